@@ -1,0 +1,143 @@
+"""What a robot is: its Pinocchio model and the figures that cost energy or set limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Symmetric limits of every joint, shape (nq,) each, SI units; `q_min`, `q_max` need not be symmetric.
+
+    `tau_max` limits the motor torque at the joint: rigid body, rotor and friction together.
+    """
+
+    q_min: Array
+    q_max: Array
+    v_max: Array
+    a_max: Array
+    j_max: Array
+    tau_max: Array
+
+    def tightened(self, **given: Array | None) -> Limits:
+        """These limits with the given ones in their place. Whether they are tighter is the caller's to check."""
+        return replace(self, **{name: value for name, value in given.items() if value is not None})
+
+
+@dataclass(frozen=True)
+class FrictionLaw:
+    """Joint friction torque, odd in the speed v and analytic.
+
+    tau_f(v) = coulomb · v / sqrt(v² + knee²) + curved · asinh(v / speed) + viscous · v
+
+    The first term is Coulomb friction whose jump is spread over `knee` [rad/s], the second the concave rise that
+    strain-wave gears show, the third viscous friction. Arrays have shape (nq,): coulomb, curved [N·m],
+    speed [rad/s], viscous [N·m·s/rad].
+    """
+
+    name: str
+    coulomb: Array
+    curved: Array
+    speed: Array
+    viscous: Array
+    knee: float = 1e-3
+
+    def torque(self, v: Array, knee: float | None = None) -> Array:
+        """Friction torque [N·m] for joint speeds v, shape (..., nq). A larger `knee` smooths the reversal further."""
+        width = self.knee if knee is None else knee
+        return np.asarray(
+            self.coulomb * v / np.sqrt(v * v + width * width)
+            + self.curved * np.arcsinh(v / self.speed)
+            + self.viscous * v
+        )
+
+
+@dataclass(frozen=True)
+class Drives:
+    """Motor and gear of every joint, joint-side, shape (nq,) each.
+
+    `torque_constant` [N·m/A], `rotor_inertia` [kg·m²], `copper` [W/A²], and the inverter's loss
+    `inverter_constant + inverter_linear·|i| + inverter_quadratic·i²` [W, W/A, W/A²].
+    """
+
+    gear_ratio: Array
+    torque_constant: Array
+    rotor_inertia: Array
+    copper: Array
+    inverter_constant: Array
+    inverter_linear: Array
+    inverter_quadratic: Array
+
+
+@dataclass(frozen=True)
+class Electronics:
+    """What the arm draws besides its motors [W]; `regeneration` is the fraction of surplus that the supply takes back."""
+
+    idle_power: float
+    controller_power: float
+    regeneration: float
+
+
+@dataclass(frozen=True)
+class DefaultMotion:
+    """How the robot's own controller moves when it is told nothing: leading-axis trapezoid [rad/s, rad/s²]."""
+
+    velocity: float
+    acceleration: float
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`.
+
+    `model` holds link inertias and rotor inertia (as armature) but neither payload nor tilted gravity: those belong
+    to a problem (see `with_payload`). `friction_laws` are named; the first one is the default. `figures` is what
+    `GET /robots/{name}` shows: every figure with its unit, source and trust letter.
+    """
+
+    name: str
+    title: str
+    model: pin.Model
+    limits: Limits
+    rated_payload: float
+    drives: Drives
+    electronics: Electronics
+    friction_laws: dict[str, FrictionLaw]
+    default_motion: DefaultMotion
+    figures: dict[str, Any] = field(repr=False)
+
+    @property
+    def nq(self) -> int:
+        """Number of joints."""
+        return int(self.model.nq)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints from base to flange."""
+        return tuple(self.model.names)[1:]
+
+    @property
+    def friction(self) -> FrictionLaw:
+        """The default friction law."""
+        return next(iter(self.friction_laws.values()))
+
+    def loaded_model(self, mass: float, com: Array, inertia: Array, gravity: Array) -> pin.Model:
+        """A copy of the model with a payload at the flange and another gravity, for the verifier and the tests.
+
+        mass [kg], com [m] in the flange frame, inertia (3, 3) about the com in flange axes [kg·m²],
+        gravity (3,) in the base frame [m/s²].
+        """
+        model = self.model.copy()
+        last = model.njoints - 1
+        flange = model.frames[model.getFrameId("flange")].placement
+        body = pin.Inertia(mass, np.asarray(com, dtype=float), np.asarray(inertia, dtype=float))
+        model.inertias[last] = model.inertias[last] + flange.act(body)
+        model.gravity.linear = np.asarray(gravity, dtype=float)
+        return model

@@ -1,0 +1,109 @@
+"""Everything that can go wrong, each error carrying its data.
+
+JoulepathError
+├── InvalidProblem          malformed or contradictory request
+│   └── OutsideLimits       given joints beyond a limit
+├── UnknownRobot
+├── UnreachablePose         no inverse kinematics solution
+├── SingularPose            every solution is singular
+├── DurationTooShort
+├── TorqueInfeasible        the arm cannot hold or move the load
+├── NoTrajectory            every candidate failed
+└── DeadlineExceeded        nothing verified in time
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from optimizer.solution import Candidate
+
+
+class JoulepathError(Exception):
+    """Base of all errors that a caller can act on; the message is one sentence that says what to do."""
+
+
+class InvalidProblem(JoulepathError):
+    """A field of the problem is malformed. `field` names it as the HTTP contract does, e.g. `limits.velocity`."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(message)
+        self.field = field
+
+
+class OutsideLimits(InvalidProblem):
+    """A given joint position lies beyond its limit [rad]."""
+
+    def __init__(self, target: str, joint: str, value: float, lower: float, upper: float) -> None:
+        super().__init__(
+            f"{target}.q",
+            f"The {target}'s {joint} is at {value:.6g} rad: give a value between {lower:.6g} and {upper:.6g} rad.",
+        )
+        self.target, self.joint, self.value, self.lower, self.upper = target, joint, value, lower, upper
+
+
+class UnknownRobot(JoulepathError):
+    """No robot of that name."""
+
+    def __init__(self, known: Sequence[str]) -> None:
+        super().__init__(f"There is no robot of that name: use one of {', '.join(known)}.")
+        self.known = list(known)
+
+
+class UnreachablePose(JoulepathError):
+    """A pose has no inverse kinematics solution within the limits.
+
+    `distance` [m] is how far the nearest reachable position of the wrist centre is, None where that is not the cause.
+    """
+
+    def __init__(self, target: str, distance: float | None, message: str) -> None:
+        super().__init__(message)
+        self.target, self.distance = target, distance
+
+
+class SingularPose(JoulepathError):
+    """Every solution of a pose is singular."""
+
+    def __init__(self, target: str, smallest_singular_value: float) -> None:
+        super().__init__(
+            f"Every arm configuration that reaches the {target} pose is singular: move the pose a few millimetres, "
+            "tilt it by a degree, or give joint angles."
+        )
+        self.target, self.smallest_singular_value = target, smallest_singular_value
+
+
+class DurationTooShort(JoulepathError):
+    """No motion is that fast; `shortest` [s] is the least feasible duration."""
+
+    def __init__(self, shortest: float) -> None:
+        super().__init__(f"No motion within the limits is that short: allow at least {shortest:.4f} s.")
+        self.shortest = shortest
+
+
+class TorqueInfeasible(JoulepathError):
+    """The arm cannot hold or move the load: `joint` needs `needed` of `available` [N·m]."""
+
+    def __init__(self, joint: str, needed: float, available: float) -> None:
+        super().__init__(
+            f"{joint} needs {needed:.4g} N·m and has {available:.4g} N·m: lighten the payload, bring it closer to "
+            "the flange, or relax the torque limit."
+        )
+        self.joint, self.needed, self.available = joint, needed, available
+
+
+class NoTrajectory(JoulepathError):
+    """Every candidate failed; `candidates` tells why."""
+
+    def __init__(self, candidates: Sequence[Candidate]) -> None:
+        super().__init__("No candidate gave a motion within the limits: relax a limit or allow a longer duration.")
+        self.candidates = list(candidates)
+
+
+class DeadlineExceeded(JoulepathError):
+    """Nothing verified in time; `candidates` tells how far the search came."""
+
+    def __init__(self, candidates: Sequence[Candidate]) -> None:
+        super().__init__("The deadline passed before any motion was verified: allow a longer deadline.")
+        self.candidates = list(candidates)

@@ -1,0 +1,194 @@
+"""What is answered: trajectory, energy, every candidate's fate, and the certificate. SI units; arrays [sample][joint]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from models.robot import Array
+
+
+@dataclass(frozen=True)
+class Spline:
+    """A clamped B-spline q(t): degree, knots (m,) [s], control points (n, nq) [rad]."""
+
+    degree: int
+    knots: Array
+    control_points: Array
+
+    @property
+    def duration(self) -> float:
+        """Length of the motion [s]."""
+        return float(self.knots[-1])
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Samples of a motion: t (k,), q, v, a, tau, tau_motor (k, nq), power (k,) drawn from the bus [W].
+
+    `tau` is rigid body and rotor; `tau_motor` adds friction.
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    a: Array
+    tau: Array
+    tau_motor: Array
+    power: Array
+    spline: Spline
+
+
+@dataclass(frozen=True)
+class ElectricalEnergy:
+    """Energy drawn from the bus [J] and the parts that add up to it; `recovered` is negative."""
+
+    total: float
+    idle: float
+    potential: float
+    kinetic: float
+    friction: float
+    copper: float
+    inverter: float
+    braking: float
+    recovered: float
+
+    @property
+    def parts_sum(self) -> float:
+        """Sum of the parts [J]: equal to `total` up to quadrature."""
+        return (
+            self.idle + self.potential + self.kinetic + self.friction
+            + self.copper + self.inverter + self.braking + self.recovered
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MechanicalEnergy:
+    """∫ Σ_j |tau_j v_j| dt [J], tau without friction, and its share per joint (nq,)."""
+
+    total: float
+    per_joint: Array
+
+
+@dataclass(frozen=True)
+class JointEnergy:
+    """Per joint (nq,) [J]: losses, and `shaft` = ∫ tau_motor · v dt."""
+
+    friction: Array
+    copper: Array
+    inverter: Array
+    shaft: Array
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Everything about a motion's energy [J, W]."""
+
+    electrical: ElectricalEnergy
+    mechanical: MechanicalEnergy
+    per_joint: JointEnergy
+    peak_power: float
+    mean_power: float
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One arm configuration: its label, e.g. `left/up/no_flip`, and joints (nq,) [rad]."""
+
+    label: str
+    q: Array
+
+
+CandidateStatus = Literal["solved", "pruned", "infeasible", "failed", "unvisited"]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A start and goal pair: what became of it, its proven bound and the energy found (of the objective) [J]."""
+
+    start: str
+    goal: str
+    q_start: Array
+    q_goal: Array
+    status: CandidateStatus
+    reason: str
+    lower_bound: float
+    energy: float | None = None
+    duration: float | None = None
+
+
+BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What another method spends between the same ends; `saving` = 1 - ours / theirs, of the objective."""
+
+    name: BaselineName
+    duration: float
+    electrical: float
+    mechanical: float
+    within_limits: bool
+    saving: float
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """The answer recomputed by Pinocchio on a 1 ms grid, apart from the solver.
+
+    `worst_ratio` maps position, velocity, acceleration, jerk, torque to the worst value / limit. `start_error` and
+    `goal_error` are (position [m], rotation [rad]) of the TCP against the pose asked for (or the forward kinematics
+    of the joints asked for).
+    `energy_error` is |fine quadrature - reported| / reported, `balance_error` |sum of parts - total| / total.
+    """
+
+    worst_ratio: dict[str, float]
+    start_error: tuple[float, float]
+    goal_error: tuple[float, float]
+    energy_error: float
+    balance_error: float
+
+    RATIO_TOLERANCE = 1e-6
+    POSITION_TOLERANCE = 1e-6
+    ENERGY_TOLERANCE = 1e-3
+
+    @property
+    def valid(self) -> bool:
+        """Whether the motion holds every limit, meets its ends and has its energy right."""
+        return (
+            max(self.worst_ratio.values()) <= 1 + self.RATIO_TOLERANCE
+            and max(self.start_error + self.goal_error) <= self.POSITION_TOLERANCE
+            and self.energy_error <= self.ENERGY_TOLERANCE
+            and self.balance_error <= self.ENERGY_TOLERANCE
+        )
+
+
+@dataclass(frozen=True)
+class SolverReport:
+    """Cost of the answer: wall time [s], iterations and programmes solved over all candidates, final stationarity."""
+
+    wall_time: float
+    iterations: int
+    nlp_solves: int
+    stationarity: float
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The motion of least energy, with its proof."""
+
+    status: Literal["optimal", "feasible"]
+    start: Branch
+    goal: Branch
+    trajectory: Trajectory
+    energy: Energy
+    lower_bound: float
+    baselines: list[Baseline]
+    candidates: list[Candidate]
+    certificate: Certificate
+    solver: SolverReport
+
+    @property
+    def duration(self) -> float:
+        """Length of the motion [s]."""
+        return self.trajectory.spline.duration
