@@ -93,9 +93,9 @@ class DefaultMotion:
     acceleration: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`.
+    """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`. Compared by identity.
 
     `model` holds link inertias and rotor inertia (as armature) but neither payload nor tilted gravity: those belong
     to a problem (see `with_payload`). `friction_laws` are named; the first one is the default. `figures` is what

@@ -1,0 +1,98 @@
+"""Robots by name: reads a robot's URDF and figures from this package."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import yaml
+
+from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, Robot
+
+ROBOTS = ("ur5e",)
+
+
+def robot_names() -> tuple[str, ...]:
+    """Names that `load_robot` knows."""
+    return ROBOTS
+
+
+@cache
+def load_robot(name: str) -> Robot:
+    """The robot of that name, loaded once per process.
+
+    Raises LookupError for a name that is not in `robot_names()`.
+    """
+    figures = load_figures(name)
+    model = _load_model(name)
+    drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
+    model.armature = drives.rotor_inertia
+    limits, electronics, motion = figures["limits"], figures["electronics"], figures["default_motion"]
+    return Robot(
+        name=name,
+        title=figures["title"],
+        model=model,
+        limits=Limits(
+            q_min=_joints(limits["position_min"], model.nq),
+            q_max=_joints(limits["position_max"], model.nq),
+            v_max=_joints(limits["velocity"], model.nq),
+            a_max=_joints(limits["acceleration"], model.nq),
+            j_max=_joints(limits["jerk"], model.nq),
+            tau_max=_joints(limits["torque"], model.nq),
+        ),
+        rated_payload=float(limits["rated_payload"]["value"]),
+        drives=drives,
+        electronics=Electronics(
+            **{part: float(electronics[part]["value"]) for part in Electronics.__dataclass_fields__}
+        ),
+        friction_laws=_friction_laws(figures, model.nq),
+        default_motion=DefaultMotion(float(motion["velocity"]["value"]), float(motion["acceleration"]["value"])),
+        figures=figures,
+    )
+
+
+def load_figures(name: str) -> dict[str, Any]:
+    """The robot's figures as they are in figures.yaml: section, figure, then value, unit, source, trust and note.
+
+    Raises LookupError for a name that is not in `robot_names()`.
+    """
+    figures: dict[str, Any] = yaml.safe_load(_read(name, "figures.yaml"))
+    return figures
+
+
+def _load_model(name: str) -> pin.Model:
+    """The URDF as a Pinocchio model. Fails on an arm that is not a chain of one-turn joints ending in `flange`."""
+    model = pin.buildModelFromXML(_read(name, f"{name}.urdf"))
+    if not (model.nq == model.nv == model.njoints - 1 and model.existFrame("flange")):
+        raise ValueError(f"{name}.urdf must be a chain of revolute joints with a link named `flange`.")
+    return model
+
+
+def _read(name: str, file: str) -> str:
+    if name not in ROBOTS:
+        raise LookupError(f"There is no robot named {name!r}: use one of {', '.join(ROBOTS)}.")
+    return (files("models") / name / file).read_text(encoding="utf-8")
+
+
+def _joints(figure: dict[str, Any], nq: int) -> Array:
+    """A figure's value as a read-only array, shape (nq,): the robot is shared by all who load it."""
+    values = np.array(figure["value"], dtype=float)
+    if values.shape != (nq,):
+        raise ValueError(f"A figure over joints must have {nq} values, not shape {values.shape}.")
+    values.setflags(write=False)
+    return values
+
+
+def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:
+    knee = float(figures["friction_table"]["knee"]["value"])
+    return {
+        name: FrictionLaw(
+            name=name,
+            knee=knee,
+            **{part: _joints(law[part], nq) for part in ("coulomb", "curved", "speed", "viscous")},
+        )
+        for name, law in figures["friction_laws"].items()
+    }

@@ -1,0 +1,154 @@
+"""The UR5e against its own figures, and against the DH table by an independent product of matrices."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.registry import load_figures, load_robot, robot_names
+from models.robot import Array, Robot
+
+# double precision over a product of seven matrices of entries about 1
+ROUNDING = 1e-14
+# the same relative to torques of up to 150 N·m
+TORQUE_ROUNDING = 1e-11
+
+
+@pytest.fixture
+def robot() -> Robot:
+    return load_robot("ur5e")
+
+
+def dh_flange(q: Array) -> Array:
+    """T_base_flange by the standard Denavit-Hartenberg table, shape (4, 4)."""
+    table = load_figures("ur5e")["kinematics"]
+    T = np.eye(4)
+    rows = zip(q, table["dh_d"]["value"], table["dh_a"]["value"], table["dh_alpha"]["value"], strict=True)
+    for theta, d, a, alpha in rows:
+        c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        T = T @ np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1]])
+    return T
+
+
+def leaves(figures: Any, path: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every figure below a section with the path to it."""
+    for name, content in figures.items():
+        if isinstance(content, dict):
+            if "value" in content:
+                yield f"{path}{name}", content
+            else:
+                yield from leaves(content, f"{path}{name}.")
+
+
+def configurations(count: int = 200) -> Array:
+    return np.random.default_rng(5).uniform(-2 * np.pi, 2 * np.pi, (count, 6))
+
+
+def test_names_load_and_others_do_not() -> None:
+    assert robot_names() == ("ur5e",)
+    assert load_robot("ur5e") is load_robot("ur5e")
+    with pytest.raises(LookupError, match="ur5e"):
+        load_robot("../ur5e")
+
+
+def test_every_figure_has_unit_source_and_trust() -> None:
+    found = dict(leaves(load_figures("ur5e")))
+    assert len(found) > 30
+    for name, figure in found.items():
+        assert set(figure) == {"value", "unit", "source", "trust", "note"}, name
+        assert figure["trust"] in tuple("ABCTE"), name
+        assert figure["unit"] and figure["source"] and figure["note"], name
+
+
+def test_no_figure_without_source_is_trusted() -> None:
+    for name, figure in leaves(load_figures("ur5e")):
+        assert figure["source"].startswith("none") == (figure["trust"] == "E"), name
+
+
+def test_forward_kinematics_is_the_dh_tables(robot: Robot) -> None:
+    data, flange = robot.model.createData(), robot.model.getFrameId("flange")
+    for q in configurations():
+        pin.framesForwardKinematics(robot.model, data, q)
+        assert np.abs(data.oMf[flange].homogeneous - dh_flange(q)).max() < ROUNDING
+
+
+def test_inertias_are_the_figures(robot: Robot) -> None:
+    figures = robot.figures["inertials"]
+    for j in range(robot.nq):
+        body = robot.model.inertias[j + 1]
+        xx, xy, xz, yy, yz, zz = figures["inertia"]["value"][j]
+        R = pin.rpy.rpyToMatrix(np.array(figures["inertia_frame_rpy"]["value"][j]))
+        assert body.mass == pytest.approx(figures["mass"]["value"][j])
+        assert body.lever == pytest.approx(figures["center_of_mass"]["value"][j], abs=ROUNDING)
+        assert body.inertia == pytest.approx(
+            R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T, abs=ROUNDING
+        )
+    assert pin.computeTotalMass(robot.model) == pytest.approx(3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365)
+
+
+def test_urdf_states_the_same_limits(robot: Robot) -> None:
+    model, limits = robot.model, robot.limits
+    assert model.lowerPositionLimit == pytest.approx(limits.q_min)
+    assert model.upperPositionLimit == pytest.approx(limits.q_max)
+    assert model.upperVelocityLimit == pytest.approx(limits.v_max)
+    assert model.upperEffortLimit == pytest.approx(limits.tau_max)
+
+
+def test_inverse_dynamics_includes_the_rotors(robot: Robot) -> None:
+    bare = robot.model.copy()
+    bare.armature = np.zeros(robot.nq)
+    rng = np.random.default_rng(1)
+    for q in configurations(20):
+        v, a = rng.uniform(-3, 3, (2, robot.nq))
+        extra = pin.rnea(robot.model, robot.model.createData(), q, v, a) - pin.rnea(bare, bare.createData(), q, v, a)
+        assert extra == pytest.approx(robot.drives.rotor_inertia * a, abs=TORQUE_ROUNDING)
+
+
+def test_a_robot_survives_the_way_to_another_process(robot: Robot) -> None:
+    copy = pickle.loads(pickle.dumps(robot))
+    assert copy.model == robot.model
+    assert (copy.model.armature == robot.drives.rotor_inertia).all()
+
+
+def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
+    mass, com, gravity = 3.2, np.array([0.03, -0.05, 0.11]), np.array([0.0, 0.0, -9.81])
+    inertia = np.array([[0.02, 0.001, -0.002], [0.001, 0.03, 0.003], [-0.002, 0.003, 0.025]])
+    loaded = robot.loaded_model(mass, com, inertia, gravity)
+    by_hand = robot.model.copy()
+    T_wrist_body = pin.SE3(np.eye(3), com)
+    by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_wrist_body)
+    rng = np.random.default_rng(2)
+    data, plain = loaded.createData(), robot.model.createData()
+    for q in configurations(20):
+        v, a = rng.uniform(-3, 3, (2, robot.nq))
+        expected = pin.rnea(by_hand, by_hand.createData(), q, v, a)
+        assert pin.rnea(loaded, data, q, v, a) == pytest.approx(expected, abs=TORQUE_ROUNDING)
+        height = (dh_flange(q) @ np.append(com, 1.0))[2]
+        work = pin.computePotentialEnergy(loaded, data, q) - pin.computePotentialEnergy(robot.model, plain, q)
+        assert work == pytest.approx(mass * 9.81 * height, abs=TORQUE_ROUNDING)
+
+
+def test_loading_leaves_the_robot_alone(robot: Robot) -> None:
+    before = robot.model.copy()
+    robot.loaded_model(5.0, np.ones(3), np.eye(3), np.array([9.81, 0.0, 0.0]))
+    assert robot.model == before
+
+
+def test_tilted_gravity_is_the_gradient_of_potential_along_it(robot: Robot) -> None:
+    gravity = np.array([3.0, -8.0, 4.5])
+    tilted = robot.loaded_model(2.0, np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)), gravity)
+    data = tilted.createData()
+    for q in configurations(20):
+        pin.centerOfMass(tilted, data, q)
+        expected = -pin.computeTotalMass(tilted) * pin.jacobianCenterOfMass(tilted, data, q).T @ gravity
+        assert pin.computeGeneralizedGravity(tilted, data, q) == pytest.approx(expected, abs=TORQUE_ROUNDING)
+
+
+def test_shared_arrays_are_read_only(robot: Robot) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        robot.limits.q_max[0] = 7.0
