@@ -1,0 +1,108 @@
+"""Creates a virtual environment with pip in it, with nothing but the standard library.
+
+Debian splits pip and ensurepip off its python3. Where they are missing, pip's wheel is fetched from the package index
+(pip's own settings for index and certificates hold) and checked against the digest pinned below.
+"""
+
+from __future__ import annotations
+
+import argparse
+import configparser
+import hashlib
+import os
+import re
+import shutil
+import ssl
+import subprocess
+import sys
+import tempfile
+import urllib.parse
+import urllib.request
+from pathlib import Path
+
+PIP_WHEEL = "pip-26.3-py3-none-any.whl"
+PIP_SHA256 = "f3b60b20ffaadd4415ed7957212a38ac63fa4c5fa375bd0f4a797777940fad13"
+OLDEST_PYTHON = (3, 11)
+
+
+def pip_setting(name: str) -> str | None:
+    """A setting as pip would find it: environment, then the user's and the machine's configuration file."""
+    from_environment = os.environ.get("PIP_" + name.upper().replace("-", "_"))
+    if from_environment:
+        return from_environment
+    user = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    files = [os.environ.get("PIP_CONFIG_FILE"), user / "pip/pip.conf", Path.home() / ".pip/pip.conf", "/etc/pip.conf"]
+    for file in filter(None, files):
+        parser = configparser.RawConfigParser()
+        parser.read(str(file))
+        if parser.has_option("global", name):
+            return parser.get("global", name)
+    return None
+
+
+def read(url: str) -> bytes:
+    """What a URL holds; credentials in it are sent as basic authentication."""
+    parts = urllib.parse.urlsplit(url)
+    handlers: list[urllib.request.BaseHandler] = [
+        urllib.request.HTTPSHandler(context=ssl.create_default_context(cafile=pip_setting("cert")))
+    ]
+    if parts.username:
+        passwords = urllib.request.HTTPPasswordMgrWithPriorAuth()
+        user, password = (urllib.parse.unquote(part or "") for part in (parts.username, parts.password))
+        parts = parts._replace(netloc=parts.netloc.rpartition("@")[2])
+        passwords.add_password(None, parts.geturl(), user, password, is_authenticated=True)
+        handlers.append(urllib.request.HTTPBasicAuthHandler(passwords))
+    with urllib.request.build_opener(*handlers).open(parts.geturl(), timeout=60) as answer:
+        content: bytes = answer.read()
+    return content
+
+
+def fetch_pip(folder: Path) -> Path:
+    """Download the pinned wheel of pip into a folder; raises ValueError where the index does not have that very file."""
+    index = (pip_setting("index-url") or "https://pypi.org/simple").rstrip("/") + "/pip/"
+    page = read(index).decode()
+    link = re.search(r'href="([^"]*/)?' + re.escape(PIP_WHEEL) + r'[^"]*"', page)
+    if link is None:
+        raise ValueError(f"the package index does not list {PIP_WHEEL}")
+    target = link.group(0)[len('href="') : -1].replace("&amp;", "&")
+    wheel = read(urllib.parse.urljoin(index, target).partition("#")[0])
+    if hashlib.sha256(wheel).hexdigest() != PIP_SHA256:
+        raise ValueError(f"{PIP_WHEEL} from the package index is not the file that was pinned")
+    path = folder / PIP_WHEEL
+    path.write_bytes(wheel)
+    return path
+
+
+def create(environment: Path) -> None:
+    """Create the environment, with pip, in place of whatever is there."""
+    shutil.rmtree(environment, ignore_errors=True)
+    venv = [sys.executable, "-m", "venv"]
+    if subprocess.run([*venv, str(environment)], capture_output=True, check=False).returncode == 0:
+        return
+    subprocess.run([*venv, "--clear", "--without-pip", str(environment)], check=True)
+    with tempfile.TemporaryDirectory() as folder:
+        wheel = fetch_pip(Path(folder))
+        python = environment / "bin" / "python"
+        run = [str(python), f"{wheel}/pip", "install", "--quiet", "--no-index", str(wheel)]
+        subprocess.run(run, check=True)
+
+
+def main() -> int:
+    """Create the environment or say in one sentence what to do."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("environment", type=Path)
+    environment: Path = parser.parse_args().environment
+    if sys.version_info < OLDEST_PYTHON:
+        print(f"Python {sys.version.split()[0]} is too old: install 3.11 or newer, or name one: make PYTHON=python3.11")
+        return 1
+    try:
+        create(environment)
+    except (OSError, ValueError, subprocess.CalledProcessError) as error:
+        shutil.rmtree(environment, ignore_errors=True)
+        print(f"No virtual environment could be made ({error}): install python3-venv and try again.", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
