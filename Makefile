@@ -1,0 +1,75 @@
+# Every target does its own set-up: nothing but Python 3.11 or newer and make has to be there.
+#   make serve   the service on http://HOST:PORT
+#   make test    every check: lint, types, architecture, tests
+#   make bench   the benchmarks
+#   make lock    renew the lockfiles
+#   make clean   remove what these made
+
+PYTHON ?= python3
+HOST ?= 127.0.0.1
+PORT ?= 8000
+VENV := .venv
+PY := $(VENV)/bin/python
+INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps
+SOURCES := app optimizer models tests benchmarks examples scripts
+
+# The optimiser compiles its kernels once per robot. Where there is no C compiler, one comes as a Python package.
+ifeq ($(shell command -v $${CC:-cc} || command -v gcc || command -v clang),)
+COMPILER := $(VENV)/bin/cc
+export CC := $(abspath $(COMPILER))
+endif
+
+export PYTHONUNBUFFERED := 1
+
+.PHONY: serve test bench lock clean lint kernels
+
+serve: $(VENV)/.runtime kernels
+	HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
+
+test: lint kernels
+	$(PY) -m pytest $(PYTEST_ARGS)
+
+lint: $(VENV)/.dev
+	$(PY) -m ruff check $(SOURCES)
+	$(PY) -m ruff format --check $(SOURCES)
+	$(PY) -m mypy
+	$(VENV)/bin/lint-imports --no-logo
+
+bench: $(VENV)/.dev kernels
+	$(PY) -m benchmarks $(BENCH_ARGS)
+
+kernels: $(VENV)/.runtime $(COMPILER)
+	@$(PY) -m optimizer.kernel
+
+# The dev lockfile holds the runtime one whole, at the same versions.
+$(VENV)/.runtime: requirements.lock $(PY)
+	@echo "Installing $< into $(VENV) ..."
+	@$(INSTALL) -r $<
+	@touch $@
+
+$(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
+	@echo "Installing $< into $(VENV) ..."
+	@$(INSTALL) -r $<
+	@touch $@
+
+$(VENV)/bin/cc: requirements-compiler.lock $(PY)
+	@echo "No C compiler on this machine: installing one into $(VENV) ..."
+	@$(INSTALL) -r $<
+	@printf '#!/bin/sh\nexec "$${0%%/*}/python" -m ziglang cc "$$@"\n' > $@
+	@chmod +x $@
+
+$(PY):
+	@$(PYTHON) scripts/bootstrap.py $(VENV)
+
+LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-url --quiet \
+	--custom-compile-command "make lock" $(LOCK_ARGS)
+
+# LOCK_ARGS=--upgrade takes the newest versions; without it, versions stay as far as pyproject.toml lets them.
+lock: $(VENV)/.dev
+	$(LOCK) pyproject.toml --output-file requirements.lock
+	$(LOCK) pyproject.toml --group dev --constraints requirements.lock --output-file requirements-dev.lock
+	$(LOCK) --group compiler --output-file requirements-compiler.lock
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
