@@ -1,0 +1,103 @@
+"""Symbolic inverse dynamics in CasADi, built from a Pinocchio model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+_Z = ca.DM([0, 0, 1])
+
+
+@dataclass(frozen=True)
+class SymbolicPayload:
+    """A body fixed to the flange as symbols: mass, com (3,) and inertia (6,) ixx ixy ixz iyy iyz izz about the com."""
+
+    mass: ca.SX
+    com: ca.SX
+    inertia: ca.SX
+
+    @staticmethod
+    def create() -> SymbolicPayload:
+        """Fresh symbols."""
+        return SymbolicPayload(ca.SX.sym("m"), ca.SX.sym("c", 3), ca.SX.sym("I", 6))
+
+
+def _tidy(matrix: np.ndarray) -> ca.DM:
+    """Drop the rounding of sines and cosines of right angles, so that CasADi drops the terms that they multiply."""
+    rounded = np.round(matrix)
+    return ca.sparsify(ca.DM(np.where(np.abs(matrix - rounded) < 1e-12, rounded, matrix)))
+
+
+def _about_origin(mass: ca.SX, com: ca.SX, inertia: ca.SX) -> ca.SX:
+    """Inertia (3, 3) about the frame's origin, by the parallel axis theorem."""
+    return inertia + mass * (ca.dot(com, com) * ca.SX.eye(3) - com @ com.T)
+
+
+def _rotation_z(angle: ca.SX) -> ca.SX:
+    c, s = ca.cos(angle), ca.sin(angle)
+    return ca.vertcat(ca.horzcat(c, -s, 0), ca.horzcat(s, c, 0), ca.horzcat(0, 0, 1))
+
+
+def inverse_dynamics(
+    model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, payload: SymbolicPayload, gravity: ca.SX, rotor: ca.SX
+) -> ca.SX:
+    """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with the payload at the frame `flange`.
+
+    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5), every link described by
+    mass, first moment and inertia about its joint frame, in which the torques are linear. `gravity` (3,) is in the
+    base frame, `rotor` (nv,) the reflected rotor inertia [kg·m²]; the model's own armature and gravity are not read.
+
+    Raises ValueError when a joint is not revolute about its z axis.
+    """
+    joints = range(1, model.njoints)
+    if any(model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints):
+        raise ValueError("the model must be a serial chain of joints that turn about their z axes")
+    rotations = {
+        i: _tidy(model.jointPlacements[i].rotation) @ _rotation_z(q[i - 1]) for i in joints
+    }
+    offsets = {i: _tidy(model.jointPlacements[i].translation) for i in joints}
+    forces: dict[int, ca.SX] = {}
+    moments: dict[int, ca.SX] = {}
+
+    omega, alpha, acceleration = ca.SX(3, 1), ca.SX(3, 1), -gravity
+    for i in joints:
+        R, p = rotations[i], offsets[i]
+        acceleration = R.T @ (acceleration + ca.cross(alpha, p) + ca.cross(omega, ca.cross(omega, p)))
+        spin = _Z * v[i - 1]
+        omega_parent = R.T @ omega
+        omega = omega_parent + spin
+        alpha = R.T @ alpha + _Z * a[i - 1] + ca.cross(omega_parent, spin)
+        mass, moment, inertia = _link(model, i, payload)
+        forces[i] = mass * acceleration + ca.cross(alpha, moment) + ca.cross(omega, ca.cross(omega, moment))
+        moments[i] = inertia @ alpha + ca.cross(omega, inertia @ omega) + ca.cross(moment, acceleration)
+
+    tau = [ca.SX(0)] * model.nv
+    force, torque = ca.SX(3, 1), ca.SX(3, 1)
+    for i in reversed(joints):
+        force, torque = forces[i] + force, moments[i] + torque
+        tau[i - 1] = torque[2] + rotor[i - 1] * a[i - 1]
+        R, p = rotations[i], offsets[i]
+        force = R @ force
+        torque = R @ torque + ca.cross(p, force)
+    return ca.vertcat(*tau)
+
+
+def _link(model: pin.Model, i: int, payload: SymbolicPayload) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Mass, first moment (3,) and inertia (3, 3) about the origin of joint i's frame; the last link bears the payload."""
+    body = model.inertias[i]
+    com = ca.SX(_tidy(body.lever))
+    mass = ca.SX(body.mass)
+    moment, inertia = mass * com, _about_origin(mass, com, ca.SX(_tidy(body.inertia)))
+    if i == model.njoints - 1:
+        flange = model.frames[model.getFrameId("flange")].placement
+        R = _tidy(flange.rotation)
+        load_com = R @ payload.com + _tidy(flange.translation)
+        ixx, ixy, ixz, iyy, iyz, izz = ca.vertsplit(payload.inertia)
+        tensor = ca.vertcat(ca.horzcat(ixx, ixy, ixz), ca.horzcat(ixy, iyy, iyz), ca.horzcat(ixz, iyz, izz))
+        mass = mass + payload.mass
+        moment = moment + payload.mass * load_com
+        inertia = inertia + _about_origin(payload.mass, load_com, R @ tensor @ R.T)
+    return mass, moment, inertia

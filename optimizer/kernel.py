@@ -1,0 +1,324 @@
+"""The per-node functions of the programme: built once per robot, compiled, and cached on disk.
+
+`node` gives cost, motor torque and their first and second derivatives at one instant of a motion; everything that a
+request may change (payload, gravity, drives, friction, objective) is a parameter. The functions are compiled by the
+system's C compiler once and kept under `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`), named by a digest of all
+that they depend on. Until the compiled file is there, or where there is no compiler, CasADi's virtual machine
+evaluates the same expressions.
+
+`python -m optimizer.kernel` compiles the kernels of all robots.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import logging
+import os
+import shutil
+import subprocess
+import tempfile
+import threading
+from dataclasses import astuple, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+import models.robot
+from models.registry import load_robot, robot_names
+from models.robot import Array, Drives, FrictionLaw, Robot
+from optimizer import dynamics, energy
+from optimizer.dynamics import SymbolicPayload, inverse_dynamics
+from optimizer.energy import drawn_power, power_flow, smooth_abs
+
+log = logging.getLogger(__name__)
+
+COMPILER_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+# nodes evaluated by one call where the caller's number varies
+CHUNK = 64
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What a request may change, in the order in which the compiled functions take it.
+
+    Shapes: com (3,), inertia (6,) ixx ixy ixz iyy iyz izz, gravity (3,), per joint (nq,). `knee` [rad/s] and `width`
+    [W] smooth friction's reversal and the cost's corners; `electrical`, `mechanical` [1] and `time` [W] weigh the cost.
+    """
+
+    mass: Any
+    com: Any
+    inertia: Any
+    gravity: Any
+    rotor_inertia: Any
+    coulomb: Any
+    curved: Any
+    speed: Any
+    viscous: Any
+    torque_constant: Any
+    copper: Any
+    inverter_constant: Any
+    inverter_linear: Any
+    inverter_quadratic: Any
+    base_power: Any
+    regeneration: Any
+    electrical: Any
+    mechanical: Any
+    time: Any
+    knee: Any
+    width: Any
+
+    def pack(self) -> Array:
+        """One vector."""
+        return np.concatenate([np.atleast_1d(np.asarray(value, dtype=float)) for value in astuple(self)])
+
+    @staticmethod
+    def symbols(nq: int) -> tuple[Parameters, ca.SX]:
+        """Symbols of the same layout, and their vector."""
+        sizes = {"com": 3, "inertia": 6, "gravity": 3}
+        scalars = {"mass", "base_power", "regeneration", "electrical", "mechanical", "time", "knee", "width"}
+        names = Parameters.__dataclass_fields__
+        values = {n: ca.SX.sym(n, sizes.get(n, 1 if n in scalars else nq)) for n in names}
+        return Parameters(**values), ca.vertcat(*values.values())
+
+
+def build(robot: Robot) -> list[ca.Function]:
+    """The functions of a robot as CasADi expressions.
+
+    `torque`(y, p) → tau: rigid body and rotor torque.
+    `value`(y, p) → cost, tau_motor.
+    `node`(y, multiplier, weight, p) → cost, tau_motor, gradient of the cost, Jacobian of tau_motor (nq, 3 nq), and the
+    Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_motor. y = (q, v, a) stacked.
+    """
+    nq = robot.nq
+    y = ca.SX.sym("y", 3 * nq)
+    q, v, a = y[:nq], y[nq : 2 * nq], y[2 * nq :]
+    par, p = Parameters.symbols(nq)
+    payload = SymbolicPayload(par.mass, par.com, par.inertia)
+    tau = inverse_dynamics(robot.model, q, v, a, payload, par.gravity, par.rotor_inertia)
+    friction = FrictionLaw("symbolic", par.coulomb, par.curved, par.speed, par.viscous, par.knee)
+    drives = Drives(
+        gear_ratio=None,  # type: ignore[arg-type]
+        torque_constant=par.torque_constant,
+        rotor_inertia=par.rotor_inertia,
+        copper=par.copper,
+        inverter_constant=par.inverter_constant,
+        inverter_linear=par.inverter_linear,
+        inverter_quadratic=par.inverter_quadratic,
+    )
+    # the inverter's |i| is rounded off over a tenth of an ampere per watt of width
+    flow = power_flow(tau, v, drives, friction, 0.1 * par.width, ca)
+    net = par.base_power + ca.sum1(flow.joints)
+    drawn = drawn_power(net, par.regeneration, par.width, ca)
+    mechanical = ca.sum1(smooth_abs(tau * v, par.width, ca))
+    cost = par.electrical * drawn + par.mechanical * mechanical + par.time
+    multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")
+    gradient = ca.gradient(cost, y)
+    jacobian = ca.jacobian(flow.tau_motor, y)
+    hessian, _ = ca.hessian(weight * cost + ca.dot(multiplier, flow.tau_motor), y)
+    dense = ca.densify
+    return [
+        ca.Function("torque", [y, p], [dense(tau)]),
+        ca.Function("value", [y, p], [cost, dense(flow.tau_motor)]),
+        ca.Function(
+            "node",
+            [y, multiplier, weight, p],
+            [cost, dense(flow.tau_motor), dense(gradient), dense(jacobian), dense(hessian)],
+            {"cse": True},
+        ),
+    ]
+
+
+FUNCTION_NAMES = ("torque", "value", "node")
+
+
+def cache_directory() -> Path:
+    """Where compiled kernels are kept."""
+    given = os.environ.get("JOULEPATH_CACHE_DIR")
+    return Path(given) if given else Path.home() / ".cache" / "joulepath"
+
+
+def digest(robot: Robot) -> str:
+    """Hash of everything that the compiled functions depend on: the chain, the sources, versions, compiler flags."""
+    h = hashlib.sha256()
+    for module in (models.robot, dynamics, energy):
+        h.update(Path(str(module.__file__)).read_bytes())
+    h.update(Path(__file__).read_bytes())
+    h.update(repr((ca.__version__, COMPILER_FLAGS, os.uname().machine)).encode())
+    for placement, body in zip(robot.model.jointPlacements, robot.model.inertias, strict=True):
+        h.update(np.asarray(placement.homogeneous).tobytes())
+        h.update(np.asarray(body.toDynamicParameters()).tobytes())
+    flange = robot.model.frames[robot.model.getFrameId("flange")].placement
+    h.update(np.asarray(flange.homogeneous).tobytes())
+    return h.hexdigest()[:24]
+
+
+def _library(robot: Robot) -> Path:
+    return cache_directory() / f"{robot.name}-{digest(robot)}.so"
+
+
+def _seal(path: Path) -> Path:
+    """File that holds the library's own hash, so that a damaged library is noticed before it is loaded."""
+    return path.with_suffix(".sha256")
+
+
+def _intact(path: Path) -> bool:
+    try:
+        return _seal(path).read_text() == hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return False
+
+
+def compiler() -> str | None:
+    """The system's C compiler, or None."""
+    return shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc") or shutil.which("clang")
+
+
+def compile_kernel(robot: Robot) -> Path:
+    """Compile a robot's functions into the cache, once however many processes ask; returns the library.
+
+    Raises RuntimeError where there is no compiler or it fails, OSError where the cache cannot be written.
+    """
+    target = _library(robot)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with (target.with_suffix(".lock")).open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if _intact(target):
+            return target
+        command = compiler()
+        if command is None:
+            raise RuntimeError("no C compiler found")
+        with tempfile.TemporaryDirectory(dir=target.parent) as folder:
+            generator = ca.CodeGenerator("kernel.c", {"with_header": False})
+            for function in build(robot):
+                generator.add(function)
+            generator.generate(folder + "/")
+            library = Path(folder) / "kernel.so"
+            source = str(Path(folder) / "kernel.c")
+            run = subprocess.run(
+                [command, *COMPILER_FLAGS, source, "-o", str(library), "-lm"], capture_output=True, text=True
+            )
+            if run.returncode:
+                raise RuntimeError(f"the C compiler failed: {run.stderr[-500:]}")
+            seal = Path(folder) / "kernel.sha256"
+            seal.write_text(hashlib.sha256(library.read_bytes()).hexdigest())
+            # the seal first: a library without its seal counts as damaged, a seal without its library as absent
+            seal.replace(_seal(target))
+            library.replace(target)
+    return target
+
+
+class _Mapped:
+    """A function mapped over a fixed number of nodes, called on numpy buffers without copies or conversions."""
+
+    def __init__(self, function: ca.Function, count: int) -> None:
+        self._function = function.map(count)
+        self._buffer, self._run = self._function.buffer()
+        self.arguments = [
+            np.zeros(self._function.size_in(i)[::-1]) for i in range(self._function.n_in())
+        ]
+        self.results = [
+            np.zeros(self._function.size_out(i)[::-1]) for i in range(self._function.n_out())
+        ]
+        for i, array in enumerate(self.arguments):
+            self._buffer.set_arg(i, memoryview(array))
+        for i, array in enumerate(self.results):
+            self._buffer.set_res(i, memoryview(array))
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        """Evaluate; row k of every argument belongs to node k. The results are overwritten by the next call."""
+        for own, given in zip(self.arguments, arguments, strict=True):
+            own[...] = given
+        self._run()
+        return self.results
+
+
+class Kernel:
+    """A robot's functions, ready to be called on arrays of nodes. Not for several threads at once."""
+
+    def __init__(self, robot: Robot, functions: list[ca.Function], compiled: bool) -> None:
+        self.nq = robot.nq
+        self.compiled = compiled
+        self._functions = dict(zip(FUNCTION_NAMES, functions, strict=True))
+        self._mapped: dict[tuple[str, int], _Mapped] = {}
+
+    def _map(self, name: str, count: int) -> _Mapped:
+        key = (name, count)
+        if key not in self._mapped:
+            self._mapped[key] = _Mapped(self._functions[name], count)
+        return self._mapped[key]
+
+    def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
+        """Cost (N,), tau_motor (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N, 3nq, 3nq).
+
+        y (N, 3nq), multiplier (N, nq), weight (N,), p packed `Parameters`. Views that the next call overwrites.
+        """
+        count, nq = len(y), self.nq
+        cost, tau, gradient, jacobian, hessian = self._map("node", count)(y, multiplier, weight[:, None], p)
+        return (
+            cost[:, 0],
+            tau,
+            gradient,
+            jacobian.reshape(count, 3 * nq, nq).transpose(0, 2, 1),
+            hessian.reshape(count, 3 * nq, 3 * nq),
+        )
+
+    def value(self, y: Array, p: Array) -> tuple[Array, Array]:
+        """Cost (N,) and tau_motor (N, nq). Views that the next call overwrites."""
+        cost, tau = self._map("value", len(y))(y, p)
+        return cost[:, 0], tau
+
+    def torque(self, q: Array, v: Array, a: Array, p: Array) -> Array:
+        """Rigid body and rotor torque tau (k, nq) for any number of samples."""
+        count = len(q)
+        mapped = self._map("torque", CHUNK)
+        y = np.zeros((-(-count // CHUNK) * CHUNK, 3 * self.nq))
+        y[:count] = np.hstack([q, v, a])
+        return np.concatenate([mapped(y[i : i + CHUNK], p)[0].copy() for i in range(0, len(y), CHUNK)])[:count]
+
+
+class _Loader:
+    """Holds a robot's kernel and swaps the compiled one in when it is there."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._library = _library(robot)
+        self._kernel: Kernel | None = None
+        self._compiling: threading.Thread | None = None
+
+    def get(self) -> Kernel:
+        if self._kernel is not None and (self._kernel.compiled or not _seal(self._library).exists()):
+            return self._kernel
+        if _intact(self._library):
+            functions = [ca.external(name, str(self._library)) for name in FUNCTION_NAMES]
+            self._kernel = Kernel(self._robot, functions, compiled=True)
+        elif self._kernel is None:
+            self._kernel = Kernel(self._robot, build(self._robot), compiled=False)
+        if not self._kernel.compiled and self._compiling is None and compiler() is not None:
+            self._compiling = threading.Thread(target=self._compile, name="kernel-compiler", daemon=True)
+            self._compiling.start()
+        return self._kernel
+
+    def _compile(self) -> None:
+        try:
+            compile_kernel(self._robot)
+        except (RuntimeError, OSError) as error:
+            log.warning("kernel of %s not compiled, the virtual machine serves: %s", self._robot.name, error)
+
+
+@cache
+def _loader(robot: Robot) -> _Loader:
+    return _Loader(robot)
+
+
+def kernel_for(robot: Robot) -> Kernel:
+    """The kernel of a robot: compiled if the cache has it, else interpreted while the compiler runs."""
+    return _loader(robot).get()
+
+
+if __name__ == "__main__":
+    for robot_name in robot_names():
+        print(compile_kernel(load_robot(robot_name)))

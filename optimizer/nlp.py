@@ -1,0 +1,202 @@
+"""The nonlinear programme of one candidate: a B-spline between two configurations, its cost, limits and derivatives.
+
+Unknowns are the free control points s (m, r) and the duration T. The spline runs in coordinates s ∈ R^r with
+q = origin + directions · s: the joints themselves (r = nq) for a B-spline motion, or the fraction of the straight line
+(r = 1) for a time-scaled one. At a node τ of [0, 1]
+
+    q = s(τ),  v = s'(τ) / T,  a = s''(τ) / T²,       cost = T Σ_k w_k ℓ(q_k, v_k, a_k).
+
+Limits on speed, acceleration and jerk are written |s^(d)(τ)| ≤ limit_d · T^d: linear in s, and since T^d is convex, a
+linear model of such a row is never looser than the row, so a step that holds the model holds the limit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.robot import Array, Limits
+from optimizer.bspline import REST_POINTS, Basis
+from optimizer.kernel import Kernel
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """Value and derivatives of a programme at one point; x = (free control points row by row, T).
+
+    `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau_motor, `tau` (N, nq), and the means to
+    differentiate single torques: `jacobian` (N, nq, 3, r), `rate` (N, 3, r) = ∂(s, v, a)/∂T.
+    """
+
+    cost: float
+    gradient: Array
+    hessian: Array
+    tau: Array
+    jacobian: Array
+    rate: Array
+
+
+@dataclass(frozen=True)
+class Programme:
+    """One candidate's programme. Limits `s_*` are in the spline's coordinates (r,); `tau_max` (nq,) is per joint.
+
+    `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it.
+    """
+
+    kernel: Kernel
+    basis: Basis
+    p: Array
+    origin: Array
+    directions: Array
+    s_start: Array
+    s_goal: Array
+    s_limits: Limits
+    t_min: float
+    t_max: float
+
+    @staticmethod
+    def joint_space(
+        kernel: Kernel, basis: Basis, p: Array, q_start: Array, q_goal: Array, limits: Limits, t_min: float, t_max: float
+    ) -> Programme:
+        """Every joint has a spline of its own."""
+        nq = len(q_start)
+        return Programme(kernel, basis, p, np.zeros(nq), np.eye(nq), q_start, q_goal, limits, t_min, t_max)
+
+    @staticmethod
+    def straight_line(
+        kernel: Kernel, basis: Basis, p: Array, q_start: Array, q_goal: Array, limits: Limits, t_min: float, t_max: float
+    ) -> Programme:
+        """All joints share one time law along the straight line from start to goal."""
+        travel = q_goal - q_start
+        length = np.maximum(np.abs(travel), 1e-12)
+        zero, one = np.zeros(1), np.ones(1)
+        shared = Limits(
+            q_min=zero,
+            q_max=one,
+            v_max=np.array([(limits.v_max / length).min()]),
+            a_max=np.array([(limits.a_max / length).min()]),
+            j_max=np.array([(limits.j_max / length).min()]),
+            tau_max=limits.tau_max,
+        )
+        return Programme(kernel, basis, p, q_start, travel[:, None], zero, one, shared, t_min, t_max)
+
+    @property
+    def r(self) -> int:
+        """Number of the spline's coordinates."""
+        return self.directions.shape[1]
+
+    @property
+    def free_count(self) -> int:
+        """Number of free control points."""
+        return self.basis.n - 2 * REST_POINTS
+
+    @cached_property
+    def rates(self) -> Array:
+        """Limits of the first to third derivative of s, (3, r)."""
+        return np.stack([self.s_limits.v_max, self.s_limits.a_max, self.s_limits.j_max])
+
+    @cached_property
+    def _full_space(self) -> bool:
+        return self.r == self.kernel.nq
+
+    def points(self, free: Array) -> Array:
+        """All control points (n, r) for the free ones (m, r)."""
+        ends = np.ones((REST_POINTS, 1))
+        return np.concatenate([ends * self.s_start, free, ends * self.s_goal])
+
+    def joint_points(self, free: Array) -> Array:
+        """Control points of q, (n, nq)."""
+        return self.origin + self.points(free) @ self.directions.T
+
+    def straight(self) -> Array:
+        """Free control points (m, r) of the rest-to-rest quintic along the straight line."""
+        return self.s_start + np.outer(self.basis.quintic[self.basis.free], self.s_goal - self.s_start)
+
+    def _states(self, free: Array, T: float) -> tuple[Array, Array]:
+        """s, v, a in the spline's coordinates (N, 3, r), and the kernel's nodes y (N, 3 nq)."""
+        z = self.basis.at_nodes @ self.points(free)
+        z[1] /= T
+        z[2] /= T * T
+        z = z.transpose(1, 0, 2)
+        if self._full_space:
+            return z, z.reshape(len(z), -1)
+        y = z @ self.directions.T
+        y[:, 0] += self.origin
+        return z, y.reshape(len(y), -1)
+
+    def value(self, free: Array, T: float) -> tuple[float, Array]:
+        """Cost [J] and motor torques (N, nq)."""
+        _, y = self._states(free, T)
+        cost, tau = self.kernel.value(y, self.p)
+        return T * float(self.basis.weights @ cost), tau
+
+    def derivatives(self, free: Array, T: float, multiplier: Array) -> Linearisation:
+        """Everything of first and second order; `multiplier` (N, nq) weighs the torques in the Hessian."""
+        z, y = self._states(free, T)
+        count, nq, r, m = len(y), self.kernel.nq, self.r, self.free_count
+        w = self.basis.weights
+        cost, tau, gradient, jacobian, hessian = self.kernel.node(y, multiplier, T * w, self.p)
+        G = gradient.reshape(count, 3, nq)
+        J = jacobian.reshape(count, nq, 3, nq)
+        H = hessian.reshape(count, 3, nq, 3, nq)
+        if not self._full_space:
+            P = self.directions
+            G, J = G @ P, J @ P
+            H = np.moveaxis(np.moveaxis(H @ P, 2, -1) @ P, -1, 2)
+
+        total = float(w @ cost)
+        scale = np.array([1.0, 1.0 / T, 1.0 / (T * T)])
+        D = self._nodes_free * scale[:, None]
+        rate = z * np.array([0.0, -1.0 / T, -2.0 / T])[:, None]
+        slope = (w[:, None, None] * G * rate).sum()
+        flat = D.reshape(count * 3, m)
+        wG = (w[:, None, None] * G).reshape(count * 3, r)
+        gradient_s = T * (flat.T @ wG)
+        gradient_T = total + T * slope
+
+        # Σ_k D_kᵀ H_k D_k as two dense products
+        left = D.transpose(0, 2, 1) @ H.reshape(count, 3, r * 3 * r)
+        left = left.reshape(count, m, r, 3, r).transpose(1, 2, 4, 0, 3).reshape(m * r * r, count * 3)
+        H_ss = (left @ flat).reshape(m, r, r, m).transpose(0, 1, 3, 2).reshape(m * r, m * r)
+        H_rate = (H.reshape(count, 3 * r, 3 * r) @ rate.reshape(count, 3 * r, 1)).reshape(count, 3, r)
+        weighted_torque = (multiplier[:, None, :] @ J.reshape(count, nq, 3 * r)).reshape(count, 3, r)
+        lagrangian = T * w[:, None, None] * G + weighted_torque
+        D_rate = D * np.array([0.0, -1.0 / T, -2.0 / T])[:, None]
+        H_sT = (
+            flat.T @ H_rate.reshape(count * 3, r)
+            + D_rate.reshape(count * 3, m).T @ lagrangian.reshape(count * 3, r)
+            + gradient_s / T
+        )
+        curvature = z * np.array([0.0, 2.0 / (T * T), 6.0 / (T * T)])[:, None]
+        H_TT = 2 * slope + (rate * H_rate).sum() + (lagrangian * curvature).sum()
+        hessian_x = np.empty((m * r + 1, m * r + 1))
+        hessian_x[:-1, :-1] = H_ss
+        hessian_x[:-1, -1] = hessian_x[-1, :-1] = H_sT.ravel()
+        hessian_x[-1, -1] = H_TT
+        return Linearisation(
+            cost=T * total,
+            gradient=np.append(gradient_s.ravel(), gradient_T),
+            hessian=hessian_x,
+            tau=tau,
+            jacobian=J,
+            rate=rate,
+        )
+
+    @cached_property
+    def _nodes_free(self) -> Array:
+        """Basis and derivatives of the free control points at the nodes, (N, 3, m)."""
+        return np.ascontiguousarray(self.basis.at_nodes[:, :, self.basis.free].transpose(1, 0, 2))
+
+    def torque_rows(self, line: Linearisation, T: float, k: Array, j: Array) -> Array:
+        """Gradients (rows, n) of the torques of joints j at nodes k with respect to x."""
+        J = line.jacobian[k, j]
+        scale = np.array([1.0, 1.0 / T, 1.0 / (T * T)])
+        by_points = np.einsum("kdm,kdr->kmr", self._nodes_free[k] * scale[:, None], J).reshape(len(k), -1)
+        by_time = np.einsum("kdr,kdr->k", J, line.rate[k])
+        return np.hstack([by_points, by_time[:, None]])
+
+    def kinematics(self, free: Array) -> Array:
+        """First to third derivative of s by τ on the fine grid, (3, M, r)."""
+        return self.basis.at_grid @ self.points(free)
