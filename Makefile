@@ -45,6 +45,7 @@ kernels: $(VENV)/.runtime $(COMPILER)
 $(VENV)/.runtime: requirements.lock $(PY)
 	@echo "Installing $< into $(VENV) ..."
 	@$(INSTALL) -r $<
+	@$(PY) scripts/link_libgomp.py
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
