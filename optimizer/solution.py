@@ -138,26 +138,29 @@ class Certificate:
 
     `worst_ratio` maps position, velocity, acceleration, jerk, torque to the worst value / limit. `start_error` and
     `goal_error` are (position [m], rotation [rad]) of the TCP against the pose asked for (or the forward kinematics
-    of the joints asked for).
+    of the joints asked for). `rest_error` is the worst |v| / v_max and |a| / a_max at the two ends.
     `energy_error` is |fine quadrature - reported| / reported, `balance_error` |sum of parts - total| / total.
     """
 
     worst_ratio: dict[str, float]
     start_error: tuple[float, float]
     goal_error: tuple[float, float]
+    rest_error: float
     energy_error: float
     balance_error: float
 
     RATIO_TOLERANCE = 1e-6
     POSITION_TOLERANCE = 1e-6
+    REST_TOLERANCE = 1e-9
     ENERGY_TOLERANCE = 1e-3
 
     @property
     def valid(self) -> bool:
-        """Whether the motion holds every limit, meets its ends and has its energy right."""
+        """Whether the motion holds every limit, meets its ends at rest and has its energy right. NaN is not valid."""
         return (
-            max(self.worst_ratio.values()) <= 1 + self.RATIO_TOLERANCE
-            and max(self.start_error + self.goal_error) <= self.POSITION_TOLERANCE
+            all(ratio <= 1 + self.RATIO_TOLERANCE for ratio in self.worst_ratio.values())
+            and all(error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error)
+            and self.rest_error <= self.REST_TOLERANCE
             and self.energy_error <= self.ENERGY_TOLERANCE
             and self.balance_error <= self.ENERGY_TOLERANCE
         )

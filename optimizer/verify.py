@@ -1,0 +1,140 @@
+"""The certificate: a motion replayed by Pinocchio on a fine grid, apart from the optimiser's basis and dynamics.
+
+Nothing is taken from the solver but the spline that is returned to the caller and the energies claimed for it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import BSpline
+
+from models.robot import Array, Limits
+from optimizer.energy import breakdown
+from optimizer.problem import Pose, Problem
+from optimizer.solution import Certificate, Energy, Spline
+
+GRID_PERIOD = 1e-3  # s, at most
+LEAST_INTERVALS = 100  # so that motions under 0.1 s are not judged by a handful of samples
+ENERGY_FLOOR = 1e-6  # J; below it a relative error says nothing
+
+
+def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy) -> Certificate:
+    """Replay `spline` and hold it against everything that was asked and reported.
+
+    q_start, q_goal (nq,) [rad] are the joint positions that the answer names as its ends. The grid is uniform, of at
+    most 1 ms, and includes both ends. Motions that leave the spline's own knots give NaN, which no tolerance passes.
+    """
+    robot, payload = problem.robot, problem.payload
+    model = robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.gravity)
+    data = model.createData()
+
+    t = _grid(spline.duration)
+    curve = BSpline(spline.knots, spline.control_points, spline.degree, extrapolate=False)
+    q, v, a, jerk = (np.ascontiguousarray(curve(t, order)) for order in range(4))
+    tau = _inverse_dynamics(model, data, q, v, a)
+    tau_motor = tau + problem.friction_law.torque(v)
+
+    energy = breakdown(
+        _simpson_weights(t),
+        v,
+        tau,
+        potential=_change([pin.computePotentialEnergy(model, data, q[i]) for i in (0, -1)]),
+        kinetic=_change([pin.computeKineticEnergy(model, data, q[i], v[i]) for i in (0, -1)]),
+        drives=robot.drives,
+        friction=problem.friction_law,
+        electronics=robot.electronics,
+    )
+    limits = problem.active_limits
+    return Certificate(
+        worst_ratio=limit_ratios(limits, q, v, a, jerk, tau_motor),
+        start_error=_end_error(problem, problem.start, q_start, q[0], model, data),
+        goal_error=_end_error(problem, problem.goal, q_goal, q[-1], model, data),
+        rest_error=float(np.max([np.abs(v[[0, -1]]) / limits.v_max, np.abs(a[[0, -1]]) / limits.a_max])),
+        energy_error=_worst(
+            _relative(energy.electrical.total, reported.electrical.total),
+            _relative(energy.mechanical.total, reported.mechanical.total),
+        ),
+        balance_error=_worst(
+            *(_relative(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
+        ),
+    )
+
+
+def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, float]:
+    """The worst value / limit over samples and joints; arrays (k, nq), where k may differ between them.
+
+    A position's ratio is its distance from the middle of the joint's range over half the range, so that 1 is on a
+    limit, also where the two limits are not opposite.
+    """
+    middle, half = (limits.q_max + limits.q_min) / 2, (limits.q_max - limits.q_min) / 2
+    return {
+        "position": float((np.abs(q - middle) / half).max()),
+        "velocity": float((np.abs(v) / limits.v_max).max()),
+        "acceleration": float((np.abs(a) / limits.a_max).max()),
+        "jerk": float((np.abs(jerk) / limits.j_max).max()),
+        "torque": float((np.abs(tau_motor) / limits.tau_max).max()),
+    }
+
+
+def _grid(duration: float) -> Array:
+    """Times (k,) [s]: an even number of equal intervals of at most GRID_PERIOD, both ends included."""
+    pairs = math.ceil(max(duration / GRID_PERIOD, LEAST_INTERVALS) / 2)
+    return np.linspace(0.0, duration, 2 * pairs + 1)
+
+
+def _simpson_weights(t: Array) -> Array:
+    """Weights (k,) [s] of Simpson's rule; where |x| has its corner the error falls with h² instead of h⁴."""
+    weights = np.full(len(t), 2.0)
+    weights[1::2] = 4.0
+    weights[[0, -1]] = 1.0
+    return np.asarray(weights * (t[-1] / (3 * (len(t) - 1))))
+
+
+def _inverse_dynamics(model: pin.Model, data: pin.Data, q: Array, v: Array, a: Array) -> Array:
+    """Rigid body and rotor torques (k, nv): Pinocchio's recursion adds armature · a."""
+    tau = np.empty_like(v)
+    rnea = pin.rnea
+    for k, (q_k, v_k, a_k) in enumerate(zip(q, v, a, strict=True)):
+        tau[k] = rnea(model, data, q_k, v_k, a_k)
+    return tau
+
+
+def _end_error(
+    problem: Problem, target: Array | Pose, named: Array, reached: Array, model: pin.Model, data: pin.Data
+) -> tuple[float, float]:
+    """(position [m], rotation [rad]) between the TCP reached and the target.
+
+    Forward kinematics cannot tell joint positions a full turn apart: the rotation is the largest joint's deviation
+    from the joints named (and from those asked for) where that is more.
+    """
+    T_reached = _tcp(problem, reached, model, data)
+    if isinstance(target, Pose):
+        T_asked, joints = target.T, [named]
+    else:
+        T_asked, joints = _tcp(problem, target, model, data), [named, target]
+    position = float(np.linalg.norm(T_reached[:3, 3] - T_asked[:3, 3]))
+    rotation = float(np.linalg.norm(pin.log3(T_asked[:3, :3].T @ T_reached[:3, :3])))
+    return position, _worst(rotation, *(float(np.abs(reached - each).max()) for each in joints))
+
+
+def _tcp(problem: Problem, q: Array, model: pin.Model, data: pin.Data) -> Array:
+    """T_base_tcp (4, 4) by forward kinematics."""
+    pin.forwardKinematics(model, data, q)
+    T_base_flange = pin.updateFramePlacement(model, data, model.getFrameId("flange"))
+    return np.asarray(T_base_flange.homogeneous @ problem.T_flange_tcp)
+
+
+def _change(ends: list[float]) -> float:
+    return ends[1] - ends[0]
+
+
+def _relative(value: float, reference: float) -> float:
+    return abs(value - reference) / max(abs(reference), ENERGY_FLOOR)
+
+
+def _worst(*values: float) -> float:
+    """The largest; NaN if any is NaN, unlike `max`."""
+    return float(np.max(values))
