@@ -111,5 +111,5 @@ def breakdown(
         mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),
         per_joint=per_joint,
         peak_power=float(drawn.max()),
-        mean_power=total / duration,
+        mean_power=total / duration if duration > 0 else 0.0,
     )
