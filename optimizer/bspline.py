@@ -28,6 +28,28 @@ def basis_matrix(n: int, points: Array, derivative: int = 0) -> Array:
     return np.ascontiguousarray(spline.derivative(derivative)(points) if derivative else spline(points))
 
 
+def greville(n: int) -> Array:
+    """Greville points (n,): where a spline's control values stand for its values; it interpolates there uniquely."""
+    knots = clamped_knots(n)
+    return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
+
+
+def fit(samples: Array, at: Array, n: int) -> Array:
+    """Control points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at points (k,) in [0, 1]."""
+    matrix = basis_matrix(n, at)
+    ends = np.zeros((n, samples.shape[1]))
+    ends[:REST_POINTS], ends[-REST_POINTS:] = samples[0], samples[-1]
+    inner = slice(REST_POINTS, n - REST_POINTS)
+    ends[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ ends, rcond=None)[0]
+    return ends
+
+
+def refine(points: Array, n: int) -> Array:
+    """Control points (n, r) of the same spline where its n - DEGREE spans split those of `points` (m, r) evenly."""
+    x = greville(n)
+    return np.linalg.solve(basis_matrix(n, x), basis_matrix(len(points), x) @ points)
+
+
 @dataclass(frozen=True)
 class Basis:
     """A spline space of n control points with everything that does not depend on a request.
@@ -63,9 +85,8 @@ def basis(n: int, least_nodes: int = 31, grid_per_span: int = 64) -> Basis:
     weights = np.tile(half * w, spans)
     grid = np.linspace(0.0, 1.0, spans * grid_per_span + 1)
     at_nodes = np.stack([basis_matrix(n, nodes, d) for d in range(3)])
-    knots = clamped_knots(n)
-    greville = np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
-    quintic = np.linalg.solve(basis_matrix(n, greville), greville**3 * (10 - 15 * greville + 6 * greville**2))
+    x = greville(n)
+    quintic = np.linalg.solve(basis_matrix(n, x), x**3 * (10 - 15 * x + 6 * x**2))
     return Basis(
         n=n,
         nodes=nodes,

@@ -1,0 +1,145 @@
+"""A problem made ready to compute with, and what a spline motion does in it: samples, torques, energy, limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import BSpline
+
+from models.robot import Array, FrictionLaw
+from optimizer import bspline
+from optimizer.energy import breakdown, drawn_power, power_flow
+from optimizer.kernel import Kernel, Parameters, kernel_for
+from optimizer.problem import Problem
+from optimizer.solution import Energy, Spline, Trajectory
+
+# smoothing that the optimiser works with: friction's reversal [rad/s] and the corners of |power| [W]
+KNEE = 0.02
+WIDTH = 0.5
+# quadrature points per knot span for reported energies
+REPORT_NODES = 16
+
+
+@dataclass(frozen=True)
+class Task:
+    """A problem with its kernel and Pinocchio model: shared by all candidates of one request."""
+
+    problem: Problem
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The robot's compiled functions."""
+        return kernel_for(self.problem.robot)
+
+    @cached_property
+    def model(self) -> pin.Model:
+        """Pinocchio model with payload and gravity."""
+        payload = self.problem.payload
+        return self.problem.robot.loaded_model(payload.mass, payload.com, payload.inertia, self.problem.gravity)
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self.model.createData()
+
+    def parameters(self, electrical: float = 0.0, mechanical: float = 0.0, time: float = 0.0) -> Array:
+        """Packed kernel parameters with the given weights on energies [1] and duration [W]."""
+        problem = self.problem
+        robot, payload, friction = problem.robot, problem.payload, problem.friction_law
+        drives, electronics = robot.drives, robot.electronics
+        return Parameters(
+            mass=payload.mass,
+            com=payload.com,
+            inertia=payload.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]],
+            gravity=problem.gravity,
+            rotor_inertia=drives.rotor_inertia,
+            coulomb=friction.coulomb,
+            curved=friction.curved,
+            speed=friction.speed,
+            viscous=friction.viscous,
+            torque_constant=drives.torque_constant,
+            copper=drives.copper,
+            inverter_constant=drives.inverter_constant,
+            inverter_linear=drives.inverter_linear,
+            inverter_quadratic=drives.inverter_quadratic,
+            base_power=electronics.idle_power + electronics.controller_power,
+            regeneration=electronics.regeneration,
+            electrical=electrical,
+            mechanical=mechanical,
+            time=time,
+            knee=KNEE,
+            width=WIDTH,
+        ).pack()
+
+    @cached_property
+    def objective_parameters(self) -> Array:
+        """Parameters of the problem's objective."""
+        return self.parameters(**{self.problem.objective: 1.0})
+
+    @cached_property
+    def fastest_parameters(self) -> Array:
+        """Parameters that make the duration the cost."""
+        return self.parameters(time=1.0)
+
+    @property
+    def friction(self) -> FrictionLaw:
+        """The friction law in force."""
+        return self.problem.friction_law
+
+    def torques(self, q: Array, v: Array, a: Array) -> Array:
+        """Rigid body and rotor torques (k, nq) [N·m]."""
+        return self.kernel.torque(q, v, a, self.objective_parameters)
+
+    def potential(self, q: Array) -> float:
+        """Potential energy [J] of arm and payload."""
+        return float(pin.computePotentialEnergy(self.model, self._data, q))
+
+    def energy(self, spline: Spline) -> Energy:
+        """Energy of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
+        weights, q, v, a = _quadrature(spline)
+        ends = spline.control_points
+        return breakdown(
+            weights,
+            v,
+            self.torques(q, v, a),
+            self.potential(ends[-1]) - self.potential(ends[0]),
+            self.problem.robot.drives,
+            self.friction,
+            self.problem.robot.electronics,
+        )
+
+    def objective_of(self, energy: Energy) -> float:
+        """The part of an energy that is minimised [J]."""
+        return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total
+
+    def trajectory(self, spline: Spline) -> Trajectory:
+        """Samples at the problem's period; the last one lies on the end."""
+        duration, period = spline.duration, self.problem.sample_period
+        # a remainder below a millionth of a period is rounding, not a sample of its own
+        t = np.append(np.arange(int(np.ceil(duration / period - 1e-6))) * period, duration)
+        q, v, a = _sample(spline, t)
+        tau = self.torques(q, v, a)
+        robot = self.problem.robot
+        flow = power_flow(tau, v, robot.drives, self.friction)
+        net = robot.electronics.idle_power + robot.electronics.controller_power + flow.joints.sum(axis=1)
+        power = drawn_power(net, robot.electronics.regeneration)
+        return Trajectory(t, q, v, a, tau, flow.tau_motor, power, spline)
+
+
+def spline_of(control_points: Array, duration: float) -> Spline:
+    """A clamped spline of the given control points (n, nq) that lasts `duration` [s]."""
+    return Spline(bspline.DEGREE, bspline.clamped_knots(len(control_points)) * duration, control_points)
+
+
+def _sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
+    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    return curve(t), curve.derivative(1)(t), curve.derivative(2)(t)
+
+
+def _quadrature(spline: Spline) -> tuple[Array, Array, Array, Array]:
+    space = bspline.basis(len(spline.control_points), REPORT_NODES * (len(spline.control_points) - bspline.DEGREE))
+    T, points = spline.duration, spline.control_points
+    q, v, a = space.at_nodes @ points
+    return space.weights * T, q, v / T, a / (T * T)

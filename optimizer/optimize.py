@@ -1,0 +1,188 @@
+"""optimize(problem) → Solution: the one door."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from models.registry import load_robot
+from optimizer import bspline, search
+from optimizer.baselines import baselines, guesses, nearest
+from optimizer.candidate import FINE, FINEST, Attempt, Guess, attempt
+from optimizer.exceptions import (
+    DeadlineExceeded,
+    DurationTooShort,
+    InvalidProblem,
+    NoTrajectory,
+)
+from optimizer.kernel import kernel_for
+from optimizer.motion import Task
+from optimizer.problem import Problem
+from optimizer.search import Entry
+from optimizer.solution import Baseline, Branch, Solution, SolverReport
+from optimizer.verify import certify
+
+# share of the deadline kept for checking and reporting the answer, at most [s]
+RESERVE_SHARE, RESERVE = 0.2, 0.1
+# a baseline counts as better only beyond the quadrature's own error
+SLACK = 1e-6
+
+
+def optimize(problem: Problem) -> Solution:
+    """Find the motion of least energy between the problem's targets, certified against every limit.
+
+    Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, TorqueInfeasible, DurationTooShort,
+    NoTrajectory, DeadlineExceeded, or InvalidProblem for a payload beyond the robot's rating.
+    """
+    return _Run(problem).solution()
+
+
+class _Run:
+    """One request being worked on: its candidates and what was spent on them."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.began = time.perf_counter()
+        self.deadline = self.began + problem.deadline - min(RESERVE_SHARE * problem.deadline, RESERVE)
+        self.problem = problem
+        self.task = Task(problem)
+        self.entries: list[Entry] = []
+        self.iterations = self.solves = 0
+
+    def solution(self) -> Solution:
+        problem, task = self.problem, self.task
+        self.entries = search.pairs(task, search.ends(task, "start"), search.ends(task, "goal"))
+        search.bound(task, self.entries)
+        if problem.payload.mass > problem.robot.rated_payload:
+            rating = problem.robot.rated_payload
+            raise InvalidProblem("payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg.")
+        search.explore(task, self.entries, lambda entry: self.attempt(entry), self.deadline)
+        if self.best() is None:
+            self.race()
+        while (best := self.best()) is not None:
+            self.refine(best)
+            table = self.compared(best)
+            best = self.best() or best
+            answer = self.answer(best, table)
+            if answer is not None:
+                return answer
+            best.status, best.reason, best.energy = "failed", "the certificate did not confirm it", None
+        if any(entry.status == "unvisited" for entry in self.entries):
+            raise DeadlineExceeded([entry.report() for entry in self.entries])
+        raise NoTrajectory([entry.report() for entry in self.entries])
+
+    def best(self) -> Entry | None:
+        """The solved entry of least energy."""
+        return min((e for e in self.entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
+
+    def attempt(self, entry: Entry, **options: Any) -> Attempt:
+        """Attempt a candidate and count what it takes."""
+        outcome = attempt(self.task, entry.q_start, entry.q_goal, self.deadline, **options)
+        self.iterations += outcome.iterations
+        self.solves += outcome.solves
+        return outcome
+
+    def race(self) -> None:
+        """No candidate holds the duration: find the fastest motion, and either start from it or say how long it takes.
+
+        Raises DurationTooShort when even the fastest motion found takes longer than allowed.
+        """
+        longest = self.problem.duration_max
+        if longest is None:
+            return
+        quickest, shortest = None, np.inf
+        runners = [e for e in self.entries if np.isfinite(e.lower_bound) or e.shortest > longest]
+        for entry in sorted(runners, key=lambda e: e.shortest):
+            if entry.shortest >= shortest or time.perf_counter() > self.deadline:
+                break
+            outcome = self.attempt(entry, control_points=(FINE, FINEST), fastest=True)
+            if outcome.spline is not None and outcome.spline.duration < shortest:
+                quickest, shortest, spline = entry, outcome.spline.duration, outcome.spline
+        if quickest is None:
+            return
+        if shortest > longest:
+            raise DurationTooShort(shortest)
+        guess = Guess(spline.control_points, shortest)
+        self.improve(quickest, self.attempt(quickest, control_points=(len(spline.control_points),), guess=guess))
+
+    def improve(self, entry: Entry, outcome: Attempt) -> None:
+        """Take a new attempt at the entry if it spends less."""
+        if outcome.spline is None:
+            return
+        energy = self.task.objective_of(self.task.energy(outcome.spline))
+        if entry.energy is None or energy < entry.energy:
+            entry.attempt, entry.energy, entry.status, entry.reason = outcome, energy, "solved", outcome.reason
+
+    def refine(self, entry: Entry) -> None:
+        """More control points for the winner, warm."""
+        assert entry.attempt is not None and entry.attempt.spline is not None
+        spline = entry.attempt.spline
+        if len(spline.control_points) >= FINE or time.perf_counter() > self.deadline:
+            return
+        guess = Guess(bspline.refine(spline.control_points, FINE), spline.duration)
+        self.improve(entry, self.attempt(entry, control_points=(FINE,), guess=guess))
+
+    def compared(self, best: Entry) -> list[Baseline]:
+        """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
+        for n in (FINE, FINEST, 2 * FINEST):
+            assert best.attempt is not None and best.attempt.spline is not None and best.energy is not None
+            duration = best.attempt.spline.duration
+            peers = [e for e in self.entries if np.array_equal(e.q_start, best.q_start)]
+            q_goals = np.array([e.q_goal for e in peers])
+            table = baselines(
+                self.problem, best.q_start, q_goals, duration, best.energy, self.task.torques, self.task.potential
+            )
+            better = [b.name for b in table if b.within_limits and b.saving < -SLACK and self.allows(b.duration)]
+            if not better or time.perf_counter() > self.deadline:
+                break
+            q_nearest = nearest(self.problem, best.q_start, q_goals)
+            entry = next(e for e in peers if np.array_equal(e.q_goal, q_nearest))
+            motions = guesses(self.problem, best.q_start, q_nearest, duration)
+            for name in better:
+                motion = motions[name]
+                points = bspline.fit(motion.q, motion.t / motion.duration, n)
+                guess = Guess(points, motion.duration)
+                self.improve(entry, self.attempt(entry, control_points=(n,), guess=guess))
+            best = self.best() or best
+        return table
+
+    def allows(self, duration: float) -> bool:
+        """Whether the request lets a motion take that long."""
+        least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
+        return bool(least * (1 - SLACK) <= duration <= most * (1 + SLACK))
+
+    def answer(self, best: Entry, table: list[Baseline]) -> Solution | None:
+        """The solution around the best entry, None when its certificate fails."""
+        assert best.attempt is not None and best.attempt.spline is not None
+        spline = best.attempt.spline
+        energy = self.task.energy(spline)
+        certificate = certify(self.problem, spline, best.q_start, best.q_goal, energy)
+        if not certificate.valid:
+            return None
+        return Solution(
+            status="feasible" if any(e.status in ("unvisited", "failed") for e in self.entries) else "optimal",
+            start=Branch(best.start.label, best.q_start),
+            goal=Branch(best.goal.label, best.q_goal),
+            trajectory=self.task.trajectory(spline),
+            energy=energy,
+            lower_bound=min(e.lower_bound for e in self.entries),
+            baselines=table,
+            candidates=[e.report() for e in self.entries],
+            certificate=certificate,
+            solver=SolverReport(
+                wall_time=time.perf_counter() - self.began,
+                iterations=self.iterations,
+                nlp_solves=self.solves,
+                stationarity=best.attempt.stationarity,
+            ),
+        )
+
+
+def warm_up(robot_name: str) -> None:
+    """Load a robot and its kernel and solve a small problem, so that the first request finds everything ready."""
+    robot = load_robot(robot_name)
+    kernel_for(robot)
+    middle = (robot.limits.q_min + robot.limits.q_max) / 2
+    optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot))
+    optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot, method="time_scaling"))

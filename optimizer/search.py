@@ -1,0 +1,186 @@
+"""Which candidates there are, in which order they are solved, and which bound rules the others out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.bounds import lower_bounds
+from optimizer.candidate import Attempt
+from optimizer.exceptions import TorqueInfeasible, UnreachablePose
+from optimizer.inverse_kinematics import inverse_kinematics_for, turns
+from optimizer.motion import Task
+from optimizer.problem import Pose
+from optimizer.solution import Candidate, CandidateStatus
+
+FULL_TURN = 2 * np.pi
+# two relative windings that differ by less are the same [rad]
+SAME_TRAVEL = 1e-9
+
+
+@dataclass(frozen=True)
+class End:
+    """One branch at an end of the motion: its label, and for every joint the positions that the limits allow [rad]."""
+
+    label: str
+    q: Array
+    choices: list[list[float]]
+    fixed: bool
+
+
+@dataclass
+class Entry:
+    """A start and goal pair and what is known of it; `energy` is exact, in the objective [J]."""
+
+    start: End
+    goal: End
+    q_start: Array
+    q_goal: Array
+    lower_bound: float = 0.0
+    shortest: float = 0.0
+    status: CandidateStatus = "unvisited"
+    reason: str = "not reached before the deadline"
+    energy: float | None = None
+    attempt: Attempt | None = field(default=None, repr=False)
+
+    def report(self) -> Candidate:
+        """The candidate as it is answered."""
+        spline = self.attempt.spline if self.attempt is not None else None
+        return Candidate(
+            start=self.start.label,
+            goal=self.goal.label,
+            q_start=self.q_start,
+            q_goal=self.q_goal,
+            status=self.status,
+            reason=self.reason,
+            lower_bound=self.lower_bound,
+            energy=self.energy,
+            duration=None if spline is None else spline.duration,
+        )
+
+
+def ends(task: Task, name: str) -> list[End]:
+    """The branches at `start` or `goal` that the problem allows, none of them singular.
+
+    Raises UnreachablePose or SingularPose; UnreachablePose also when the branch asked for does not reach the pose.
+    """
+    problem = task.problem
+    target = getattr(problem, name)
+    kinematics, limits = inverse_kinematics_for(problem.robot), problem.active_limits
+    if not isinstance(target, Pose):
+        return [End(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True)]
+    solutions = kinematics.solve(target.T, problem.T_flange_tcp, limits, windings=False, target=name)
+    wanted = problem.branch
+    if wanted is not None:
+        parts = ("shoulder", "elbow", "wrist")
+        solutions = [
+            s for s in solutions if all(getattr(wanted, p) in (None, getattr(s.label, p)) for p in parts)
+        ]
+        if not solutions:
+            raise UnreachablePose(
+                name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
+            )
+    return [End(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False) for s in solutions]
+
+
+def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry]:
+    """Every pair of branches with every winding that makes a motion of its own.
+
+    Dynamics does not know full turns: where both ends are poses, pairs of the same relative travel are one candidate,
+    and those that turn a joint by more than a full turn are left out, since the same pair of branches without that turn
+    travels less in that joint and no further in the others, under a bound that is never higher.
+    Without `windings`, the one of least travel.
+    """
+    result = []
+    for start in starts:
+        for goal in goals:
+            options = [
+                _joint_options(s, g, start.fixed or goal.fixed, task.problem.windings)
+                for s, g in zip(start.choices, goal.choices, strict=True)
+            ]
+            for combination in product(*options):
+                both = np.array(combination)
+                result.append(Entry(start, goal, both[:, 0], both[:, 1]))
+    return result
+
+
+def _joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
+    """(start, goal) of one joint for each relative travel, least travel first."""
+    both = sorted(product(starts, goals), key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])))
+    if not windings:
+        return both[:1]
+    if fixed:
+        return both
+    kept: list[tuple[float, float]] = []
+    for s, g in both:
+        fresh = all(abs((g - s) - (other[1] - other[0])) > SAME_TRAVEL for other in kept)
+        if fresh and (not kept or abs(g - s) < FULL_TURN + SAME_TRAVEL):
+            kept.append((s, g))
+    return kept
+
+
+def bound(task: Task, entries: Sequence[Entry]) -> None:
+    """Rule out the pairs whose ends the arm cannot hold, and give every entry its lower bound and least duration.
+
+    Raises TorqueInfeasible when the arm can hold no pair at all.
+    """
+    problem = task.problem
+    tau_max = problem.active_limits.tau_max
+    potential: dict[int, float] = {}
+    holding: dict[int, Array] = {}
+    for entry in entries:
+        for end in (entry.start, entry.goal):
+            if id(end) not in potential:
+                zero = np.zeros_like(end.q)
+                potential[id(end)] = task.potential(end.q)
+                holding[id(end)] = np.abs(task.torques(end.q[None], zero[None], zero[None])[0])
+    travel = np.array([entry.q_goal - entry.q_start for entry in entries])
+    climb = np.array([potential[id(entry.goal)] - potential[id(entry.start)] for entry in entries])
+    bounds, shortest = lower_bounds(task, travel, climb)
+    for entry, value, least in zip(entries, bounds.tolist(), shortest.tolist(), strict=True):
+        entry.lower_bound, entry.shortest = value, least
+        for end in (entry.start, entry.goal):
+            excess = holding[id(end)] / tau_max
+            if excess.max() > 1:
+                joint = problem.robot.joint_names[int(excess.argmax())]
+                entry.status, entry.reason = "infeasible", f"{joint} cannot hold the load at an end of the motion"
+                entry.lower_bound = np.inf
+        if entry.status == "unvisited" and not np.isfinite(value):
+            entry.status, entry.reason = "infeasible", f"takes at least {least:.4f} s"
+    if entries and all(entry.reason.endswith("at an end of the motion") for entry in entries):
+        _, worst = min(((holding[key] / tau_max).max(), key) for key in holding if (holding[key] / tau_max).max() > 1)
+        j = int((holding[worst] / tau_max).argmax())
+        raise TorqueInfeasible(problem.robot.joint_names[j], float(holding[worst][j]), float(tau_max[j]))
+
+
+def explore(
+    task: Task,
+    entries: Sequence[Entry],
+    attempt: Callable[[Entry], Attempt],
+    deadline: float,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Entry | None:
+    """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none."""
+    best: Entry | None = None
+    for entry in sorted(entries, key=lambda e: e.lower_bound):
+        if entry.status != "unvisited":
+            continue
+        if best is not None and best.energy is not None and entry.lower_bound >= best.energy:
+            entry.status, entry.reason = "pruned", "its lower bound is not below the best energy found"
+            continue
+        if clock() > deadline:
+            break
+        entry.attempt = outcome = attempt(entry)
+        if outcome.status == "out of time":
+            break
+        entry.status, entry.reason = outcome.status, outcome.reason
+        if outcome.spline is not None:
+            entry.energy = task.objective_of(task.energy(outcome.spline))
+            if best is None or best.energy is None or entry.energy < best.energy:
+                best = entry
+    return best

@@ -1,0 +1,72 @@
+"""The shortest time law along the straight line in joint space, by toppra (Pham, Pham 2018).
+
+toppra knows speed, acceleration and torque, not jerk: its law bounds the duration of every time-scaled motion from
+below, says whether there is one at all, and shapes the first guess.
+"""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+import toppra
+from toppra import algorithm, constraint
+
+from models.robot import Array
+from optimizer.bspline import greville
+from optimizer.motion import Task
+
+logging.getLogger("toppra").setLevel(logging.ERROR)
+
+GRID = np.linspace(0.0, 1.0, 61)
+# share of toppra's duration that counts as proven: its constraints hold at the grid points only
+TRUST = 0.98
+
+
+@dataclass(frozen=True)
+class ShortestLaw:
+    """Fractions of the line GRID (61,) reached at `times` (61,) [s], from rest to rest."""
+
+    times: Array
+
+    @property
+    def duration_bound(self) -> float:
+        """No time-scaled motion is shorter [s]."""
+        return TRUST * float(self.times[-1])
+
+    def fractions(self, n: int) -> Array:
+        """Control values (n,) of a spline over [0, 1] that follows the law, at rest at both ends."""
+        values = np.interp(greville(n) * self.times[-1], self.times, GRID)
+        values[:3], values[-3:] = 0.0, 1.0
+        return np.asarray(values)
+
+
+def shortest_law(task: Task, q_start: Array, q_goal: Array) -> ShortestLaw | None:
+    """The shortest law under speed, acceleration and torque limits, None where there is none.
+
+    The motor torque's limit is relaxed by the most that friction can lend: the result stays a bound.
+    """
+    limits, model = task.problem.active_limits, task.model
+    travel = q_goal - q_start
+    if not np.abs(travel).max() > 0:
+        return ShortestLaw(np.linspace(0.0, 1e-9, len(GRID)))
+    data = model.createData()
+
+    def torque(q: Array, v: Array, a: Array) -> Array:
+        return np.asarray(pin.rnea(model, data, q, v, a))
+
+    tau = limits.tau_max + task.friction.torque(limits.v_max)
+    none = np.zeros(len(travel))
+    path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([travel, travel]))
+    constraints = [
+        constraint.JointVelocityConstraint(np.stack([-limits.v_max, limits.v_max], axis=1)),
+        constraint.JointAccelerationConstraint(np.stack([-limits.a_max, limits.a_max], axis=1)),
+        constraint.JointTorqueConstraint(torque, np.stack([-tau, tau], axis=1), none),
+    ]
+    _, speed, _ = algorithm.TOPPRA(constraints, path, gridpoints=GRID).compute_parameterization(0.0, 0.0)
+    if speed is None or not np.isfinite(speed).all():
+        return None
+    steps = 2 * np.diff(GRID) / (speed[1:] + speed[:-1])
+    return ShortestLaw(np.concatenate([[0.0], np.cumsum(steps)]))
