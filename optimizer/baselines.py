@@ -150,8 +150,10 @@ def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential
 
 def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:
     """Whether a motion holds every limit: its exact peaks of the rates, positions and motor torques at its samples."""
+    limits = problem.active_limits
     tau_motor = tau + problem.friction_law.torque(motion.v)
-    ratios = limit_ratios(problem.active_limits, motion.q, motion.peak_v, motion.peak_a, motion.peak_jerk, tau_motor)
+    jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
+    ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_motor)
     return all(ratio <= 1 + RATIO_TOLERANCE for ratio in ratios.values())
 
 
