@@ -223,6 +223,17 @@ def test_energies_balance() -> None:
         assert energy.parts_sum == pytest.approx(energy.total, rel=BALANCE)
 
 
+@pytest.mark.parametrize("friction", list(ROBOT.friction_laws))
+def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
+    """Each law's own loss, ∫ v · friction(v) dt, from the motion's samples."""
+    task = problem(friction=friction)
+    torques, potential = oracle(task)
+    motion = quintic(START, GOAL, DURATION)
+    energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential)
+    loss = motion.weights @ (motion.v * ROBOT.friction_laws[friction].torque(motion.v))
+    assert energy.per_joint.friction == pytest.approx(loss, rel=EXACT)
+
+
 def test_energies_are_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Against twenty times as many quadrature panels, over random moves."""
     rng = np.random.default_rng(6)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi as ca
 import numpy as np
 import pinocchio as pin
@@ -38,18 +40,22 @@ def random_gravity(rng: np.random.Generator) -> Array:
     return 9.81 * direction / np.linalg.norm(direction)
 
 
-@pytest.fixture(scope="module")
-def symbolic() -> ca.Function:
+def build(model: pin.Model) -> ca.Function:
     """(q, v, a, payload's mass, com, inertia, gravity, rotor) → torques and their Jacobians by q, v and a."""
-    nq = ROBOT.nq
+    nq = model.nq
     q, v, a, rotor = (ca.SX.sym(name, nq) for name in ("q", "v", "a", "rotor"))
     gravity, payload = ca.SX.sym("g", 3), SymbolicPayload.create()
-    tau = inverse_dynamics(ROBOT.model, q, v, a, payload, gravity, rotor)
+    tau = inverse_dynamics(model, q, v, a, payload, gravity, rotor)
     return ca.Function(
         "inverse_dynamics",
         [q, v, a, payload.mass, payload.com, payload.inertia, gravity, rotor],
         [tau, ca.jacobian(tau, q), ca.jacobian(tau, v), ca.jacobian(tau, a)],
     )
+
+
+@pytest.fixture(scope="module")
+def symbolic() -> ca.Function:
+    return build(ROBOT.model)
 
 
 def evaluate(symbolic: ca.Function, q: Array, v: Array, a: Array, load: Load, gravity: Array) -> list[Array]:
@@ -110,6 +116,21 @@ def test_payload_hangs_from_the_flange(symbolic: ca.Function) -> None:
         assert loaded[j] - empty[j] == pytest.approx(
             oMj.rotation[:, 2] @ np.cross(lever, -mass * gravity), abs=TORQUE_TOLERANCE
         )
+
+
+def test_the_flange_may_be_turned() -> None:
+    """The UR5e's flange is parallel to its last link; on an arm where it is not, com and inertia turn with it."""
+    rng = np.random.default_rng(4)
+    model = ROBOT.model.copy()
+    flange = model.frames[model.getFrameId("flange")]
+    flange.placement = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.8, 1.1), np.array([0.02, 0.01, 0.05]))
+    turned, symbolic = replace(ROBOT, model=model), build(model)
+    for _ in range(20):
+        q, v, a = rng.uniform(-3.0, 3.0, (3, ROBOT.nq))
+        load, gravity = random_payload(rng), random_gravity(rng)
+        oracle = turned.loaded_model(*load, gravity)
+        expected = pin.rnea(oracle, oracle.createData(), q, v, a)
+        assert np.abs(evaluate(symbolic, q, v, a, load, gravity)[0][:, 0] - expected).max() < TORQUE_TOLERANCE
 
 
 def test_refuses_a_joint_of_another_kind() -> None:
