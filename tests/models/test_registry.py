@@ -62,7 +62,7 @@ def test_every_figure_has_unit_source_and_trust() -> None:
     for name, figure in found.items():
         assert set(figure) == {"value", "unit", "source", "trust", "note"}, name
         assert figure["trust"] in tuple("ABCTE"), name
-        assert figure["unit"] and figure["source"] and figure["note"], name
+        assert all(figure[part] for part in ("unit", "source", "note")), name
 
 
 def test_no_figure_without_source_is_trusted() -> None:
