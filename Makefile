@@ -24,7 +24,7 @@ export PYTHONUNBUFFERED := 1
 .PHONY: serve test bench lock clean lint kernels
 
 serve: $(VENV)/.runtime kernels
-	HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
+	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
 test: lint kernels
 	$(PY) -m pytest $(PYTEST_ARGS)

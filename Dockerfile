@@ -1,0 +1,47 @@
+ARG BASE_IMAGE=debian:bookworm-slim
+
+# Installs the locked dependencies, leaves behind what only builds need, compiles the kernels.
+FROM ${BASE_IMAGE} AS build
+# A package index other than PyPI: --build-arg PIP_INDEX_URL=…
+ARG PIP_INDEX_URL
+RUN apt-get update \
+    && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
+        binutils ca-certificates gcc libc6-dev libgomp1 python3-venv
+WORKDIR /opt/joulepath
+ENV PATH=/opt/joulepath/venv/bin:$PATH
+COPY requirements.lock scripts/slim.py /tmp/
+RUN python3 -m venv venv \
+    && pip install --no-cache-dir --no-compile --disable-pip-version-check --require-hashes --no-deps \
+        -r /tmp/requirements.lock \
+    && pip uninstall --yes --quiet pip setuptools \
+    && python /tmp/slim.py venv
+COPY LICENSE ./
+COPY models models
+COPY optimizer optimizer
+COPY app app
+ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
+# Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
+RUN mkdir /opt/matplotlib \
+    && python -c "import importlib, pkgutil; [importlib.import_module(m.name) for p in ('app', 'optimizer', 'models') for m in pkgutil.walk_packages([p], p + '.') if not m.name.endswith('__main__')]" \
+    && python -m optimizer.kernel
+
+FROM ${BASE_IMAGE}
+RUN apt-get update \
+    && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends libgomp1 python3 \
+    && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/* \
+    && useradd --system --uid 10001 --home-dir /opt/joulepath --no-create-home joulepath
+WORKDIR /opt/joulepath
+COPY --from=build /opt/joulepath .
+# matplotlib, which toppra imports, keeps its cache only where it may write
+COPY --from=build --chown=joulepath /opt/matplotlib /opt/matplotlib
+ENV PATH=/opt/joulepath/venv/bin:$PATH \
+    PYTHONUNBUFFERED=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    JOULEPATH_CACHE_DIR=/opt/joulepath/kernels \
+    MPLCONFIGDIR=/opt/matplotlib \
+    PORT=8000
+USER joulepath
+EXPOSE 8000
+HEALTHCHECK --interval=10s --timeout=3s --start-period=30s --retries=3 \
+    CMD ["python", "-c", "import os, urllib.request; urllib.request.urlopen(f'http://127.0.0.1:{os.environ[\"PORT\"]}/healthz', timeout=2)"]
+CMD ["python", "-m", "app"]
