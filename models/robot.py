@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -49,12 +49,13 @@ class FrictionLaw:
     viscous: Array
     knee: float = 1e-3
 
-    def torque(self, v: Array, knee: float | None = None) -> Array:
-        """Friction torque [N·m] for joint speeds v, shape (..., nq). A larger `knee` smooths the reversal further."""
-        width = self.knee if knee is None else knee
-        return np.asarray(
-            self.coulomb * v / np.sqrt(v * v + width * width)
-            + self.curved * np.arcsinh(v / self.speed)
+    FORMULA: ClassVar[str] = "coulomb v / sqrt(v² + knee²) + curved asinh(v / speed) + viscous v"
+
+    def torque(self, v: Any, xp: Any = np) -> Any:
+        """Friction torque [N·m] for joint speeds v, shape (..., nq); `xp` is numpy, or casadi for symbols."""
+        return (
+            self.coulomb * v / xp.sqrt(v * v + self.knee * self.knee)
+            + self.curved * xp.asinh(v / self.speed)
             + self.viscous * v
         )
 
@@ -78,7 +79,7 @@ class Drives:
 
 @dataclass(frozen=True)
 class Electronics:
-    """What the arm draws besides its motors [W]; `regeneration` is the fraction of surplus that the supply takes back."""
+    """What the arm draws besides its motors [W]; `regeneration`: the fraction of surplus that the supply takes back."""
 
     idle_power: float
     controller_power: float

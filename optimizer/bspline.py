@@ -1,4 +1,4 @@
-"""Clamped B-splines on [0, 1] with evenly spaced knots: basis matrices, quadrature nodes, and the limit grid."""
+"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the limit grid."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import BSpline
 
 from models.robot import Array
@@ -16,82 +17,110 @@ DEGREE = 5
 REST_POINTS = 3
 
 
-def clamped_knots(n: int) -> Array:
-    """Knots (n + DEGREE + 1,) of a clamped spline of n control points over [0, 1]."""
-    inner = np.linspace(0.0, 1.0, n - DEGREE + 1)
-    return np.concatenate([np.zeros(DEGREE), inner, np.ones(DEGREE)])
+# least number of nodes that a motion's cost is summed over, and of points where its peaks are looked for
+LEAST_NODES = 31
+GRID_POINTS = 512
+# parts into which the anchors of speed, acceleration and jerk divide a span: these have degree 4, 3 and 2 there
+ANCHORS = (2, 4, 4)
 
 
-def basis_matrix(n: int, points: Array, derivative: int = 0) -> Array:
+def clamped(breaks: Array) -> Array:
+    """Clamped knots over [0, 1] from breaks (k,) that begin with 0 and end with 1."""
+    return np.concatenate([np.zeros(DEGREE), breaks, np.ones(DEGREE)])
+
+
+def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
     """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
-    spline = BSpline(clamped_knots(n), np.eye(n), DEGREE)
+    n = len(knots) - DEGREE - 1
+    spline = BSpline(knots, np.eye(n), DEGREE)
     return np.ascontiguousarray(spline.derivative(derivative)(points) if derivative else spline(points))
 
 
-def greville(n: int) -> Array:
+def greville(knots: Array) -> Array:
     """Greville points (n,): where a spline's control values stand for its values; it interpolates there uniquely."""
-    knots = clamped_knots(n)
+    n = len(knots) - DEGREE - 1
     return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
 
 
-def fit(samples: Array, at: Array, n: int) -> Array:
+def quadrature(knots: Array, per_span: int) -> tuple[Array, Array]:
+    """Gauss-Legendre points and weights (spans · per_span,) over every knot span of [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(per_span)
+    edges = np.unique(knots)
+    half = np.diff(edges)[:, None] / 2
+    return (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+
+
+def fit(samples: Array, at: Array, knots: Array) -> Array:
     """Control points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at points (k,) in [0, 1]."""
-    matrix = basis_matrix(n, at)
-    ends = np.zeros((n, samples.shape[1]))
-    ends[:REST_POINTS], ends[-REST_POINTS:] = samples[0], samples[-1]
-    inner = slice(REST_POINTS, n - REST_POINTS)
-    ends[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ ends, rcond=None)[0]
-    return ends
+    matrix = basis_matrix(knots, at)
+    points = np.zeros((matrix.shape[1], samples.shape[1]))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
+    inner = slice(REST_POINTS, len(points) - REST_POINTS)
+    points[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ points, rcond=None)[0]
+    return points
 
 
-def refine(points: Array, n: int) -> Array:
-    """Control points (n, r) of the same spline where its n - DEGREE spans split those of `points` (m, r) evenly."""
-    x = greville(n)
-    return np.linalg.solve(basis_matrix(n, x), basis_matrix(len(points), x) @ points)
+def refit(points: Array, knots: Array, onto: Array) -> Array:
+    """Control points (n, r) over the knots `onto` that interpolate the spline of `points` (m, r) over `knots`.
+
+    Exact where `onto` refines `knots`.
+    """
+    x = greville(onto)
+    return np.linalg.solve(basis_matrix(onto, x), basis_matrix(knots, x) @ points)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Basis:
-    """A spline space of n control points with everything that does not depend on a request.
+    """A spline space over [0, 1] of n control points, with everything that does not depend on a request.
 
     `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, where cost and torque are evaluated;
     `at_nodes` (3, N, n): basis and its first two derivatives there. `at_grid` (3, M, n): first to third derivative on
-    a uniform grid fine enough to find the peaks of speed, acceleration and jerk. `quintic` (n,): the control values of
-    the rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which the space contains.
+    a grid fine enough to find the peaks of speed, acceleration and jerk; `anchors` (3, M) marks the few of its points
+    per span that hold each derivative down along a stretch at its limit. `quintic` (n,): the control values of the
+    rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which the space contains.
     """
 
-    n: int
+    knots: Array
     nodes: Array
     weights: Array
     at_nodes: Array
     at_grid: Array
+    anchors: npt.NDArray[np.bool_]
     quintic: Array
+
+    @property
+    def n(self) -> int:
+        """Number of control points."""
+        return len(self.quintic)
 
     @property
     def free(self) -> slice:
         """The control points that rest at the ends leaves free."""
         return slice(REST_POINTS, self.n - REST_POINTS)
 
+    @staticmethod
+    def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
+        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; knots may be repeated up to three times."""
+        spans = len(np.unique(knots)) - 1
+        nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), 3))
+        edges = np.unique(knots)
+        # a hair off the edges: at a repeated knot jerk jumps, and both of its values count
+        per_span = 4 * max(math.ceil(grid_points / spans / 4), 4)
+        grid = (edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)).ravel()
+        step = np.arange(len(grid)) % (per_span + 1)
+        x = greville(knots)
+        return Basis(
+            knots=knots,
+            nodes=nodes,
+            weights=weights,
+            at_nodes=np.stack([basis_matrix(knots, nodes, d) for d in range(3)]),
+            at_grid=np.stack([basis_matrix(knots, grid, d) for d in range(1, 4)]),
+            anchors=np.stack([step % (per_span // parts) == 0 for parts in ANCHORS]),
+            quintic=np.linalg.solve(basis_matrix(knots, x), x**3 * (10 - 15 * x + 6 * x**2)),
+        )
+
 
 @cache
-def basis(n: int, least_nodes: int = 31, grid_per_span: int = 64) -> Basis:
-    """The spline space of n ≥ 7 control points (cached)."""
-    spans = n - DEGREE
-    per_span = math.ceil(least_nodes / spans)
-    x, w = np.polynomial.legendre.leggauss(max(per_span, 3))
-    edges = np.linspace(0.0, 1.0, spans + 1)
-    half = 0.5 / spans
-    nodes = (edges[:-1, None] + half * (1 + x)).ravel()
-    weights = np.tile(half * w, spans)
-    grid = np.linspace(0.0, 1.0, spans * grid_per_span + 1)
-    at_nodes = np.stack([basis_matrix(n, nodes, d) for d in range(3)])
-    x = greville(n)
-    quintic = np.linalg.solve(basis_matrix(n, x), x**3 * (10 - 15 * x + 6 * x**2))
-    return Basis(
-        n=n,
-        nodes=nodes,
-        weights=weights,
-        at_nodes=at_nodes,
-        at_grid=np.stack([basis_matrix(n, grid, d) for d in range(1, 4)]),
-        quintic=quintic,
-    )
+def uniform(n: int) -> Basis:
+    """The space of n ≥ 7 control points with evenly spaced knots."""
+    return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))

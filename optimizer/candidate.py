@@ -9,9 +9,10 @@ from typing import Literal
 import numpy as np
 
 from models.robot import Array, Limits
-from optimizer import bspline, shortest_line
+from optimizer import shortest_line
 from optimizer.bounds import LEAST_DURATION, LONGEST_DURATION
-from optimizer.motion import Task, spline_of
+from optimizer.bspline import Basis, uniform
+from optimizer.motion import Task, fine_samples, spline_of
 from optimizer.nlp import Programme
 from optimizer.solution import Spline
 from optimizer.solve import FEASIBILITY, Result, solve
@@ -57,7 +58,7 @@ def attempt(
     q_start: Array,
     q_goal: Array,
     deadline: float,
-    control_points: Sequence[int] = (COARSE, FINE, FINEST),
+    spaces: Sequence[Basis] = (uniform(COARSE), uniform(FINE), uniform(FINEST)),
     guess: Guess | None = None,
     fastest: bool = False,
 ) -> Attempt:
@@ -66,29 +67,29 @@ def attempt(
     `fastest` minimises the duration in place of the problem's objective.
     """
     outcome = Attempt("failed", "not tried", 0, 0)
-    for n in control_points:
-        fresh = _attempt(task, q_start, q_goal, deadline, n, guess, fastest)
+    for space in spaces:
+        fresh = _attempt(task, q_start, q_goal, deadline, space, guess, fastest)
         outcome = replace(fresh, iterations=fresh.iterations + outcome.iterations, solves=fresh.solves + outcome.solves)
         if outcome.status in ("solved", "out of time"):
             break
     return outcome
 
 
-def _programme(task: Task, q_start: Array, q_goal: Array, n: int, limits: Limits, fastest: bool) -> Programme:
+def _programme(task: Task, q_start: Array, q_goal: Array, space: Basis, limits: Limits, fastest: bool) -> Programme:
     problem = task.problem
     t_min = LEAST_DURATION if problem.duration_min is None or fastest else problem.duration_min
     t_max = LONGEST_DURATION if problem.duration_max is None or fastest else problem.duration_max
     p = task.fastest_parameters if fastest else task.objective_parameters
     build = Programme.straight_line if problem.method == "time_scaling" else Programme.joint_space
-    return build(task.kernel, bspline.basis(n), p, q_start, q_goal, limits, t_min, t_max)
+    return build(task.kernel, space, p, q_start, q_goal, limits, t_min, t_max)
 
 
 def _attempt(
-    task: Task, q_start: Array, q_goal: Array, deadline: float, n: int, guess: Guess | None, fastest: bool
+    task: Task, q_start: Array, q_goal: Array, deadline: float, space: Basis, guess: Guess | None, fastest: bool
 ) -> Attempt:
     problem = task.problem
     limits = _scaled(problem.active_limits, 1 - MARGIN)
-    programme = _programme(task, q_start, q_goal, n, limits, fastest)
+    programme = _programme(task, q_start, q_goal, space, limits, fastest)
     if problem.method == "time_scaling":
         law = shortest_line.shortest_law(task, q_start, q_goal)
         if law is None:
@@ -98,7 +99,7 @@ def _attempt(
             return Attempt("infeasible", reason, 0, 0)
         t_min = max(programme.t_min, law.duration_bound)
         programme = replace(programme, t_min=t_min)
-        first = (law.fractions(n)[programme.basis.free, None], t_min)
+        first = (law.fractions(programme.basis.knots)[programme.basis.free, None], t_min)
     elif guess is not None:
         first = (guess.points[programme.basis.free], guess.duration)
     else:
@@ -113,11 +114,11 @@ def _attempt(
         if result.status == "out of time":
             return Attempt("out of time", "the deadline passed", iterations, solves)
         if result.violation > FEASIBILITY:
-            reason = f"no motion of {n} control points holds the limits (worst excess {result.violation:.2g})"
+            reason = f"no motion of {space.n} control points holds the limits (worst excess {result.violation:.2g})"
             return Attempt("infeasible", reason, iterations, solves)
         excess = _excess(task, programme, result)
         if excess is None:
-            spline = spline_of(programme.joint_points(result.free), result.duration)
+            spline = spline_of(programme.basis, programme.joint_points(result.free), result.duration)
             status: Literal["solved", "failed"] = "solved"
             return Attempt(status, "converged", iterations, solves, spline, result.cost, result.stationarity)
         limits = replace(
@@ -127,7 +128,7 @@ def _attempt(
             j_max=limits.j_max / excess.j_max,
             tau_max=limits.tau_max / excess.tau_max,
         )
-        tight = _programme(task, q_start, q_goal, n, limits, fastest)
+        tight = _programme(task, q_start, q_goal, space, limits, fastest)
         programme = replace(programme, s_limits=tight.s_limits)
         free, duration, multiplier = result.free, result.duration, result.multiplier
     return Attempt("failed", "limits stay broken between the nodes", iterations, solves)
@@ -167,9 +168,7 @@ def _excess(task: Task, programme: Programme, result: Result) -> Limits | None:
     limits, T = task.problem.active_limits, result.duration
     points = programme.joint_points(result.free)
     rates = np.abs(programme.basis.at_grid @ points).max(axis=1)
-    fine = bspline.basis(len(points), TORQUE_POINTS * (len(points) - bspline.DEGREE))
-    q, v, a = fine.at_nodes @ points
-    v, a = v / T, a / (T * T)
+    _, q, v, a = fine_samples(spline_of(programme.basis, points, T), TORQUE_POINTS)
     tau = task.torques(q, v, a) + task.friction.torque(v)
     found = {
         "v_max": rates[0] / T / limits.v_max,

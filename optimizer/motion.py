@@ -98,7 +98,7 @@ class Task:
 
     def energy(self, spline: Spline) -> Energy:
         """Energy of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
-        weights, q, v, a = _quadrature(spline)
+        weights, q, v, a = fine_samples(spline, REPORT_NODES)
         ends = spline.control_points
         return breakdown(
             weights,
@@ -128,9 +128,9 @@ class Task:
         return Trajectory(t, q, v, a, tau, flow.tau_motor, power, spline)
 
 
-def spline_of(control_points: Array, duration: float) -> Spline:
-    """A clamped spline of the given control points (n, nq) that lasts `duration` [s]."""
-    return Spline(bspline.DEGREE, bspline.clamped_knots(len(control_points)) * duration, control_points)
+def spline_of(basis: bspline.Basis, control_points: Array, duration: float) -> Spline:
+    """A motion in a spline space: control points (n, nq), lasting `duration` [s]."""
+    return Spline(bspline.DEGREE, basis.knots * duration, control_points)
 
 
 def _sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
@@ -138,8 +138,7 @@ def _sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
     return curve(t), curve.derivative(1)(t), curve.derivative(2)(t)
 
 
-def _quadrature(spline: Spline) -> tuple[Array, Array, Array, Array]:
-    space = bspline.basis(len(spline.control_points), REPORT_NODES * (len(spline.control_points) - bspline.DEGREE))
-    T, points = spline.duration, spline.control_points
-    q, v, a = space.at_nodes @ points
-    return space.weights * T, q, v / T, a / (T * T)
+def fine_samples(spline: Spline, per_span: int) -> tuple[Array, Array, Array, Array]:
+    """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of every knot span."""
+    points, weights = bspline.quadrature(spline.knots, per_span)
+    return weights, *_sample(spline, points)

@@ -10,6 +10,7 @@ import numpy as np
 from models.registry import load_robot
 from optimizer import bspline, search
 from optimizer.baselines import baselines, guesses, nearest
+from optimizer.bspline import uniform
 from optimizer.candidate import FINE, FINEST, Attempt, Guess, attempt
 from optimizer.exceptions import (
     DeadlineExceeded,
@@ -96,7 +97,7 @@ class _Run:
         for entry in sorted(runners, key=lambda e: e.shortest):
             if entry.shortest >= shortest or time.perf_counter() > self.deadline:
                 break
-            outcome = self.attempt(entry, control_points=(FINE, FINEST), fastest=True)
+            outcome = self.attempt(entry, spaces=(uniform(FINE), uniform(FINEST)), fastest=True)
             if outcome.spline is not None and outcome.spline.duration < shortest:
                 quickest, shortest, spline = entry, outcome.spline.duration, outcome.spline
         if quickest is None:
@@ -104,7 +105,7 @@ class _Run:
         if shortest > longest:
             raise DurationTooShort(shortest)
         guess = Guess(spline.control_points, shortest)
-        self.improve(quickest, self.attempt(quickest, control_points=(len(spline.control_points),), guess=guess))
+        self.improve(quickest, self.attempt(quickest, spaces=(uniform(len(spline.control_points)),), guess=guess))
 
     def improve(self, entry: Entry, outcome: Attempt) -> None:
         """Take a new attempt at the entry if it spends less."""
@@ -120,8 +121,8 @@ class _Run:
         spline = entry.attempt.spline
         if len(spline.control_points) >= FINE or time.perf_counter() > self.deadline:
             return
-        guess = Guess(bspline.refine(spline.control_points, FINE), spline.duration)
-        self.improve(entry, self.attempt(entry, control_points=(FINE,), guess=guess))
+        points = bspline.refit(spline.control_points, spline.knots / spline.duration, uniform(FINE).knots)
+        self.improve(entry, self.attempt(entry, spaces=(uniform(FINE),), guess=Guess(points, spline.duration)))
 
     def compared(self, best: Entry) -> list[Baseline]:
         """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
@@ -141,9 +142,9 @@ class _Run:
             motions = guesses(self.problem, best.q_start, q_nearest, duration)
             for name in better:
                 motion = motions[name]
-                points = bspline.fit(motion.q, motion.t / motion.duration, n)
+                points = bspline.fit(motion.q, motion.t / motion.duration, uniform(n).knots)
                 guess = Guess(points, motion.duration)
-                self.improve(entry, self.attempt(entry, control_points=(n,), guess=guess))
+                self.improve(entry, self.attempt(entry, spaces=(uniform(n),), guess=guess))
             best = self.best() or best
         return table
 

@@ -36,9 +36,9 @@ class ShortestLaw:
         """No time-scaled motion is shorter [s]."""
         return TRUST * float(self.times[-1])
 
-    def fractions(self, n: int) -> Array:
-        """Control values (n,) of a spline over [0, 1] that follows the law, at rest at both ends."""
-        values = np.interp(greville(n) * self.times[-1], self.times, GRID)
+    def fractions(self, knots: Array) -> Array:
+        """Control values (n,) of a spline over clamped knots of [0, 1] that follows the law, at rest at both ends."""
+        values = np.interp(greville(knots) * self.times[-1], self.times, GRID)
         values[:3], values[-3:] = 0.0, 1.0
         return np.asarray(values)
 

@@ -15,6 +15,7 @@ from typing import Literal
 
 import daqp
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import cho_factor
 from scipy.linalg import LinAlgError
 
@@ -27,15 +28,18 @@ NEAR_TORQUE = 0.5
 # a programme counts as feasible when no row exceeds its limit by more than this share
 FEASIBILITY = 1e-4
 # relative decrease of cost that a further step must promise
-PROGRESS = 1e-7
+PROGRESS = 3e-6
 MAX_ITERATIONS = 60
+BACKTRACKS = 14
 # smallest eigenvalue that the QP's Hessian may have, relative to the largest
 EIGENVALUE_FLOOR = 1e-7
 # no joint's control point moves further in one step [rad]
 STEP = 1.5
 
 # times that a QP is solved again with the rows that its step would break
-QP_ROUNDS = 6
+QP_ROUNDS = 10
+
+Status = Literal["solved", "infeasible", "stalled", "out of time"]
 
 _DAQP_OPTIMAL = 1
 _SOFT = 8
@@ -49,7 +53,7 @@ class Result:
     gradient over that of the cost, at the last step.
     """
 
-    status: Literal["solved", "infeasible", "stalled", "out of time"]
+    status: Status
     free: Array
     duration: float
     cost: float
@@ -60,193 +64,195 @@ class Result:
 
 
 @dataclass(frozen=True)
-class _Rows:
-    """Linear rows A x ≤ b in relative units, and where they come from."""
+class _Step:
+    """A QP's answer: the step in scaled unknowns, and the multipliers of kinematic and torque rows with their places."""
 
-    kinematic: tuple[Array, Array, Array]  # derivative, grid point, coordinate
-    sign: Array
-    torque: tuple[Array, Array]  # node, joint
-    torque_sign: Array
-    A: Array
-    b: Array
+    x: Array
+    soft: bool
+    places: tuple[Array, Array, Array]  # derivative, grid point, coordinate
+    kinematic: Array
+    nodes: tuple[Array, Array]  # node, joint
+    signs: Array
+    torque: Array
 
 
-def _peaks(ratio: Array, near: float) -> tuple[Array, Array, Array]:
-    """Indices where |ratio| (d, M, r) has a local maximum along the grid and exceeds `near`."""
-    size = np.abs(ratio)
-    if size.max() <= near:
-        empty = np.empty(0, dtype=int)
-        return empty, empty, empty
-    high = size > near
-    high[:, 1:] &= size[:, 1:] >= size[:, :-1]
-    high[:, :-1] &= size[:, :-1] > size[:, 1:]
-    return np.nonzero(high)  # type: ignore[return-value]
+def _peaks(size: Array) -> npt.NDArray[np.bool_]:
+    """Where size (d, M, r) ≥ 0 has a local maximum along the grid."""
+    high = np.ones(size.shape, dtype=bool)
+    rising = size[:, 1:] >= size[:, :-1]
+    high[:, 1:] = rising
+    high[:, :-1] &= ~rising
+    return high
 
 
 class _Solver:
+    """One run of the SQP. Unknowns x: free control points row by row, then, if it is free, T / time_scale."""
+
     def __init__(self, programme: Programme, clock: Callable[[], float], deadline: float) -> None:
         self.p = programme
         self.clock, self.deadline = clock, deadline
         self.free_time = programme.t_max > programme.t_min
         self.count = programme.free_count * programme.r
         self.n = self.count + int(self.free_time)
-        self.grid_free = programme.basis.at_grid[:, :, programme.basis.free]
+        basis = programme.basis
+        self.grid_free = np.ascontiguousarray(basis.at_grid[:, :, basis.free])
+        self.anchors = basis.anchors[:, :, None]
         self.tau_max = programme.s_limits.tau_max
         self.orders = np.arange(1, 4)
+        self.active = np.zeros((*basis.at_grid.shape[:2], programme.r), dtype=bool)
 
     def rates(self, T: float) -> Array:
-        return self.p.rates * (T ** self.orders)[:, None]
+        """Limits of the derivatives by τ, (3, r)."""
+        return self.p.rates * (T**self.orders)[:, None]
 
     def violations(self, kinematics: Array, T: float, tau: Array) -> Array:
-        """Worst excess per derivative and coordinate, and per joint torque, as a share of the limit (flat)."""
-        kin = np.abs(kinematics).max(axis=1) / self.rates(T) - 1
-        torque = np.abs(tau).max(axis=0) / self.tau_max - 1
-        return np.maximum(np.concatenate([kin.ravel(), torque]), 0.0)
-
-    def kinematic_rows(self, where: tuple[Array, Array, Array], ratio: Array, T: float, time_scale: float) -> tuple[Array, Array, Array]:
-        d, g, j = where
-        value = ratio[d, g, j]
-        sign = np.sign(value)
-        m, r = self.p.free_count, self.p.r
-        A = np.zeros((len(d), self.n))
-        block = (sign / (self.p.rates[d, j] * T ** (d + 1)))[:, None] * self.grid_free[d, g]
-        A[np.arange(len(d))[:, None], np.arange(m) * r + j[:, None]] = block
-        if self.free_time:
-            A[:, -1] = -(d + 1) / T * time_scale
-        return A, 1 - np.abs(value), sign
+        """Worst excess per derivative and coordinate, and per joint torque, as a share of the limit, (3 r + nq,)."""
+        kin = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.rates(T)
+        torque = np.abs(tau).max(axis=0) / self.tau_max
+        return np.maximum(np.concatenate([kin.ravel(), torque]) - 1, 0.0)
 
     def solve(self, free: Array, T: float, multiplier: Array | None) -> Result:
-        p = self.p
-        nodes = len(p.basis.nodes)
-        multiplier = np.zeros((nodes, p.kernel.nq)) if multiplier is None else multiplier
+        p, r = self.p, self.p.r
+        multiplier = np.zeros((len(p.basis.nodes), p.kernel.nq)) if multiplier is None else multiplier
         time_scale = T
-        line = p.derivatives(free, T, multiplier)
+        scale = np.ones(self.n)
+        if self.free_time:
+            scale[-1] = time_scale
+        line, kin = p.derivatives(free, T, multiplier), p.kinematics(free)
         cost_scale = 1.0 / max(abs(line.cost), 1e-9)
-        kin = p.kinematics(free)
-        penalty = np.full(3 * p.r + p.kernel.nq, 0.1)
-        kinematic_curvature = 0.0
-        stationarity, iteration = np.inf, 0
-        status: Literal["solved", "infeasible", "stalled", "out of time"] = "stalled"
+        violation = self.violations(kin, T, line.tau)
+        penalty = np.full(len(violation), 0.1)
+        curvature, stationarity, iteration = 0.0, np.inf, 0
+        status: Status = "stalled"
         for iteration in range(1, MAX_ITERATIONS + 1):
             if self.clock() > self.deadline:
                 status = "out of time"
                 break
-            g = line.gradient * cost_scale
+            g = line.gradient[: self.n] * scale * cost_scale
             H = line.hessian * cost_scale
-            H[-1, -1] += kinematic_curvature
-            if self.free_time:
-                g[-1] *= time_scale
-                H[-1] *= time_scale
-                H[:, -1] *= time_scale
-            else:
-                g, H = g[:-1], H[:-1, :-1]
-            H = _convex(H)
-            ratio = kin / self.rates(T)[:, None, :]
-            violation = self.violations(kin, T, line.tau)
-            step, rows = self._qp(H, g, line, free, T, time_scale, ratio)
+            H[-1, -1] += curvature
+            H = _convex(H[: self.n, : self.n] * np.outer(scale, scale))
+            step = self._qp(H, g, line, free, T, time_scale, kin / self.rates(T)[:, None, :])
             if step is None:
                 status = "infeasible"
                 break
-            dx, mu, soft = step
-            # multipliers of the torque rows weigh their curvature in the next Hessian
-            new_multiplier = np.zeros_like(multiplier)
-            kinematic_mu = mu[: len(rows.sign)]
-            torque_mu = mu[len(rows.sign) :]
-            np.add.at(new_multiplier, rows.torque, rows.torque_sign * torque_mu / self.tau_max[rows.torque[1]] / cost_scale)
-            d = rows.kinematic[0]
-            kinematic_curvature = -float((kinematic_mu * (d + 1) * d).sum()) / (T * T)
-            need = np.zeros_like(penalty)
-            np.add.at(need, d * p.r + rows.kinematic[2], kinematic_mu)
-            np.add.at(need, 3 * p.r + rows.torque[1], torque_mu)
-            if not soft:
+            dx = step.x
+            # torque rows bend with the dynamics, kinematic rows with T^d: their multipliers weigh that curvature
+            multiplier = np.zeros_like(multiplier)
+            np.add.at(multiplier, step.nodes, step.signs * step.torque / self.tau_max[step.nodes[1]] / cost_scale)
+            d = step.places[0]
+            curvature = -float((step.kinematic * (d + 1) * d).sum()) / (T * T)
+            if not step.soft:
+                need = np.zeros_like(penalty)
+                np.add.at(need, d * r + step.places[2], step.kinematic)
+                np.add.at(need, 3 * r + step.nodes[1], step.torque)
                 penalty = np.maximum(penalty, 2.0 * need)
-            residual = g + H @ dx
-            promised = -float(g @ dx) - 0.5 * float(dx @ H @ dx)
-            descent = float(g @ dx) - float(penalty @ violation)
-            stationarity = float(np.abs(H @ dx).max() / max(np.abs(g).max(), 1e-12))
+            Hdx = H @ dx
+            slope = float(g @ dx)
+            promised = -slope - 0.5 * float(dx @ Hdx)
+            stationarity = float(np.abs(Hdx).max() / max(np.abs(g).max(), 1e-12))
             worst = float(violation.max())
             if worst < FEASIBILITY and promised < PROGRESS:
                 status = "solved"
-                multiplier = new_multiplier
                 break
             merit = line.cost * cost_scale + float(penalty @ violation)
-            alpha, accepted = 1.0, False
-            for _ in range(14):
-                ds = alpha * dx[: self.count].reshape(free.shape)
-                dT = alpha * dx[-1] * time_scale if self.free_time else 0.0
-                trial_free, trial_T = free + ds, T + dT
-                trial_cost, trial_tau = p.value(trial_free, trial_T)
-                trial_kin = p.kinematics(trial_free)
+            descent = min(slope - float(penalty @ violation), 0.0)
+            alpha = 1.0
+            for _ in range(BACKTRACKS):
+                trial = free + alpha * dx[: self.count].reshape(free.shape)
+                trial_T = T + alpha * float(dx[-1]) * time_scale if self.free_time else T
+                trial_cost, trial_tau = p.value(trial, trial_T)
+                trial_kin = p.kinematics(trial)
                 trial_violation = self.violations(trial_kin, trial_T, trial_tau)
-                trial = trial_cost * cost_scale + float(penalty @ trial_violation)
-                if trial <= merit + 1e-4 * alpha * min(descent, 0.0) + 1e-12:
-                    accepted = True
+                if trial_cost * cost_scale + float(penalty @ trial_violation) <= merit + 1e-4 * alpha * descent + 1e-12:
                     break
                 alpha *= 0.5
-            if not accepted:
+            else:
                 status = "solved" if worst < FEASIBILITY and promised < 100 * PROGRESS else "stalled"
                 break
-            free, T, kin, multiplier = trial_free, trial_T, trial_kin, new_multiplier
+            free, T, kin, violation = trial, trial_T, trial_kin, trial_violation
             line = p.derivatives(free, T, multiplier)
-        violation = self.violations(kin, T, line.tau)
         return Result(status, free, T, line.cost, iteration, float(violation.max()), stationarity, multiplier)
 
-    def _qp(
-        self, H: Array, g: Array, line: Linearisation, free: Array, T: float, time_scale: float, ratio: Array
-    ) -> tuple[tuple[Array, Array, bool] | None, _Rows]:
-        p = self.p
-        where = _peaks(ratio, NEAR)
-        A, b, sign = self.kinematic_rows(where, ratio, T, time_scale)
+    def _kinematic_rows(self, places: tuple[Array, Array, Array], sign: Array, T: float, time_scale: float) -> Array:
+        """Gradients (rows, n) of sign · value / limit at the places."""
+        d, g, j = places
+        A = np.zeros((len(d), self.n))
+        block = (sign / self.rates(T)[d, j])[:, None] * self.grid_free[d, g]
+        A[np.arange(len(d))[:, None], np.arange(self.p.free_count) * self.p.r + j[:, None]] = block
+        if self.free_time:
+            A[:, -1] = -(d + 1) / T * time_scale
+        return A
+
+    def _torque_rows(self, line: Linearisation, T: float, time_scale: float) -> tuple[Array, Array, Array, Array, Array]:
+        """Node and joint of the rows that come near, their sign, gradients (rows, n) and room left."""
         share = line.tau / self.tau_max
         k, j = np.nonzero(np.abs(share) > NEAR_TORQUE)
-        torque_sign = np.sign(share[k, j])
-        if len(k):
-            rows = p.torque_rows(line, T, k, j) * (torque_sign / self.tau_max[j])[:, None]
-            rows[:, -1] *= time_scale
-            A_torque = rows[:, : self.n]
-        else:
-            A_torque = np.zeros((0, self.n))
-        b_torque = 1 - np.abs(share[k, j])
+        sign = np.sign(share[k, j])
+        if not len(k):
+            return k, j, sign, np.zeros((0, self.n)), sign
+        A = self.p.torque_rows(line, T, k, j) * (sign / self.tau_max[j])[:, None]
+        A[:, -1] *= time_scale
+        return k, j, sign, A[:, : self.n], 1 - np.abs(share[k, j])
 
+    def _bounds(self, free: Array, T: float, time_scale: float) -> tuple[Array, Array]:
+        """Least and most that each unknown may change: position limits hold for control points, so along the curve."""
+        p = self.p
         lower = np.maximum(np.tile(p.s_limits.q_min, p.free_count) - free.ravel(), -STEP)
         upper = np.minimum(np.tile(p.s_limits.q_max, p.free_count) - free.ravel(), STEP)
         if self.free_time:
-            lower = np.append(lower, max((p.t_min - T), -0.5 * T) / time_scale)
-            upper = np.append(upper, min((p.t_max - T), 1.0 * T) / time_scale)
+            lower = np.append(lower, max(p.t_min - T, -0.5 * T) / time_scale)
+            upper = np.append(upper, min(p.t_max - T, T) / time_scale)
+        return lower, upper
+
+    def _qp(
+        self, H: Array, g: Array, line: Linearisation, free: Array, T: float, time_scale: float, ratio: Array
+    ) -> _Step | None:
+        k, j, torque_sign, A_torque, b_torque = self._torque_rows(line, T, time_scale)
+        lower, upper = self._bounds(free, T, time_scale)
+        size = np.abs(ratio)
+        chosen = (size > NEAR) & (self.anchors | _peaks(size)) | self.active
+        places = np.nonzero(chosen)
+        sign = np.sign(ratio[places])
+        A = np.concatenate([A_torque, self._kinematic_rows(places, sign, T, time_scale)])
+        b = np.concatenate([b_torque, 1 - size[places]])
         soft = False
         for attempt in range(QP_ROUNDS):
-            full = np.concatenate([A, A_torque])
-            most = np.concatenate([upper, b, b_torque])
-            least = np.concatenate([lower, np.full(len(full), -1e30)])
-            sense = np.zeros(len(most), dtype=np.int32)
+            sense = np.zeros(self.n + len(b), dtype=np.int32)
             if soft:
                 sense[self.n :] = _SOFT
-            dx, _, flag, info = daqp.solve(H, g, full, most, least, sense, primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6)
+            least = np.concatenate([lower, np.full(len(b), -1e30)])
+            most = np.concatenate([upper, b])
+            x, _, flag, info = daqp.solve(H, g, A, most, least, sense, primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6)
             if flag < _DAQP_OPTIMAL and not soft:
                 soft = True
                 continue
             if flag < _DAQP_OPTIMAL:
-                return None, _Rows(where, sign, (k, j), torque_sign, A, b)
-            ds = dx[: self.count].reshape(free.shape)
-            predicted = ratio + (self.grid_free @ ds) / self.rates(T)[:, None, :]
+                return None
+            predicted = ratio + (self.grid_free @ x[: self.count].reshape(free.shape)) / self.rates(T)[:, None, :]
             if self.free_time:
-                limit = 1 + self.orders * dx[-1] * time_scale / T
-                predicted = predicted / np.maximum(limit, 1e-3)[:, None, None]
-            fresh = _peaks(predicted, 1 + 1e-6)
-            known = set(zip(*(w.tolist() for w in where), strict=True))
-            keep = [i for i, key in enumerate(zip(*(w.tolist() for w in fresh), strict=True)) if key not in known]
-            if not keep or attempt == QP_ROUNDS - 1:
+                predicted /= np.maximum(1 + self.orders * x[-1] * time_scale / T, 1e-3)[:, None, None]
+            size = np.abs(predicted)
+            broken = size > 1 + FEASIBILITY / 4
+            if attempt == QP_ROUNDS - 1 or not broken.any():
                 break
-            fresh = tuple(w[keep] for w in fresh)  # type: ignore[assignment]
+            broken &= (self.anchors | _peaks(size)) & ~chosen
+            fresh = np.nonzero(broken)
+            if not len(fresh[0]):
+                break
+            chosen |= broken
             # the row's sign is that of the value it would reach, not of the value now
-            signed = np.sign(predicted[fresh])
-            A_new, _, now = self.kinematic_rows(fresh, ratio, T, time_scale)
-            A_new[:, : self.count] *= (signed * np.where(now == 0, 1, now))[:, None]
-            b_new = 1 - signed * ratio[fresh]
-            A, b, sign = np.concatenate([A, A_new]), np.concatenate([b, b_new]), np.concatenate([sign, signed])
-            where = tuple(np.concatenate(pair) for pair in zip(where, fresh, strict=True))  # type: ignore[assignment]
+            fresh_sign = np.sign(predicted[fresh])
+            A = np.concatenate([A, self._kinematic_rows(fresh, fresh_sign, T, time_scale)])
+            b = np.concatenate([b, 1 - fresh_sign * ratio[fresh]])
+            places = tuple(np.concatenate(both) for both in zip(places, fresh, strict=True))
+            sign = np.concatenate([sign, fresh_sign])
         mu = np.maximum(info["lam"][self.n :], 0.0)
-        return (dx, mu, soft), _Rows(where, sign, (k, j), torque_sign, A, b)
+        torque, kinematic = mu[: len(k)], mu[len(k) :]
+        self.active[...] = False
+        held = kinematic > 0
+        self.active[tuple(place[held] for place in places)] = True
+        return _Step(x, soft, places, kinematic, (k, j), torque_sign, torque)
 
 
 def _convex(H: Array) -> Array:
