@@ -15,7 +15,7 @@ JoulepathError
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from optimizer.solution import Candidate
@@ -23,6 +23,17 @@ if TYPE_CHECKING:
 
 class JoulepathError(Exception):
     """Base of all errors that a caller can act on; the message is one sentence that says what to do."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # the default calls the constructor with the message, but the subclasses' constructors take data
+        return _restore, (type(self), self.args, self.__dict__)
+
+
+def _restore(kind: type[JoulepathError], args: tuple[Any, ...], data: dict[str, Any]) -> JoulepathError:
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(data)
+    return error
 
 
 class InvalidProblem(JoulepathError):
