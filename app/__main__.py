@@ -1,0 +1,30 @@
+"""`python -m app`: the service under uvicorn."""
+
+# Worker processes import this module again: what they have no use for is imported inside `main`.
+from __future__ import annotations
+
+import signal
+import sys
+from types import FrameType
+
+
+def main() -> None:
+    """Serves until SIGTERM or Ctrl-C, then exits with 0."""
+    from app.logs import configure_logging
+    from app.server import serve
+    from app.settings import Settings
+
+    # before and after uvicorn handles signals itself; it raises the one it got again when it is done
+    signal.signal(signal.SIGTERM, _exit)
+    signal.signal(signal.SIGINT, _exit)
+    settings = Settings()
+    configure_logging(settings.log_level)
+    serve(settings)
+
+
+def _exit(signum: int, frame: FrameType | None) -> None:
+    sys.exit(0)
+
+
+if __name__ == "__main__":
+    main()

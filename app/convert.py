@@ -1,0 +1,202 @@
+"""Between the schemas of the contract and the optimizer's dataclasses, both ways."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from app.schemas import request as asked
+from app.schemas.common import Pose as PoseSchema
+from app.schemas.common import QuaternionPose, RpyPose
+from app.schemas.ik import IKRequest
+from models.registry import load_robot, robot_names
+from models.robot import Array, Limits, Robot
+from optimizer.exceptions import InvalidProblem, UnknownRobot
+from optimizer.inverse_kinematics import IKSolution
+from optimizer.problem import LIMIT_NAMES, BranchFilter, Payload, Pose, Problem
+from optimizer.solution import Candidate, Energy, Solution
+
+
+def robot_named(name: str) -> Robot:
+    """The robot of that name. Raises UnknownRobot."""
+    if name not in robot_names():
+        raise UnknownRobot(robot_names())
+    return load_robot(name)
+
+
+def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
+    """The optimizer's problem for a request of which `deadline` [s] is left.
+
+    Raises UnknownRobot, InvalidProblem or OutsideLimits.
+    """
+    robot = robot_named(request.robot)
+    shortest, longest = _duration(request)
+    branch = request.branch
+    return Problem(
+        start=_target(request.start),
+        goal=_target(request.goal),
+        robot=robot,
+        T_flange_tcp=to_matrix(request.tcp),
+        payload=_payload(request.payload),
+        gravity=np.array(request.gravity),
+        method=request.method,
+        objective=request.objective,
+        duration_min=shortest,
+        duration_max=longest,
+        limits=_limits(request.limits, robot),
+        friction=request.friction,
+        branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
+        windings=request.windings,
+        sample_period=request.sample_period,
+        deadline=deadline,
+    )
+
+
+def to_matrix(pose: PoseSchema) -> Array:
+    """Homogeneous matrix (4, 4) of a pose."""
+    T = np.eye(4)
+    T[:3, 3] = pose.position
+    if isinstance(pose, QuaternionPose):
+        T[:3, :3] = _from_quaternion(np.array(pose.quaternion))
+    elif isinstance(pose, RpyPose):
+        roll, pitch, yaw = (_from_rotvec(angle * axis) for angle, axis in zip(pose.rpy, np.eye(3), strict=True))
+        T[:3, :3] = yaw @ pitch @ roll
+    else:
+        T[:3, :3] = _from_rotvec(np.array(pose.rotvec))
+    return T
+
+
+def _from_quaternion(quaternion: Array) -> Array:
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _from_rotvec(rotvec: Array) -> Array:
+    angle = float(np.linalg.norm(rotvec))
+    # sinc keeps the quaternion exact through zero
+    half = 0.5 * rotvec * np.sinc(0.5 * angle / np.pi)
+    return _from_quaternion(np.array([*half, math.cos(0.5 * angle)]))
+
+
+def _target(target: asked.Target) -> Array | Pose:
+    return np.array(target.q) if isinstance(target, asked.JointTarget) else Pose(to_matrix(target.pose))
+
+
+def _payload(payload: asked.Payload | None) -> Payload:
+    if payload is None:
+        return Payload()
+    ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6
+    inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    return Payload(payload.mass, np.array(payload.com), inertia)
+
+
+def _duration(request: asked.OptimizeRequest) -> tuple[float | None, float | None]:
+    """Bounds on the duration. An open end is closed for the electrical objective: an answer has to end some time."""
+    if isinstance(request.duration, float | int):
+        return request.duration, request.duration
+    given = request.duration or asked.DurationRange()
+    if given.max is None and request.objective == "electrical":
+        return given.min, min(asked.MAX_DURATION, request.sample_period * asked.MAX_SAMPLES)
+    return given.min, given.max
+
+
+def _limits(limits: asked.Limits, robot: Robot) -> Limits:
+    tighter = {
+        name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq) for public, name in LIMIT_NAMES.items()
+    }
+    if limits.position is not None:
+        tighter["q_min"] = _per_joint("limits.position.lower", limits.position.lower, robot.nq)
+        tighter["q_max"] = _per_joint("limits.position.upper", limits.position.upper, robot.nq)
+    return robot.limits.tightened(**tighter)
+
+
+def _per_joint(field: str, value: float | list[float] | None, nq: int) -> Array | None:
+    if value is None:
+        return None
+    if isinstance(value, list) and len(value) != nq:
+        raise InvalidProblem(field, f"{field} must be one number or a list of {nq}, one per joint.")
+    return np.full(nq, value, dtype=float)
+
+
+def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
+    """The answer as the contract lays it out: numbers, strings, lists, dicts, and C-contiguous arrays."""
+    trajectory, certificate = solution.trajectory, solution.certificate
+    electrical, mechanical = solution.energy.electrical, solution.energy.mechanical
+    objective = electrical.total if request.objective == "electrical" else mechanical.total
+    return {
+        "id": request_id,
+        "robot": request.robot,
+        "method": request.method,
+        "objective": request.objective,
+        "duration": solution.duration,
+        "status": solution.status,
+        "branch": {end: _fields(getattr(solution, end), "label", "q") for end in ("start", "goal")},
+        "trajectory": {
+            **_fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power"),
+            "spline": _fields(trajectory.spline, "degree", "knots", "control_points"),
+        },
+        "energy": {
+            **_energy(solution.energy),
+            "lower_bound": solution.lower_bound,
+            # a motion that costs nothing is as good as can be
+            "optimality_gap": 1 - solution.lower_bound / objective if objective > 0 else 0.0,
+        },
+        "baselines": [
+            _fields(baseline, "name", "duration", "electrical", "mechanical", "within_limits", "saving")
+            for baseline in solution.baselines
+        ],
+        "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
+        "certificate": {
+            "worst_ratio": certificate.worst_ratio,
+            "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
+            "goal_error": dict(zip(("position", "rotation"), certificate.goal_error, strict=True)),
+            **_fields(certificate, "energy_error", "balance_error"),
+        },
+        "solver": _fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
+    }
+
+
+def candidate_fields(candidate: Candidate) -> dict[str, Any]:
+    """One entry of `candidates`."""
+    return _fields(
+        candidate, "start", "goal", "q_start", "q_goal", "status", "reason", "lower_bound", "energy", "duration"
+    )
+
+
+def _energy(energy: Energy) -> dict[str, Any]:
+    parts = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
+    return {
+        "electrical": _fields(energy.electrical, "total", *parts),
+        "mechanical": _fields(energy.mechanical, "total", "per_joint"),
+        "per_joint": _fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
+        **_fields(energy, "peak_power", "mean_power"),
+    }
+
+
+def _fields(source: object, *names: str) -> dict[str, Any]:
+    """Attributes by name. The JSON encoder takes arrays in C order only, and writes what is not finite as null."""
+    values = {name: getattr(source, name) for name in names}
+    return {
+        name: np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value for name, value in values.items()
+    }
+
+
+def to_ik_response(request: IKRequest, request_id: str, solutions: Sequence[IKSolution]) -> dict[str, Any]:
+    """The answer of `POST /ik`."""
+    return {
+        "id": request_id,
+        "robot": request.robot,
+        "solutions": [
+            {"label": str(solution.label), **_fields(solution, "q", "limit_distance", "smallest_singular_value")}
+            for solution in solutions
+        ],
+    }

@@ -1,0 +1,148 @@
+"""From exceptions to problems: one table, and the bytes that go out. Used by the service and by its workers alike.
+
+ServiceError
+├── InvalidRequest      does not fit the schema
+├── Busy                the queue is full
+├── NotReady            no worker is warm
+├── ShuttingDown        given up because the service stops
+├── WorkerDied          its worker process ended under it
+├── NotFound, MethodNotAllowed, BodyTooLarge
+└── ClientDisconnected  nobody is left to answer
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import orjson
+
+from app.convert import candidate_fields
+from app.schemas import problems
+from optimizer import exceptions as optimizer_errors
+
+
+class ServiceError(Exception):
+    """Base of the service's own errors; the message is one sentence that says what to do."""
+
+
+class InvalidRequest(ServiceError):
+    """The request does not fit the schema; `errors` holds {loc, msg} each."""
+
+    def __init__(self, errors: Sequence[Mapping[str, Any]]) -> None:
+        super().__init__("Correct the fields listed under `errors`.")
+        self.errors = list(errors)
+
+
+class Busy(ServiceError):
+    """The queue is full."""
+
+    def __init__(self) -> None:
+        super().__init__("Every worker is taken and the queue is full: try again after a few seconds.")
+
+
+class NotReady(ServiceError):
+    """No worker is warm."""
+
+    def __init__(self) -> None:
+        super().__init__("The workers are warming up: try again after a few seconds.")
+
+
+class ShuttingDown(ServiceError):
+    """The service stops before the request is done."""
+
+    def __init__(self) -> None:
+        super().__init__("The service is stopping: send the request again.")
+
+
+class WorkerDied(ServiceError):
+    """A worker process ended while it worked on the request."""
+
+    def __init__(self) -> None:
+        super().__init__("The process that worked on this request died: report it with the id in `instance`.")
+
+
+class NotFound(ServiceError):
+    """Nothing is at that path."""
+
+    def __init__(self) -> None:
+        super().__init__("Nothing is at this path: see /openapi.json for what there is.")
+
+
+class MethodNotAllowed(ServiceError):
+    """The path does not take that method."""
+
+    def __init__(self) -> None:
+        super().__init__("This path does not take that method: use one from the Allow header.")
+
+
+class BodyTooLarge(ServiceError):
+    """The body is over the limit."""
+
+    def __init__(self) -> None:
+        super().__init__("The body is larger than the service accepts: send a smaller one.")
+
+
+class ClientDisconnected(ServiceError):
+    """The caller hung up."""
+
+
+TABLE: dict[type[Exception], type[problems.Problem]] = {
+    InvalidRequest: problems.Validation,
+    optimizer_errors.InvalidProblem: problems.Validation,
+    optimizer_errors.OutsideLimits: problems.OutsideLimits,
+    optimizer_errors.UnknownRobot: problems.UnknownRobot,
+    optimizer_errors.UnreachablePose: problems.UnreachablePose,
+    optimizer_errors.SingularPose: problems.SingularPose,
+    optimizer_errors.DurationTooShort: problems.DurationTooShort,
+    optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
+    optimizer_errors.NoTrajectory: problems.NoTrajectory,
+    optimizer_errors.DeadlineExceeded: problems.DeadlineExceeded,
+    Busy: problems.Busy,
+    NotReady: problems.NotReady,
+    ShuttingDown: problems.ShuttingDown,
+    NotFound: problems.NotFound,
+    MethodNotAllowed: problems.MethodNotAllowed,
+    BodyTooLarge: problems.BodyTooLarge,
+    WorkerDied: problems.Internal,
+}
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What goes back to a caller: status, JSON, and headers of its own."""
+
+    status: int
+    body: bytes
+    headers: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def media_type(self) -> str:
+        """Content type of the body."""
+        return "application/json" if self.status < 400 else "application/problem+json"
+
+
+def problem_type(error: Exception) -> type[problems.Problem]:
+    """The type of problem that an exception is; what is not in the table is a defect."""
+    return next((TABLE[cls] for cls in type(error).__mro__ if cls in TABLE), problems.Internal)
+
+
+def problem_reply(error: Exception, instance: str) -> Reply:
+    """The answer to the request `instance` that failed with `error`."""
+    problem = problem_type(error)
+    known = isinstance(error, (ServiceError, optimizer_errors.JoulepathError))
+    # an unforeseen exception's message is for the log, not for the caller
+    detail = str(error) if known else "This is a defect of the service: report it with the id in `instance`."
+    content = {name: problem.model_fields[name].default for name in ("type", "title", "status")}
+    content |= {"detail": detail, "instance": instance}
+    content |= {name: _own_field(error, name) for name in problem.own_fields()}
+    headers = {} if problem.retry_after is None else {"Retry-After": str(problem.retry_after)}
+    return Reply(content["status"], orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), headers)
+
+
+def _own_field(error: Exception, name: str) -> Any:
+    if name == "errors" and isinstance(error, optimizer_errors.InvalidProblem):
+        return [{"loc": ["body", *error.field.split(".")], "msg": str(error)}]
+    value = getattr(error, name)
+    return [candidate_fields(candidate) for candidate in value] if name == "candidates" else value

@@ -1,0 +1,58 @@
+"""Composition of the service."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.metadata import PackageNotFoundError, version
+
+from fastapi import FastAPI
+
+from app import tasks
+from app.body_limit import BodyLimit
+from app.context import RequestContext
+from app.documentation import install_openapi
+from app.engine import Engine
+from app.handlers import install_handlers
+from app.routes import docs, health, ik, optimize, problems, robots
+from app.settings import Settings
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The service, for any ASGI server. Its workers start and end with the server's lifespan."""
+    settings = settings or Settings()
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.engine = engine = Engine(settings, tasks.warm)
+        engine.start()
+        yield
+        await engine.stop()
+
+    app = FastAPI(
+        title="joulepath",
+        summary="The robot-arm motion of least energy, with its energy breakdown and a certificate.",
+        description="SI units throughout: m, rad, s, kg, N·m, W, J. Arrays over time are `[sample][joint]`. "
+        "Every error is an `application/problem+json` whose `type` leads to a page that explains it.",
+        version=_version(),
+        license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
+        docs_url=None,
+        redoc_url=None,
+        redirect_slashes=False,
+        lifespan=lifespan,
+    )
+    app.state.settings = settings
+    app.add_middleware(BodyLimit, most=settings.max_body_bytes)
+    app.add_middleware(RequestContext)  # added last: the outermost
+    install_handlers(app)
+    install_openapi(app, settings)
+    for routes in (optimize, ik, robots, health, problems, docs):
+        app.include_router(routes.router)
+    return app
+
+
+def _version() -> str:
+    try:
+        return version("joulepath")
+    except PackageNotFoundError:  # run from a source tree
+        return "0"

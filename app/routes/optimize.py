@@ -1,0 +1,75 @@
+"""POST /optimize."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Coroutine
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Request, Response
+
+from app.documentation import problem_responses
+from app.engine import Engine
+from app.errors import ClientDisconnected, Reply
+from app.handlers import to_http
+from app.schemas import problems
+from app.schemas.examples import OPTIMIZE_EXAMPLES
+from app.schemas.request import OptimizeRequest
+from app.schemas.response import OptimizeResponse
+from app.settings import Settings
+from app.tasks import OptimizeTask
+from optimizer.exceptions import InvalidProblem
+
+router = APIRouter(tags=["motion"])
+
+
+@router.post(
+    "/optimize",
+    summary="The motion of least energy",
+    response_model=OptimizeResponse,
+    responses=problem_responses(
+        problems.Validation,
+        problems.UnreachablePose,
+        problems.SingularPose,
+        problems.OutsideLimits,
+        problems.DurationTooShort,
+        problems.TorqueInfeasible,
+        problems.NoTrajectory,
+        problems.UnknownRobot,
+        problems.BodyTooLarge,
+        problems.Busy,
+        problems.ShuttingDown,
+        problems.DeadlineExceeded,
+    ),
+)
+async def optimize(
+    request: Request, body: Annotated[OptimizeRequest, Body(openapi_examples=OPTIMIZE_EXAMPLES)]
+) -> Response:
+    """Finds the motion of least energy from rest at `start` to rest at `goal`, over every arm configuration, and
+    returns it with its energy breakdown and a certificate that it holds every limit."""
+    settings: Settings = request.app.state.settings
+    engine: Engine = request.app.state.engine
+    if body.deadline > settings.max_deadline:
+        raise InvalidProblem("deadline", f"deadline must be at most {settings.max_deadline:g} s.")
+    task = OptimizeTask(body, request.state.id)
+    return to_http(await _unless_disconnected(request, engine.run(task, body.deadline)))
+
+
+async def _unless_disconnected(request: Request, work: Coroutine[None, None, Reply]) -> Reply:
+    """The work's result; the work is cancelled when the caller hangs up. Raises ClientDisconnected."""
+    working, listening = asyncio.create_task(work), asyncio.create_task(_disconnected(request))
+    try:
+        await asyncio.wait({working, listening}, return_when=asyncio.FIRST_COMPLETED)
+        if working.done():
+            return working.result()
+        raise ClientDisconnected
+    finally:
+        working.cancel()
+        listening.cancel()
+        await asyncio.gather(working, listening, return_exceptions=True)
+
+
+async def _disconnected(request: Request) -> None:
+    # the body has been read: nothing else comes
+    while (await request.receive())["type"] != "http.disconnect":
+        pass

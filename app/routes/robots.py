@@ -1,0 +1,66 @@
+"""GET /robots and GET /robots/{name}."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from fastapi import APIRouter
+
+from app.convert import robot_named
+from app.documentation import problem_responses
+from app.schemas import problems
+from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
+from models.registry import load_robot, robot_names
+from models.robot import Robot
+
+router = APIRouter(prefix="/robots", tags=["robots"])
+
+TRUST = {
+    "A": "maker's own file or data packet",
+    "B": "fitted to measured data",
+    "C": "figure from a paper, seen second-hand",
+    "T": "transferred from a sister robot",
+    "E": "engineering default, no source",
+}
+_SECTIONS = ("kinematics", "inertials", "limits", "drives", "electronics", "default_motion")
+
+
+@router.get("", summary="Every robot", response_model=RobotList, responses=problem_responses())
+def list_robots() -> RobotList:
+    """The robots that requests can name."""
+    return RobotList(robots=[RobotSummary(**_summary(load_robot(name))) for name in robot_names()])
+
+
+@router.get(
+    "/{name}",
+    summary="All that is known of a robot",
+    response_model=RobotDetail,
+    responses=problem_responses(problems.UnknownRobot),
+)
+def show_robot(name: str) -> RobotDetail:
+    """Kinematics, inertials, limits, drives and electronics, each figure with its source and how far to trust it, and
+    the friction laws with their coefficients."""
+    return _detail(robot_named(name).name)
+
+
+@cache
+def _detail(name: str) -> RobotDetail:
+    robot = load_robot(name)
+    sections = {section: robot.figures[section] for section in _SECTIONS}
+    return RobotDetail(**_summary(robot), trust=TRUST, friction=_friction(robot), **sections)
+
+
+def _friction(robot: Robot) -> Friction:
+    figures = robot.figures["friction_laws"]
+    return Friction(
+        table=robot.figures["friction_table"],
+        laws=[
+            FrictionLaw(name=law.name, default=law is robot.friction, formula=law.FORMULA, coefficients=figures[name])
+            for name, law in robot.friction_laws.items()
+        ],
+    )
+
+
+def _summary(robot: Robot) -> dict[str, Any]:
+    return {"name": robot.name, "title": robot.title, "joints": list(robot.joint_names)}

@@ -1,0 +1,50 @@
+"""What `POST /ik` takes and answers."""
+
+from __future__ import annotations
+
+from app.schemas.common import IDENTITY, Pose, Request, Response, RobotName, described
+
+_Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+
+
+class IKRequest(Request):
+    """A pose whose arm configurations are wanted."""
+
+    robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
+    pose: Pose = described(
+        "Pose of the TCP in the robot's base frame.", None, {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
+    )
+    tcp: Pose = described(
+        "Pose of the TCP in the flange frame.",
+        None,
+        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
+        default=IDENTITY,
+    )
+    windings: bool = described(
+        "Whether to also give solutions a full turn away, where the joint range allows.", None, True, default=True
+    )
+
+
+class IKSolution(Response):
+    """One arm configuration that reaches the pose."""
+
+    q: list[float] = described("Joint positions.", "rad", _Q)
+    label: str = described(
+        "Branch: shoulder/elbow/wrist, and the windings where there are any.", None, "left/up/no_flip"
+    )
+    limit_distance: float = described("Least distance of a joint from an end of its range.", "rad", 1.57)
+    smallest_singular_value: float = described(
+        "Of the Jacobian in metres and radians: near zero, the configuration is nearly singular.", "1", 0.12
+    )
+
+
+class IKResponse(Response):
+    """Every solution within the joint range."""
+
+    id: str = described(
+        "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
+    )
+    robot: str = described("Name of the robot.", None, "ur5e")
+    solutions: list[IKSolution] = described(
+        "Solutions, one entry each.", None, [{"q": _Q, "label": "left/up/no_flip", "limit_distance": 1.57}]
+    )

@@ -1,0 +1,229 @@
+"""What `POST /optimize` takes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+from app.schemas.common import IDENTITY, JointPositions, Pose, Request, RobotName, Vector3, by_field, described
+
+MAX_DURATION = 600.0
+"""Longest motion [s]."""
+MAX_SAMPLES = 100_000
+"""Most samples that an answer holds."""
+
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+Seconds = Annotated[float, Field(gt=0, le=MAX_DURATION)]
+Angle = Annotated[float, Field(ge=-1e3, le=1e3)]
+
+
+def _by_shape(value: Any) -> str | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int | float):
+        return "one"
+    return "each" if isinstance(value, list) else None
+
+
+_SHAPE = Discriminator(
+    _by_shape, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
+)
+PositivePerJoint = Annotated[
+    Annotated[Positive, Tag("one")]
+    | Annotated[Annotated[list[Positive], Field(min_length=1, max_length=16)], Tag("each")],
+    _SHAPE,
+]
+AnglePerJoint = Annotated[
+    Annotated[Angle, Tag("one")] | Annotated[Annotated[list[Angle], Field(min_length=1, max_length=16)], Tag("each")],
+    _SHAPE,
+]
+
+
+class JointTarget(Request):
+    """A target in joint space."""
+
+    q: JointPositions = described("Joint positions from base to flange.", "rad", [0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+
+
+class PoseTarget(Request):
+    """A target in space: every arm configuration that reaches it is a candidate."""
+
+    pose: Pose = described(
+        "Pose of the TCP in the robot's base frame.", None, {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
+    )
+
+
+Target = Annotated[Annotated[JointTarget, Tag("by q")] | Annotated[PoseTarget, Tag("by pose")], by_field("q", "pose")]
+
+
+class Payload(Request):
+    """A body fixed to the flange."""
+
+    mass: float = described("Mass.", "kg", 2.0, ge=0, le=1e3)
+    com: Vector3 = described("Centre of mass in the flange frame.", "m", [0.0, 0.0, 0.05])
+    inertia: list[float] | None = described(
+        "Inertia about the centre of mass in flange axes: ixx, ixy, ixz, iyy, iyz, izz. Null: a point mass.",
+        "kg·m²",
+        [0.004, 0.0, 0.0, 0.004, 0.0, 0.003],
+        default=None,
+        min_length=6,
+        max_length=6,
+    )
+
+
+class DurationRange(Request):
+    """Bounds on the duration; either may be left out."""
+
+    min: Seconds | None = described("Shortest duration.", "s", 1.0, default=None)
+    max: Seconds | None = described("Longest duration.", "s", 3.0, default=None)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise PydanticCustomError("range", "`min` must not exceed `max`")
+        return self
+
+
+def _by_kind(value: Any) -> str | None:
+    if isinstance(value, bool):
+        return None
+    if isinstance(value, int | float):
+        return "seconds"
+    return "range" if isinstance(value, dict | DurationRange) else None
+
+
+Duration = Annotated[
+    Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")],
+    Discriminator(
+        _by_kind,
+        custom_error_type="duration",
+        custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
+    ),
+]
+
+
+class PositionLimits(Request):
+    """A narrower joint range. One number holds for every joint."""
+
+    lower: AnglePerJoint | None = described("Least joint positions.", "rad", -3.0, default=None)
+    upper: AnglePerJoint | None = described("Greatest joint positions.", "rad", 3.0, default=None)
+
+
+class Limits(Request):
+    """Limits tighter than the robot's. One number holds for every joint, a list gives one per joint."""
+
+    velocity: PositivePerJoint | None = described("Greatest joint speed.", "rad/s", 2.0, default=None)
+    acceleration: PositivePerJoint | None = described("Greatest joint acceleration.", "rad/s²", 5.0, default=None)
+    jerk: PositivePerJoint | None = described("Greatest joint jerk.", "rad/s³", 100.0, default=None)
+    torque: PositivePerJoint | None = described(
+        "Greatest motor torque at the joint: rigid body, rotor and friction together.",
+        "N·m",
+        [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],
+        default=None,
+    )
+    position: PositionLimits | None = described(
+        "Narrower joint range.", None, {"lower": -3.0, "upper": 3.0}, default=None
+    )
+
+
+class Branch(Request):
+    """Arm configurations to keep to; a part left out is free."""
+
+    shoulder: Literal["left", "right"] | None = described(
+        "Side of the shoulder that the arm is on.", None, "left", default=None
+    )
+    elbow: Literal["up", "down"] | None = described("Elbow above or below.", None, "up", default=None)
+    wrist: Literal["flip", "no_flip"] | None = described("Wrist flipped or not.", None, "no_flip", default=None)
+
+
+class OptimizeRequest(Request):
+    """A motion from rest at `start` to rest at `goal`."""
+
+    robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
+    start: Target = described(
+        "Where the motion starts: joints or a pose.", None, {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}
+    )
+    goal: Target = described(
+        "Where it ends: joints or a pose.",
+        None,
+        {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+    )
+    tcp: Pose = described(
+        "Pose of the TCP in the flange frame.",
+        None,
+        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
+        default=IDENTITY,
+    )
+    payload: Payload | None = described(
+        "What the flange carries. Null: nothing.", None, {"mass": 2.0, "com": [0.0, 0.0, 0.05]}, default=None
+    )
+    gravity: Annotated[list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)] = described(
+        "Gravity in the base frame: turn it for a wall or ceiling mount.",
+        "m/s²",
+        [0.0, 0.0, -9.81],
+        default=[0.0, 0.0, -9.81],
+    )
+    method: Literal["bspline", "time_scaling"] = described(
+        "How the motion is parametrised: a free B-spline, or the straight joint-space line with an optimised time law.",
+        None,
+        "bspline",
+        default="bspline",
+    )
+    objective: Literal["electrical", "mechanical"] = described(
+        "What is minimised: energy drawn from the bus, or the joints' absolute mechanical work.",
+        None,
+        "electrical",
+        default="electrical",
+    )
+    duration: Duration | None = described(
+        "Duration, or its bounds. Null lets the optimiser choose (`mechanical` then needs a number or a `max`: it has "
+        f"no best duration of its own). At most {MAX_DURATION:g} s, and {MAX_SAMPLES} times `sample_period`.",
+        "s",
+        {"max": 3.0},
+        default=None,
+    )
+    limits: Limits = described(
+        "Limits to keep besides the robot's own; they may only tighten these.",
+        None,
+        {"velocity": 2.0},
+        default=Limits(),
+    )
+    branch: Branch | None = described(
+        "Arm configurations to keep to. Null: try them all.",
+        None,
+        {"shoulder": "left", "elbow": "up", "wrist": "no_flip"},
+        default=None,
+    )
+    windings: bool = described(
+        "Whether to also try goals a full turn away, where the joint range allows.", None, True, default=True
+    )
+    friction: Annotated[str, Field(min_length=1, max_length=64)] | None = described(
+        "Name of one of the robot's friction laws, from `GET /robots/{name}`. Null: its default.",
+        None,
+        "curved",
+        default=None,
+    )
+    sample_period: float = described(
+        "Time between the returned samples; the last sample lies on the end.", "s", 0.008, default=0.008, ge=1e-4, le=1
+    )
+    deadline: float = described(
+        "Wall time, waiting included, after which the best verified result so far is returned.",
+        "s",
+        10.0,
+        default=10.0,
+        gt=0,
+        le=MAX_DURATION,
+    )
+
+    @model_validator(mode="after")
+    def _few_enough_samples(self) -> Self:
+        longest = self.duration.max or self.duration.min if isinstance(self.duration, DurationRange) else self.duration
+        if longest is not None and longest > self.sample_period * MAX_SAMPLES:
+            raise PydanticCustomError(
+                "too_many_samples",
+                "`duration` divided by `sample_period` must be at most {most}: lengthen `sample_period`",
+                {"most": MAX_SAMPLES},
+            )
+        return self

@@ -1,0 +1,205 @@
+"""What `POST /optimize` answers. Answers are built by `app.convert` without passing through these models: the tests
+hold the two together."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.common import Response, described
+
+Joints = list[float]
+Samples = list[float]
+JointSamples = list[Joints]
+Label = str
+_Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+_LABEL = "left/up/no_flip"
+
+
+class Configuration(Response):
+    """One arm configuration."""
+
+    label: Label = described("Branch: shoulder/elbow/wrist, and the windings where there are any.", None, _LABEL)
+    q: Joints = described("Joint positions.", "rad", _Q)
+
+
+class Branches(Response):
+    """The chosen pair of arm configurations."""
+
+    start: Configuration = described("At the start.", None, {"label": _LABEL, "q": _Q})
+    goal: Configuration = described("At the goal.", None, {"label": _LABEL, "q": _Q})
+
+
+class Spline(Response):
+    """Clamped B-spline of the joint positions over time."""
+
+    degree: int = described("Degree.", "1", 5)
+    knots: list[float] = described("Knots.", "s", [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9, 1.8, 1.8, 1.8, 1.8, 1.8, 1.8])
+    control_points: JointSamples = described("Control points, [point][joint].", "rad", [_Q, _Q])
+
+
+class Trajectory(Response):
+    """The motion, sampled; arrays are [sample][joint]."""
+
+    t: Samples = described("Time of each sample.", "s", [0.0, 0.008, 0.016])
+    q: JointSamples = described("Joint positions.", "rad", [_Q])
+    v: JointSamples = described("Joint velocities.", "rad/s", [[0.0] * 6])
+    a: JointSamples = described("Joint accelerations.", "rad/s²", [[0.0] * 6])
+    tau: JointSamples = described(
+        "Torque of rigid body and rotor, without friction.", "N·m", [[0.0, -38.1, -16.4, -1.2, 0.0, 0.0]]
+    )
+    tau_motor: JointSamples = described(
+        "Motor torque at the joint, friction included.", "N·m", [[0.0, -38.1, -16.4, -1.2, 0.0, 0.0]]
+    )
+    power: Samples = described("Power drawn from the bus.", "W", [42.5, 43.1, 45.0])
+    spline: Spline = described(
+        "The motion itself, from which all the rest follows.",
+        None,
+        {"degree": 5, "knots": [0.0, 1.8], "control_points": [_Q, _Q]},
+    )
+
+
+class ElectricalEnergy(Response):
+    """Energy drawn from the bus and its parts, which add up to the total."""
+
+    total: float = described("Energy drawn from the bus.", "J", 152.4)
+    idle: float = described("Electronics: idle and controller power times the duration.", "J", 66.1)
+    potential: float = described("Rise in potential energy.", "J", 12.3)
+    kinetic: float = described("Rise in kinetic energy: zero between two rests.", "J", 0.0)
+    friction: float = described("Lost to friction in the joints.", "J", 48.0)
+    copper: float = described("Lost in the motors' windings.", "J", 21.0)
+    inverter: float = described("Lost in the inverters.", "J", 0.0)
+    braking: float = described("Surplus burnt in the brake resistor.", "J", 5.0)
+    recovered: float = described("Surplus given back to the supply, zero or negative.", "J", 0.0)
+
+
+class MechanicalEnergy(Response):
+    """Absolute mechanical work of the joints, without friction."""
+
+    total: float = described("Sum over the joints of ∫ |tau v| dt.", "J", 61.7)
+    per_joint: Joints = described("The same per joint.", "J", [12.0, 31.0, 15.0, 2.5, 0.9, 0.3])
+
+
+class JointEnergy(Response):
+    """Losses and shaft work per joint."""
+
+    friction: Joints = described("Lost to friction.", "J", [20.0, 15.0, 9.0, 2.0, 1.5, 0.5])
+    copper: Joints = described("Lost in the windings.", "J", [4.0, 11.0, 5.0, 0.6, 0.3, 0.1])
+    inverter: Joints = described("Lost in the inverter.", "J", [0.0] * 6)
+    shaft: Joints = described("∫ tau_motor · v dt.", "J", [20.1, 24.0, 13.0, 2.2, 0.8, 0.2])
+
+
+class Energy(Response):
+    """Everything about the motion's energy."""
+
+    electrical: ElectricalEnergy = described("Energy drawn from the bus.", None, {"total": 152.4, "idle": 66.1})
+    mechanical: MechanicalEnergy = described("Absolute mechanical work.", None, {"total": 61.7})
+    per_joint: JointEnergy = described("Losses and shaft work per joint.", None, {"friction": [20.0, 15.0, 9.0]})
+    peak_power: float = described("Greatest power drawn from the bus.", "W", 236.0)
+    mean_power: float = described("Mean power drawn from the bus.", "W", 84.7)
+    lower_bound: float = described(
+        "Of the objective: no motion of any shape and any allowed duration between these targets needs less.",
+        "J",
+        139.9,
+    )
+    optimality_gap: float = described("1 - lower_bound / energy, of the objective.", "1", 0.082)
+
+
+class Baseline(Response):
+    """What another method spends between the same ends."""
+
+    name: Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"] = described(
+        "`trapezoid` and `quintic`: to the nearest goal configuration in our duration; `ruckig`: at its own shortest "
+        "time; `ruckig_slowed`: in our duration; `controller_default`: as the robot's controller moves by default.",
+        None,
+        "controller_default",
+    )
+    duration: float = described("Its duration.", "s", 2.4)
+    electrical: float = described("Energy it draws from the bus.", "J", 190.2)
+    mechanical: float = described("Its absolute mechanical work.", "J", 70.3)
+    within_limits: bool = described("Whether it keeps every limit.", None, True)
+    saving: float = described("1 - ours / theirs, of the objective.", "1", 0.199)
+
+
+class Candidate(Response):
+    """A start and goal pair and what became of it."""
+
+    start: Label = described("Branch at the start.", None, _LABEL)
+    goal: Label = described("Branch at the goal.", None, "left/down/flip")
+    q_start: Joints = described("Joint positions at the start.", "rad", _Q)
+    q_goal: Joints = described("Joint positions at the goal.", "rad", _Q)
+    status: Literal["solved", "pruned", "infeasible", "failed", "unvisited"] = described(
+        "What became of it.", None, "pruned"
+    )
+    reason: str = described("Why, in words.", None, "its bound is above the best energy found")
+    lower_bound: float | None = described(
+        "Proven bound of the objective; null where no motion exists or none was computed.", "J", 171.0
+    )
+    energy: float | None = described("Energy found, of the objective; null if not solved.", "J", 180.5)
+    duration: float | None = described("Duration found; null if not solved.", "s", 1.9)
+
+
+class WorstRatio(Response):
+    """Greatest value / limit over the motion: at most 1 + 1e-6."""
+
+    position: float = described("Joint position within its range.", "1", 0.61)
+    velocity: float = described("Joint speed.", "1", 0.74)
+    acceleration: float = described("Joint acceleration.", "1", 1.0)
+    jerk: float = described("Joint jerk.", "1", 0.66)
+    torque: float = described("Motor torque.", "1", 0.55)
+
+
+class EndError(Response):
+    """Distance of the TCP from where it was asked to be."""
+
+    position: float = described("Distance.", "m", 2e-12)
+    rotation: float = described("Angle.", "rad", 4e-12)
+
+
+class Certificate(Response):
+    """The motion recomputed by Pinocchio on a 1 ms grid, apart from the solver."""
+
+    worst_ratio: WorstRatio = described("Worst value / limit, per limit.", None, {"velocity": 0.74, "torque": 0.55})
+    start_error: EndError = described("At the start.", None, {"position": 2e-12, "rotation": 4e-12})
+    goal_error: EndError = described("At the goal.", None, {"position": 2e-12, "rotation": 4e-12})
+    energy_error: float = described("Fine quadrature against the reported total, relative.", "1", 1e-6)
+    balance_error: float = described("Sum of the parts against the total, relative.", "1", 1e-6)
+
+
+class Solver(Response):
+    """What the answer cost to compute."""
+
+    wall_time: float = described("Wall time.", "s", 0.41)
+    iterations: int = described("Iterations, over all candidates.", "1", 52)
+    nlp_solves: int = described("Nonlinear programmes solved.", "1", 4)
+    stationarity: float = described("Final stationarity of the best candidate.", "1", 1e-8)
+
+
+class OptimizeResponse(Response):
+    """The motion of least energy, its energy breakdown, and a certificate that it holds every limit."""
+
+    id: str = described(
+        "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
+    )
+    robot: str = described("Name of the robot.", None, "ur5e")
+    method: Literal["bspline", "time_scaling"] = described("How the motion is parametrised.", None, "bspline")
+    objective: Literal["electrical", "mechanical"] = described("What was minimised.", None, "electrical")
+    duration: float = described("Length of the motion.", "s", 1.8)
+    status: Literal["optimal", "feasible"] = described(
+        "`optimal`: converged, and every other candidate solved or ruled out by a bound. `feasible`: verified, but the "
+        "search was cut short.",
+        None,
+        "optimal",
+    )
+    branch: Branches = described("The chosen pair of arm configurations.", None, {"start": {"label": _LABEL, "q": _Q}})
+    trajectory: Trajectory = described("The motion.", None, {"t": [0.0, 0.008], "power": [42.5, 43.1]})
+    energy: Energy = described("Its energy.", None, {"peak_power": 236.0, "mean_power": 84.7})
+    baselines: Annotated[list[Baseline], Field(min_length=1)] = described(
+        "What other methods spend between the same ends.", None, [{"name": "quintic", "duration": 1.8}]
+    )
+    candidates: Annotated[list[Candidate], Field(min_length=1)] = described(
+        "Every start and goal pair looked at.", None, [{"start": _LABEL, "goal": _LABEL, "status": "solved"}]
+    )
+    certificate: Certificate = described("Proof that the motion holds.", None, {"energy_error": 1e-6})
+    solver: Solver = described("What it cost to compute.", None, {"wall_time": 0.41, "iterations": 52})

@@ -1,0 +1,46 @@
+"""uvicorn, told what this service needs."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import socket
+
+import uvicorn
+
+from app.engine import Engine
+from app.main import create_app
+from app.settings import Settings
+
+_SETTLING_TIME = 0.05
+"""Time [s] in which what has arrived on open connections is read before the idle ones are closed."""
+
+
+class _Server(uvicorn.Server):
+    """Tells the engine when a shutdown begins: the lifespan's end comes only after the last answer."""
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        engine: Engine = self.config.loaded_app.state.engine
+        engine.drain()
+        for server in self.servers:
+            server.close()
+        await asyncio.sleep(_SETTLING_TIME)
+        await super().shutdown(sockets)
+
+
+def serve(settings: Settings) -> None:
+    """Serves in this process until a signal comes."""
+    config = uvicorn.Config(
+        create_app(settings),
+        host=settings.host,
+        port=settings.port,
+        loop="uvloop",
+        http="httptools",
+        ws="none",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        # requests in flight are refused by the engine before this
+        timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
+    )
+    _Server(config).run()
