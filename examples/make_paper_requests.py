@@ -1,0 +1,51 @@
+"""Writes paper_pose_1.json to paper_pose_15.json: from the home of the UR5e paper to each pose of its Table 1.
+
+    python examples/make_paper_requests.py
+
+`tests/reference/README.md` names the paper and tells what is known of its frames and joint convention.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from math import radians
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parent
+POSES = FOLDER.parent / "tests" / "reference" / "paper_table1_poses.csv"
+# The paper's home, all zeros, in Universal Robots' joint convention [deg].
+HOME = (0, -90, 90, -90, 180, 0)
+
+
+def requests() -> dict[str, dict[str, Any]]:
+    """Requests to `POST /optimize` by file name, in the order of the table."""
+    home = [radians(angle) for angle in HOME]
+    with POSES.open(newline="") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    return {
+        f"paper_pose_{number}.json": {
+            "robot": "ur5e",
+            "start": {"q": home},
+            "goal": {
+                "pose": {
+                    "position": [row["x_m"], row["y_m"], row["z_m"]],
+                    "rpy": [row["roll_rad"], row["pitch_rad"], row["yaw_rad"]],
+                }
+            },
+        }
+        for number, row in enumerate(rows, start=1)
+    }
+
+
+def text(request: dict[str, Any]) -> str:
+    """A request as it stands in its file: indented, but for lists of numbers."""
+    indented = json.dumps(request, indent=2)
+    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", indented) + "\n"
+
+
+if __name__ == "__main__":
+    for name, request in requests().items():
+        (FOLDER / name).write_text(text(request))

@@ -1,0 +1,127 @@
+"""Draws an answer: joint positions, speeds and motor torques, and the power drawn from the bus, over time.
+
+    python examples/plot_answer.py examples/paper_pose_1.json      asks the service and draws its answer
+    python examples/plot_answer.py answer.json                     draws an answer that was saved
+
+The service is asked for the robot's limits either way. Needs matplotlib.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito's palette, which colour-blind readers can tell apart.
+COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"]
+
+
+def call(url: str, body: bytes | None = None) -> dict[str, Any]:
+    """The JSON that the service answers; a refusal ends the program with the service's own words."""
+    request = urllib.request.Request(url, body, {"Content-Type": "application/json"})
+    try:
+        with urllib.request.urlopen(request, timeout=120) as answer:
+            content: dict[str, Any] = json.load(answer)
+    except urllib.error.HTTPError as error:
+        sys.exit(f"{url}: {error.code} {json.load(error).get('detail', error.reason)}")
+    except urllib.error.URLError as error:
+        sys.exit(f"{url}: {error.reason}. Start the service with `make serve`, or name it with --service.")
+    return content
+
+
+def limits_of(service: str, robot: str, request: dict[str, Any]) -> dict[str, list[float]]:
+    """Limit per joint on speed and torque: the robot's, or the request's where it tightens them."""
+    figures = call(f"{service}/robots/{robot}")["limits"]
+    limits: dict[str, list[float]] = {}
+    for name in ("velocity", "torque"):
+        given = (request.get("limits") or {}).get(name)
+        own: list[float] = figures[name]["value"]
+        limits[name] = own if given is None else given if isinstance(given, list) else [given] * len(own)
+    return limits
+
+
+def draw_joints(axes: Axes, t: Sequence[float], samples: Sequence[Sequence[float]], joints: Sequence[int]) -> None:
+    """One line per joint."""
+    for joint in joints:
+        axes.plot(t, [sample[joint] for sample in samples], color=COLOURS[joint % len(COLOURS)], label=f"J{joint + 1}")
+
+
+def draw_limit(axes: Axes, limit: float) -> None:
+    """A line at both ends of a symmetric limit."""
+    for value in (limit, -limit):
+        axes.axhline(value, color="0.35", linestyle="--", linewidth=1)
+    axes.annotate("limit", (1, limit), xycoords=("axes fraction", "data"), xytext=(3, -3), textcoords="offset points")
+
+
+def draw(answer: dict[str, Any], limits: dict[str, list[float]]) -> Figure:
+    """The whole figure: one panel each for position, speed and power, one per group of joints of equal torque limit."""
+    motion, energy = answer["trajectory"], answer["energy"]
+    t, joints = motion["t"], range(len(motion["q"][0]))
+    groups = [
+        [joint for joint in joints if limits["torque"][joint] == limit]
+        for limit in sorted(set(limits["torque"]), reverse=True)
+    ]
+    rows = 3 + len(groups)
+    figure = Figure(figsize=(8, 1.9 * rows), layout="constrained")
+    panels = list(figure.subplots(rows, sharex=True))
+    position, speed, *torques, power = panels
+    for axes in panels:
+        axes.grid(alpha=0.3)
+        axes.spines[["right", "top"]].set_visible(False)
+
+    draw_joints(position, t, motion["q"], joints)
+    position.set_ylabel("q [rad]")
+    draw_joints(speed, t, motion["v"], joints)
+    speed.set_ylabel("v [rad/s]")
+    for limit in set(limits["velocity"]):
+        draw_limit(speed, limit)
+    for axes, group in zip(torques, groups, strict=True):
+        draw_joints(axes, t, motion["tau_motor"], group)
+        axes.set_ylabel(f"tau_motor [N·m]\nJ{', J'.join(str(joint + 1) for joint in group)}")
+        draw_limit(axes, limits["torque"][group[0]])
+    power.plot(t, motion["power"], color="black")
+    power.fill_between(t, motion["power"], color="black", alpha=0.12, linewidth=0)
+    power.set(ylabel="bus power [W]", xlabel="time [s]", ylim=(0, None), xlim=(t[0], t[-1]))
+    power.annotate(
+        f"{energy['electrical']['total']:.1f} J, mean {energy['mean_power']:.0f} W, peak {energy['peak_power']:.0f} W",
+        (0.5, 0.08),
+        xycoords="axes fraction",
+        ha="center",
+    )
+    figure.legend(*position.get_legend_handles_labels(), loc="outside lower center", ncols=len(joints), frameon=False)
+    branch = answer["branch"]
+    figure.suptitle(
+        f"{answer['robot']}, {answer['method']}, least {answer['objective']} energy: {answer['duration']:.3f} s, "
+        f"{branch['start']['label']} to {branch['goal']['label']}",
+        fontsize=10,
+    )
+    figure.align_ylabels()
+    return figure
+
+
+def main() -> None:
+    """Ask if need be, draw, save."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", type=Path, help="a request, which is sent to the service, or a saved answer")
+    parser.add_argument("--service", default="http://127.0.0.1:8000", help="where the service is (%(default)s)")
+    parser.add_argument("--output", type=Path, help="the picture (default: the file's name with .png, here)")
+    arguments = parser.parse_args()
+    content = json.loads(arguments.file.read_text())
+    saved = "trajectory" in content
+    answer = content if saved else call(f"{arguments.service}/optimize", json.dumps(content).encode())
+    limits = limits_of(arguments.service, answer["robot"], {} if saved else content)
+    output = arguments.output or Path(arguments.file.with_suffix(".png").name)
+    draw(answer, limits).savefig(output, dpi=150)
+    print(output)
+
+
+if __name__ == "__main__":
+    main()
