@@ -58,7 +58,7 @@ def read(url: str) -> bytes:
 
 
 def fetch_pip(folder: Path) -> Path:
-    """Download the pinned wheel of pip into a folder; raises ValueError where the index does not have that very file."""
+    """Download the pinned wheel of pip into a folder; raises ValueError where the index lacks that very file."""
     index = (pip_setting("index-url") or "https://pypi.org/simple").rstrip("/") + "/pip/"
     page = read(index).decode()
     link = re.search(r'href="([^"]*/)?' + re.escape(PIP_WHEEL) + r'[^"]*"', page)
