@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array, Limits
+from models.robot import Array
 from optimizer.motion import Task
+from optimizer.profile import shortest_duration
 
 # no motion is planned shorter than this, even one that goes nowhere, nor longer than that [s]
 LEAST_DURATION = 0.01
@@ -18,23 +19,6 @@ LONGEST_DURATION = 600.0
 _KNEE_DEFICIT = 0.3003
 # halvings of the interval that holds the best duration: its width falls below a millionth of itself
 _BISECTIONS = 24
-
-
-def shortest_duration(travel: Array, limits: Limits) -> Array:
-    """Least time [s] of a rest-to-rest motion under speed, acceleration and jerk limits; travel (..., nq) → (...).
-
-    Every joint needs at least its own time-optimal seven-segment profile (Biagiotti, Melchiorri 2008, sec. 3.4), the
-    arm at least that of its slowest joint.
-    """
-    d = np.abs(travel)
-    v, a, j = limits.v_max, limits.a_max, limits.j_max
-    reaches_a = v * j >= a * a
-    ramp = np.where(reaches_a, v / a + a / j, 2 * np.sqrt(v / j))
-    cruising = d / v + ramp
-    with_a = a / j + np.sqrt((a / j) ** 2 + 4 * d / a)
-    jerk_only = 4 * np.cbrt(d / (2 * j))
-    short = np.where(reaches_a & (d >= 2 * a**3 / j**2), with_a, jerk_only)
-    return np.asarray(np.where(d >= v * ramp, cruising, short).max(axis=-1))
 
 
 def lower_bounds(task: Task, travel: Array, climb: Array) -> tuple[Array, Array]:

@@ -32,8 +32,7 @@ def clamped(breaks: Array) -> Array:
 def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
     """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
     n = len(knots) - DEGREE - 1
-    spline = BSpline(knots, np.eye(n), DEGREE)
-    return np.ascontiguousarray(spline.derivative(derivative)(points) if derivative else spline(points))
+    return np.ascontiguousarray(BSpline(knots, np.eye(n), DEGREE)(points, derivative))
 
 
 def greville(knots: Array) -> Array:
@@ -124,3 +123,16 @@ class Basis:
 def uniform(n: int) -> Basis:
     """The space of n ≥ 7 control points with evenly spaced knots."""
     return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))
+
+
+def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
+    """A space whose knots are repeated at the switches (k,) and otherwise no further apart than `widest`.
+
+    At a knot repeated twice the third derivative bends, repeated three times it jumps, as jerk does at its limits.
+    """
+    edges = np.concatenate([[0.0], switches[(switches > 1e-3) & (switches < 1 - 1e-3)], [1.0]])
+    breaks = [0.0]
+    for a, b in zip(edges[:-1], edges[1:], strict=True):
+        breaks += np.linspace(a, b, math.ceil((b - a) / widest) + 1)[1:-1].tolist()
+        breaks += [b] * (repeat if b < 1.0 else 1)
+    return Basis.of(clamped(np.array(breaks)))

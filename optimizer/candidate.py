@@ -12,7 +12,7 @@ from models.robot import Array, Limits
 from optimizer import shortest_line
 from optimizer.bounds import LEAST_DURATION, LONGEST_DURATION
 from optimizer.bspline import Basis, uniform
-from optimizer.motion import Task, fine_samples, spline_of
+from optimizer.motion import Task, fine_samples, peak_rates, spline_of
 from optimizer.nlp import Programme
 from optimizer.solution import Spline
 from optimizer.solve import FEASIBILITY, Result, solve
@@ -28,7 +28,7 @@ REPAIRS = 6
 REPAIR_MARGIN = 2e-4
 # first durations tried, in multiples of the shortest that the straight line allows
 STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
-# checking points per knot span for torque between the nodes
+# points per knot span at which torque is checked between the nodes
 TORQUE_POINTS = 16
 
 
@@ -165,15 +165,16 @@ def _first_duration(programme: Programme, free: Array, least: float) -> float:
 
 def _excess(task: Task, programme: Programme, result: Result) -> Limits | None:
     """By which factors (≥ 1) each limit must be tightened, None when the motion holds them all on a fine grid."""
-    limits, T = task.problem.active_limits, result.duration
+    limits = task.problem.active_limits
     points = programme.joint_points(result.free)
-    rates = np.abs(programme.basis.at_grid @ points).max(axis=1)
-    _, q, v, a = fine_samples(spline_of(programme.basis, points, T), TORQUE_POINTS)
+    spline = spline_of(programme.basis, points, result.duration)
+    _, q, v, a = fine_samples(spline, TORQUE_POINTS)
     tau = task.torques(q, v, a) + task.friction.torque(v)
+    rates = peak_rates(spline)
     found = {
-        "v_max": rates[0] / T / limits.v_max,
-        "a_max": rates[1] / T**2 / limits.a_max,
-        "j_max": rates[2] / T**3 / limits.j_max,
+        "v_max": rates[0] / limits.v_max,
+        "a_max": rates[1] / limits.a_max,
+        "j_max": rates[2] / limits.j_max,
         "tau_max": np.abs(tau).max(axis=0) / limits.tau_max,
     }
     if max(float(ratio.max()) for ratio in found.values()) <= 1 - REPAIR_MARGIN / 4:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,8 @@ KNEE = 0.02
 WIDTH = 0.5
 # quadrature points per knot span for reported energies
 REPORT_NODES = 16
+# points per knot span at which peaks are looked for: between them a parabola rises by less than 1e-4 of its curvature
+RATE_POINTS = 65
 
 
 @dataclass(frozen=True)
@@ -135,10 +138,29 @@ def spline_of(basis: bspline.Basis, control_points: Array, duration: float) -> S
 
 def _sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
-    return curve(t), curve.derivative(1)(t), curve.derivative(2)(t)
+    return curve(t), curve(t, 1), curve(t, 2)
 
 
 def fine_samples(spline: Spline, per_span: int) -> tuple[Array, Array, Array, Array]:
     """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of every knot span."""
     points, weights = bspline.quadrature(spline.knots, per_span)
     return weights, *_sample(spline, points)
+
+
+def peak_rates(spline: Spline) -> Array:
+    """Greatest absolute speed, acceleration and jerk of every joint, (3, nq): on a dense grid.
+
+    Every knot span is expanded around its middle, so that both sides of a repeated knot count.
+    """
+    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    edges = np.unique(spline.knots)
+    middle, half = (edges[:-1] + edges[1:]) / 2, np.diff(edges) / 2
+    # the spans as polynomials in x ∈ [-1, 1] around their middles
+    series = np.stack([curve(middle, k) * half[:, None] ** k for k in range(6)])
+    x = np.linspace(-1.0, 1.0, RATE_POINTS)
+    powers = np.stack([x**k / math.factorial(k) for k in range(6)], axis=1)
+    peaks = []
+    for d in range(1, 4):
+        values = np.tensordot(powers[:, : 6 - d], series[d:], axes=1) / half[:, None] ** d
+        peaks.append(np.abs(values).max(axis=(0, 1)))
+    return np.array(peaks)

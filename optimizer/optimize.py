@@ -6,11 +6,12 @@ import time
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from models.registry import load_robot
-from optimizer import bspline, search
+from optimizer import bspline, profile, search
 from optimizer.baselines import baselines, guesses, nearest
-from optimizer.bspline import uniform
+from optimizer.bspline import Basis, uniform
 from optimizer.candidate import FINE, FINEST, Attempt, Guess, attempt
 from optimizer.exceptions import (
     DeadlineExceeded,
@@ -29,6 +30,9 @@ from optimizer.verify import certify
 RESERVE_SHARE, RESERVE = 0.2, 0.1
 # a baseline counts as better only beyond the quadrature's own error
 SLACK = 1e-6
+# how often knots are repeated where jerk switches: it bends there in a refined motion, and jumps in the finest
+REFINED, EXACT = 2, 3
+FIT_SAMPLES = 201
 
 
 def optimize(problem: Problem) -> Solution:
@@ -116,17 +120,25 @@ class _Run:
             entry.attempt, entry.energy, entry.status, entry.reason = outcome, energy, "solved", outcome.reason
 
     def refine(self, entry: Entry) -> None:
-        """More control points for the winner, warm."""
+        """More control points for the winner, placed where jerk switches, warm."""
         assert entry.attempt is not None and entry.attempt.spline is not None
         spline = entry.attempt.spline
         if len(spline.control_points) >= FINE or time.perf_counter() > self.deadline:
             return
-        points = bspline.refit(spline.control_points, spline.knots / spline.duration, uniform(FINE).knots)
-        self.improve(entry, self.attempt(entry, spaces=(uniform(FINE),), guess=Guess(points, spline.duration)))
+        at = np.linspace(0.0, spline.duration, FIT_SAMPLES)
+        q = BSpline(spline.knots, spline.control_points, spline.degree)(at)
+        space = self.space(entry, spline.duration, REFINED)
+        points = bspline.fit(q, at / spline.duration, space.knots)
+        self.improve(entry, self.attempt(entry, spaces=(space,), guess=Guess(points, spline.duration)))
+
+    def space(self, entry: Entry, duration: float, repeat: int) -> Basis:
+        """A spline space made for the entry: knots where the leading joint's jerk switches, evenly spaced elsewhere."""
+        switches = profile.switches(entry.q_goal - entry.q_start, duration, self.problem.active_limits)
+        return bspline.graded(switches, repeat) if len(switches) else uniform(FINE)
 
     def compared(self, best: Entry) -> list[Baseline]:
         """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
-        for n in (FINE, FINEST, 2 * FINEST):
+        for repeat in (REFINED, EXACT, EXACT):
             assert best.attempt is not None and best.attempt.spline is not None and best.energy is not None
             duration = best.attempt.spline.duration
             peers = [e for e in self.entries if np.array_equal(e.q_start, best.q_start)]
@@ -142,9 +154,9 @@ class _Run:
             motions = guesses(self.problem, best.q_start, q_nearest, duration)
             for name in better:
                 motion = motions[name]
-                points = bspline.fit(motion.q, motion.t / motion.duration, uniform(n).knots)
-                guess = Guess(points, motion.duration)
-                self.improve(entry, self.attempt(entry, spaces=(uniform(n),), guess=guess))
+                space = self.space(entry, motion.duration, repeat)
+                guess = Guess(bspline.fit(motion.q, motion.t / motion.duration, space.knots), motion.duration)
+                self.improve(entry, self.attempt(entry, spaces=(space,), guess=guess))
             best = self.best() or best
         return table
 
