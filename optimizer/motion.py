@@ -22,8 +22,8 @@ KNEE = 0.02
 WIDTH = 0.5
 # quadrature points per knot span for reported energies
 REPORT_NODES = 16
-# points per knot span at which peaks are looked for: between them a parabola rises by less than 1e-4 of its curvature
-RATE_POINTS = 65
+# points per knot span at which peaks of speed, acceleration and jerk are looked for
+RATE_POINTS = 33
 
 
 @dataclass(frozen=True)
@@ -148,9 +148,10 @@ def fine_samples(spline: Spline, per_span: int) -> tuple[Array, Array, Array, Ar
 
 
 def peak_rates(spline: Spline) -> Array:
-    """Greatest absolute speed, acceleration and jerk of every joint, (3, nq): on a dense grid.
+    """Greatest absolute speed, acceleration and jerk of every joint, (3, nq).
 
-    Every knot span is expanded around its middle, so that both sides of a repeated knot count.
+    Every knot span is expanded around its middle, so that both sides of a repeated knot count, and its greatest sample
+    is raised to the vertex of the parabola through its neighbours: exact for jerk, which is such a parabola.
     """
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
     edges = np.unique(spline.knots)
@@ -162,5 +163,8 @@ def peak_rates(spline: Spline) -> Array:
     peaks = []
     for d in range(1, 4):
         values = np.tensordot(powers[:, : 6 - d], series[d:], axes=1) / half[:, None] ** d
-        peaks.append(np.abs(values).max(axis=(0, 1)))
+        low, top, high = np.abs(values[:-2]), np.abs(values[1:-1]), np.abs(values[2:])
+        bend = 2 * top - low - high
+        vertex = np.where((top >= low) & (top >= high) & (bend > 0), (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
+        peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=(0, 1)), (top + vertex).max(axis=(0, 1))))
     return np.array(peaks)

@@ -151,7 +151,8 @@ class Certificate:
 
     RATIO_TOLERANCE = 1e-6
     POSITION_TOLERANCE = 1e-6
-    REST_TOLERANCE = 1e-9
+    # rounding of control points (1e-16 rad) over the square of the shortest knot span
+    REST_TOLERANCE = 1e-7
     ENERGY_TOLERANCE = 1e-3
 
     @property
