@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import ruckig
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.energy import breakdown
 from optimizer.problem import Problem
 from optimizer.solution import Baseline, BaselineName, Energy
@@ -112,7 +112,7 @@ def baselines(
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
     """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]."""
-    fastest = time_optimal(problem, q_start, q_goal)
+    fastest = time_optimal(problem.active_limits, q_start, q_goal)
     return {
         "trapezoid": trapezoid(problem, q_start, q_goal, duration),
         "quintic": quintic(q_start, q_goal, duration),
@@ -217,12 +217,11 @@ def controller_default(problem: Problem, q_start: Array, q_goal: Array) -> Sampl
     return _trapezoid(q_start, q_goal, 2 * math.sqrt(lazy), math.sqrt(lazy))
 
 
-def time_optimal(problem: Problem, q_start: Array, q_goal: Array) -> SampledMotion:
+def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
     """Ruckig's motion from rest to rest, joints ending together, each of up to seven phases of constant jerk.
 
     Raises RuntimeError should Ruckig find no motion: between configurations at rest there always is one.
     """
-    limits = problem.active_limits
     given = ruckig.InputParameter(len(q_start))
     given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()
     given.max_velocity, given.max_acceleration = limits.v_max.tolist(), limits.a_max.tolist()

@@ -20,6 +20,8 @@ from optimizer.solution import Energy, Spline, Trajectory
 # smoothing that the optimiser works with: friction's reversal [rad/s] and the corners of |power| [W]
 KNEE = 0.02
 WIDTH = 0.5
+# what a second costs where the shortest duration is looked for [W]: a hundred times what energy could make up for
+HASTE = 1e4
 # quadrature points per knot span for reported energies
 REPORT_NODES = 16
 # points per knot span at which peaks of speed, acceleration and jerk are looked for
@@ -83,8 +85,8 @@ class Task:
 
     @cached_property
     def fastest_parameters(self) -> Array:
-        """Parameters that make the duration the cost."""
-        return self.parameters(time=1.0)
+        """Parameters that make the duration the cost; a little energy beside it keeps the programme well conditioned."""
+        return self.parameters(electrical=1.0, time=HASTE)
 
     @property
     def friction(self) -> FrictionLaw:

@@ -21,6 +21,9 @@ from models.robot import Array, Limits
 from optimizer.bspline import REST_POINTS, Basis
 from optimizer.kernel import Kernel
 
+# travel below this counts as none where a shared time law is limited by the joints' own limits [rad]
+SHORTEST_TRAVEL = 1e-12
+
 
 @dataclass(frozen=True)
 class Linearisation:
@@ -39,8 +42,51 @@ class Linearisation:
 
 
 @dataclass(frozen=True)
+class Coordinates:
+    """What the spline runs in: q = origin (nq,) + directions (nq, r) · s, from `start` to `goal` (r,).
+
+    `limits` are those of s, (r,) each, but for `tau_max` (nq,), which stays per joint.
+    """
+
+    origin: Array
+    directions: Array
+    start: Array
+    goal: Array
+    limits: Limits
+
+    @staticmethod
+    def joints(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
+        """Every joint has a spline of its own."""
+        nq = len(q_start)
+        return Coordinates(np.zeros(nq), np.eye(nq), q_start, q_goal, limits)
+
+    @staticmethod
+    def straight_line(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
+        """All joints share one time law s ∈ [0, 1] along the straight line from start to goal."""
+        travel = q_goal - q_start
+        length = np.maximum(np.abs(travel), SHORTEST_TRAVEL)
+        zero, one = np.zeros(1), np.ones(1)
+        rates = [np.array([(limit / length).min()]) for limit in (limits.v_max, limits.a_max, limits.j_max)]
+        shared = Limits(zero, one, *rates, tau_max=limits.tau_max)
+        return Coordinates(q_start, travel[:, None], zero, one, shared)
+
+    @property
+    def r(self) -> int:
+        """Number of coordinates."""
+        return self.directions.shape[1]
+
+    def to_joints(self, points: Array) -> Array:
+        """q (n, nq) for s (n, r)."""
+        return np.asarray(self.origin + points @ self.directions.T)
+
+    def from_joints(self, q: Array) -> Array:
+        """s (k, r) of the points nearest to q (k, nq)."""
+        return np.asarray((q - self.origin) @ np.linalg.pinv(self.directions).T)
+
+
+@dataclass(frozen=True)
 class Programme:
-    """One candidate's programme. Limits `s_*` are in the spline's coordinates (r,); `tau_max` (nq,) is per joint.
+    """One candidate's programme.
 
     `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it.
     """
@@ -48,44 +94,19 @@ class Programme:
     kernel: Kernel
     basis: Basis
     p: Array
-    origin: Array
-    directions: Array
-    s_start: Array
-    s_goal: Array
-    s_limits: Limits
+    coordinates: Coordinates
     t_min: float
     t_max: float
-
-    @staticmethod
-    def joint_space(
-        kernel: Kernel, basis: Basis, p: Array, q_start: Array, q_goal: Array, limits: Limits, t_min: float, t_max: float
-    ) -> Programme:
-        """Every joint has a spline of its own."""
-        nq = len(q_start)
-        return Programme(kernel, basis, p, np.zeros(nq), np.eye(nq), q_start, q_goal, limits, t_min, t_max)
-
-    @staticmethod
-    def straight_line(
-        kernel: Kernel, basis: Basis, p: Array, q_start: Array, q_goal: Array, limits: Limits, t_min: float, t_max: float
-    ) -> Programme:
-        """All joints share one time law along the straight line from start to goal."""
-        travel = q_goal - q_start
-        length = np.maximum(np.abs(travel), 1e-12)
-        zero, one = np.zeros(1), np.ones(1)
-        shared = Limits(
-            q_min=zero,
-            q_max=one,
-            v_max=np.array([(limits.v_max / length).min()]),
-            a_max=np.array([(limits.a_max / length).min()]),
-            j_max=np.array([(limits.j_max / length).min()]),
-            tau_max=limits.tau_max,
-        )
-        return Programme(kernel, basis, p, q_start, travel[:, None], zero, one, shared, t_min, t_max)
 
     @property
     def r(self) -> int:
         """Number of the spline's coordinates."""
-        return self.directions.shape[1]
+        return self.coordinates.r
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of the spline's coordinates."""
+        return self.coordinates.limits
 
     @property
     def free_count(self) -> int:
@@ -95,7 +116,7 @@ class Programme:
     @cached_property
     def rates(self) -> Array:
         """Limits of the first to third derivative of s, (3, r)."""
-        return np.stack([self.s_limits.v_max, self.s_limits.a_max, self.s_limits.j_max])
+        return np.stack([self.limits.v_max, self.limits.a_max, self.limits.j_max])
 
     @cached_property
     def _full_space(self) -> bool:
@@ -104,15 +125,11 @@ class Programme:
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""
         ends = np.ones((REST_POINTS, 1))
-        return np.concatenate([ends * self.s_start, free, ends * self.s_goal])
+        return np.concatenate([ends * self.coordinates.start, free, ends * self.coordinates.goal])
 
     def joint_points(self, free: Array) -> Array:
         """Control points of q, (n, nq)."""
-        return self.origin + self.points(free) @ self.directions.T
-
-    def straight(self) -> Array:
-        """Free control points (m, r) of the rest-to-rest quintic along the straight line."""
-        return self.s_start + np.outer(self.basis.quintic[self.basis.free], self.s_goal - self.s_start)
+        return self.coordinates.to_joints(self.points(free))
 
     def _states(self, free: Array, T: float) -> tuple[Array, Array]:
         """s, v, a in the spline's coordinates (N, 3, r), and the kernel's nodes y (N, 3 nq)."""
@@ -122,8 +139,8 @@ class Programme:
         z = z.transpose(1, 0, 2)
         if self._full_space:
             return z, z.reshape(len(z), -1)
-        y = z @ self.directions.T
-        y[:, 0] += self.origin
+        y = z @ self.coordinates.directions.T
+        y[:, 0] += self.coordinates.origin
         return z, y.reshape(len(y), -1)
 
     def value(self, free: Array, T: float) -> tuple[float, Array]:
@@ -142,7 +159,7 @@ class Programme:
         J = jacobian.reshape(count, nq, 3, nq)
         H = hessian.reshape(count, 3, nq, 3, nq)
         if not self._full_space:
-            P = self.directions
+            P = self.coordinates.directions
             G, J = G @ P, J @ P
             H = np.moveaxis(np.moveaxis(H @ P, 2, -1) @ P, -1, 2)
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import Any
-
 import numpy as np
 from scipy.interpolate import BSpline
 
 from models.registry import load_robot
-from optimizer import bspline, profile, search
+from models.robot import Array
+from optimizer import bspline, search
 from optimizer.baselines import baselines, guesses, nearest
-from optimizer.bspline import Basis, uniform
-from optimizer.candidate import FINE, FINEST, Attempt, Guess, attempt
+from optimizer.candidate import COARSE, EXACT, REFINED, Attempt, Guess, Solver
 from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
@@ -23,15 +21,13 @@ from optimizer.kernel import kernel_for
 from optimizer.motion import Task
 from optimizer.problem import Problem
 from optimizer.search import Entry
-from optimizer.solution import Baseline, Branch, Solution, SolverReport
+from optimizer.solution import Baseline, Branch, Solution, SolverReport, Spline
 from optimizer.verify import certify
 
 # share of the deadline kept for checking and reporting the answer, at most [s]
 RESERVE_SHARE, RESERVE = 0.2, 0.1
 # a baseline counts as better only beyond the quadrature's own error
 SLACK = 1e-6
-# how often knots are repeated where jerk switches: it bends there in a refined motion, and jumps in the finest
-REFINED, EXACT = 2, 3
 FIT_SAMPLES = 201
 
 
@@ -62,7 +58,7 @@ class _Run:
         if problem.payload.mass > problem.robot.rated_payload:
             rating = problem.robot.rated_payload
             raise InvalidProblem("payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg.")
-        search.explore(task, self.entries, lambda entry: self.attempt(entry), self.deadline)
+        search.explore(task, self.entries, lambda entry: self.count(self.solver(entry).solve()), self.deadline)
         if self.best() is None:
             self.race()
         while (best := self.best()) is not None:
@@ -81,9 +77,12 @@ class _Run:
         """The solved entry of least energy."""
         return min((e for e in self.entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
 
-    def attempt(self, entry: Entry, **options: Any) -> Attempt:
-        """Attempt a candidate and count what it takes."""
-        outcome = attempt(self.task, entry.q_start, entry.q_goal, self.deadline, **options)
+    def solver(self, entry: Entry, fastest: bool = False) -> Solver:
+        """What solves the entry."""
+        return Solver(self.task, entry.q_start, entry.q_goal, self.deadline, fastest)
+
+    def count(self, outcome: Attempt) -> Attempt:
+        """Add up what an attempt took."""
         self.iterations += outcome.iterations
         self.solves += outcome.solves
         return outcome
@@ -96,23 +95,31 @@ class _Run:
         longest = self.problem.duration_max
         if longest is None:
             return
-        quickest, shortest = None, np.inf
-        runners = [e for e in self.entries if np.isfinite(e.lower_bound) or e.shortest > longest]
-        for entry in sorted(runners, key=lambda e: e.shortest):
-            if entry.shortest >= shortest or time.perf_counter() > self.deadline:
+        winner, best = None, None
+        for entry in sorted((e for e in self.entries if e.holdable), key=lambda e: e.shortest):
+            if (best is not None and entry.shortest >= best.duration) or time.perf_counter() > self.deadline:
                 break
-            outcome = self.attempt(entry, spaces=(uniform(FINE), uniform(FINEST)), fastest=True)
-            if outcome.spline is not None and outcome.spline.duration < shortest:
-                quickest, shortest, spline = entry, outcome.spline.duration, outcome.spline
-        if quickest is None:
+            spline = self.count(self.solver(entry, fastest=True).solve()).spline
+            if spline is not None and (best is None or spline.duration < best.duration):
+                winner, best = entry, spline
+        if winner is None or best is None:
             return
-        if shortest > longest:
-            raise DurationTooShort(shortest)
-        guess = Guess(spline.control_points, shortest)
-        self.improve(quickest, self.attempt(quickest, spaces=(uniform(len(spline.control_points)),), guess=guess))
+        if best.duration > longest:
+            raise DurationTooShort(best.duration)
+        self.learn(winner, best)
 
-    def improve(self, entry: Entry, outcome: Attempt) -> None:
-        """Take a new attempt at the entry if it spends less."""
+    def learn(self, entry: Entry, spline: Spline, repeat: int = EXACT) -> None:
+        """Optimise the entry from a motion, over knots where jerk switches, and keep what spends less."""
+        at = np.linspace(0.0, spline.duration, FIT_SAMPLES)
+        q = BSpline(spline.knots, spline.control_points, spline.degree)(at)
+        self.improve(entry, q, at, repeat)
+
+    def improve(self, entry: Entry, q: Array, t: Array, repeat: int) -> None:
+        """Optimise the entry from samples q (k, nq) at times t (k,), and keep the outcome if it spends less."""
+        solver, duration = self.solver(entry), float(t[-1])
+        space = solver.graded(duration, repeat)
+        s = solver.coordinates.from_joints(q)
+        outcome = self.count(solver.improve(Guess(space, bspline.fit(s, t / duration, space.knots), duration)))
         if outcome.spline is None:
             return
         energy = self.task.objective_of(self.task.energy(outcome.spline))
@@ -123,22 +130,12 @@ class _Run:
         """More control points for the winner, placed where jerk switches, warm."""
         assert entry.attempt is not None and entry.attempt.spline is not None
         spline = entry.attempt.spline
-        if len(spline.control_points) >= FINE or time.perf_counter() > self.deadline:
-            return
-        at = np.linspace(0.0, spline.duration, FIT_SAMPLES)
-        q = BSpline(spline.knots, spline.control_points, spline.degree)(at)
-        space = self.space(entry, spline.duration, REFINED)
-        points = bspline.fit(q, at / spline.duration, space.knots)
-        self.improve(entry, self.attempt(entry, spaces=(space,), guess=Guess(points, spline.duration)))
-
-    def space(self, entry: Entry, duration: float, repeat: int) -> Basis:
-        """A spline space made for the entry: knots where the leading joint's jerk switches, evenly spaced elsewhere."""
-        switches = profile.switches(entry.q_goal - entry.q_start, duration, self.problem.active_limits)
-        return bspline.graded(switches, repeat) if len(switches) else uniform(FINE)
+        if len(spline.control_points) == COARSE and time.perf_counter() < self.deadline:
+            self.learn(entry, spline, REFINED)
 
     def compared(self, best: Entry) -> list[Baseline]:
         """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
-        for repeat in (REFINED, EXACT, EXACT):
+        for repeat in (REFINED, EXACT, None):
             assert best.attempt is not None and best.attempt.spline is not None and best.energy is not None
             duration = best.attempt.spline.duration
             peers = [e for e in self.entries if np.array_equal(e.q_start, best.q_start)]
@@ -147,16 +144,15 @@ class _Run:
                 self.problem, best.q_start, q_goals, duration, best.energy, self.task.torques, self.task.potential
             )
             better = [b.name for b in table if b.within_limits and b.saving < -SLACK and self.allows(b.duration)]
-            if not better or time.perf_counter() > self.deadline:
+            # a baseline off the straight line is no guess for a motion along it
+            if not better or repeat is None or self.problem.method == "time_scaling":
                 break
             q_nearest = nearest(self.problem, best.q_start, q_goals)
             entry = next(e for e in peers if np.array_equal(e.q_goal, q_nearest))
             motions = guesses(self.problem, best.q_start, q_nearest, duration)
             for name in better:
-                motion = motions[name]
-                space = self.space(entry, motion.duration, repeat)
-                guess = Guess(bspline.fit(motion.q, motion.t / motion.duration, space.knots), motion.duration)
-                self.improve(entry, self.attempt(entry, spaces=(space,), guess=guess))
+                if time.perf_counter() < self.deadline:
+                    self.improve(entry, motions[name].q, motions[name].t, repeat)
             best = self.best() or best
         return table
 

@@ -47,6 +47,7 @@ class Entry:
     reason: str = "not reached before the deadline"
     energy: float | None = None
     attempt: Attempt | None = field(default=None, repr=False)
+    holdable: bool = True
 
     def report(self) -> Candidate:
         """The candidate as it is answered."""
@@ -149,10 +150,10 @@ def bound(task: Task, entries: Sequence[Entry]) -> None:
             if excess.max() > 1:
                 joint = problem.robot.joint_names[int(excess.argmax())]
                 entry.status, entry.reason = "infeasible", f"{joint} cannot hold the load at an end of the motion"
-                entry.lower_bound = np.inf
+                entry.lower_bound, entry.holdable = np.inf, False
         if entry.status == "unvisited" and not np.isfinite(value):
             entry.status, entry.reason = "infeasible", f"takes at least {least:.4f} s"
-    if entries and all(entry.reason.endswith("at an end of the motion") for entry in entries):
+    if not any(entry.holdable for entry in entries):
         _, worst = min(((holding[key] / tau_max).max(), key) for key in holding if (holding[key] / tau_max).max() > 1)
         j = int((holding[worst] / tau_max).argmax())
         raise TorqueInfeasible(problem.robot.joint_names[j], float(holding[worst][j]), float(tau_max[j]))
@@ -167,7 +168,7 @@ def explore(
 ) -> Entry | None:
     """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none."""
     best: Entry | None = None
-    for entry in sorted(entries, key=lambda e: e.lower_bound):
+    for entry in sorted(entries, key=lambda e: (e.lower_bound, e.shortest)):
         if entry.status != "unvisited":
             continue
         if best is not None and best.energy is not None and entry.lower_bound >= best.energy:

@@ -31,7 +31,7 @@ FEASIBILITY = 1e-4
 PROGRESS = 3e-6
 MAX_ITERATIONS = 60
 BACKTRACKS = 14
-# smallest eigenvalue that the QP's Hessian may have, relative to the largest
+# smallest eigenvalue that the QP's Hessian may have, relative to the largest or to 1, the scale of the cost
 EIGENVALUE_FLOOR = 1e-7
 # no joint's control point moves further in one step [rad]
 STEP = 1.5
@@ -97,7 +97,7 @@ class _Solver:
         basis = programme.basis
         self.grid_free = np.ascontiguousarray(basis.at_grid[:, :, basis.free])
         self.anchors = basis.anchors[:, :, None]
-        self.tau_max = programme.s_limits.tau_max
+        self.tau_max = programme.limits.tau_max
         self.orders = np.arange(1, 4)
         self.active = np.zeros((*basis.at_grid.shape[:2], programme.r), dtype=bool)
 
@@ -198,8 +198,8 @@ class _Solver:
     def _bounds(self, free: Array, T: float, time_scale: float) -> tuple[Array, Array]:
         """Least and most that each unknown may change: position limits hold for control points, so along the curve."""
         p = self.p
-        lower = np.maximum(np.tile(p.s_limits.q_min, p.free_count) - free.ravel(), -STEP)
-        upper = np.minimum(np.tile(p.s_limits.q_max, p.free_count) - free.ravel(), STEP)
+        lower = np.maximum(np.tile(p.limits.q_min, p.free_count) - free.ravel(), -STEP)
+        upper = np.minimum(np.tile(p.limits.q_max, p.free_count) - free.ravel(), STEP)
         if self.free_time:
             lower = np.append(lower, max(p.t_min - T, -0.5 * T) / time_scale)
             upper = np.append(upper, min(p.t_max - T, T) / time_scale)
@@ -263,7 +263,7 @@ def _convex(H: Array) -> Array:
         return H
     except LinAlgError:
         values, vectors = np.linalg.eigh(H)
-        floor = EIGENVALUE_FLOOR * np.abs(values).max()
+        floor = EIGENVALUE_FLOOR * max(1.0, np.abs(values).max())
         return (vectors * np.maximum(np.abs(values), floor)) @ vectors.T
 
 

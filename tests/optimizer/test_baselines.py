@@ -138,7 +138,7 @@ def test_trapezoid_keeps_to_limits_where_it_can() -> None:
 
 def test_ruckig_takes_its_textbook_time() -> None:
     """One joint that reaches all three limits: T = Δ/v + v/a + a/j."""
-    motion = time_optimal(problem(), START, one_joint(2.5))
+    motion = time_optimal(problem().active_limits, START, one_joint(2.5))
     v, a, j = math.pi, 10.0, 200.0
     assert motion.duration == pytest.approx(2.5 / v + v / a + a / j, rel=RATE)
     assert (motion.peak_v[2], motion.peak_a[2], motion.peak_jerk[2]) == pytest.approx((v, a, j), rel=RATE)
@@ -150,7 +150,7 @@ def test_ruckig_keeps_its_limits_and_its_word() -> None:
     for _ in range(50):
         own = limits(v_max=rng.uniform(0.3, 3.0, 6), a_max=rng.uniform(1.0, 10.0, 6), j_max=rng.uniform(10, 200, 6))
         start, goal = rng.uniform(-3.0, 3.0, (2, 6))
-        motion = time_optimal(problem(start, goal, limits=own), start, goal)
+        motion = time_optimal(problem(start, goal, limits=own).active_limits, start, goal)
         ratios = np.array([motion.peak_v / own.v_max, motion.peak_a / own.a_max, motion.peak_jerk / own.j_max])
         assert ratios.max() == pytest.approx(1.0, rel=RATE)
         given = ruckig.InputParameter(6)
@@ -164,7 +164,7 @@ def test_ruckig_keeps_its_limits_and_its_word() -> None:
 
 def test_slowing_scales_the_rates() -> None:
     """Twice the duration: v/2, a/4, jerk/8 on the same path."""
-    motion = time_optimal(problem(), START, GOAL)
+    motion = time_optimal(problem().active_limits, START, GOAL)
     slowed = motion.scaled_to(2 * motion.duration)
     for name, factor in {"q": 1, "t": 2, "weights": 2, "v": 1 / 2, "a": 1 / 4}.items():
         assert getattr(slowed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
@@ -281,7 +281,7 @@ def test_within_limits_of_torque() -> None:
     """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it is in."""
     free = problem()
     torques, _ = oracle(free)
-    motion = time_optimal(free, START, GOAL)
+    motion = time_optimal(free.active_limits, START, GOAL)
     tau = torques(motion.q, motion.v, motion.a)
     peaks = np.abs(tau + ROBOT.friction.torque(motion.v)).max(axis=0)
     for factor, inside in ((1 - 1e-5, False), (1 + 1e-5, True)):
@@ -293,7 +293,7 @@ def test_trapezoids_pass_without_a_jerk_limit() -> None:
     robot = replace(ROBOT, limits=limits(j_max=math.inf))
     report = compare(problem(robot=robot))
     assert all(each.within_limits for each in report.values())
-    bang_bang = time_optimal(problem(robot=robot), START, one_joint(0.4))
+    bang_bang = time_optimal(problem(robot=robot).active_limits, START, one_joint(0.4))
     assert bang_bang.duration == pytest.approx(2 * math.sqrt(0.4 / 10.0), rel=RATE)
 
 
