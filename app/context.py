@@ -18,6 +18,7 @@ logger = logging.getLogger("app.request")
 
 REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+_PROBES = ("/healthz", "/readyz")
 _CLIENT_CLOSED_REQUEST = 499
 """Status that is logged, never sent, for a request whose caller hung up: nginx's convention."""
 
@@ -56,7 +57,9 @@ class RequestContext:
                 raise  # the server breaks the connection, so that half an answer is not taken for a whole one
             await respond(Request(scope), error)(scope, receive, send_with_id)
         finally:
-            logger.info(
+            logger.log(
+                # probes come every second or so and say nothing new
+                logging.DEBUG if scope["path"] in _PROBES else logging.INFO,
                 "request",
                 extra={
                     "request_id": request_id,

@@ -106,7 +106,10 @@ class Engine:
         # the optimiser keeps the deadline itself and hands back what it has; the grace is for that
         limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
         try:
-            return await worker.ask(task, end - asyncio.get_running_loop().time())
+            left = end - asyncio.get_running_loop().time()
+            if left <= 0:
+                raise DeadlineExceeded([])
+            return await worker.ask(task, left)
         finally:
             if worker.alive:
                 self._idle.put_nowait(worker)

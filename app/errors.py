@@ -6,8 +6,7 @@ ServiceError
 ├── NotReady            no worker is warm
 ├── ShuttingDown        given up because the service stops
 ├── WorkerDied          its worker process ended under it
-├── NotFound, MethodNotAllowed, BodyTooLarge
-└── ClientDisconnected  nobody is left to answer
+└── NotFound, MethodNotAllowed, BodyTooLarge
 """
 
 from __future__ import annotations
@@ -84,8 +83,8 @@ class BodyTooLarge(ServiceError):
         super().__init__("The body is larger than the service accepts: send a smaller one.")
 
 
-class ClientDisconnected(ServiceError):
-    """The caller hung up."""
+class ClientDisconnected(Exception):
+    """The caller hung up: nobody is left to answer."""
 
 
 TABLE: dict[type[Exception], type[problems.Problem]] = {

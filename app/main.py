@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from importlib.metadata import PackageNotFoundError, version
 
 from fastapi import FastAPI
 
-from app import tasks
+from app import __version__, tasks
 from app.body_limit import BodyLimit
 from app.context import RequestContext
 from app.documentation import install_openapi
@@ -34,7 +33,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         summary="The robot-arm motion of least energy, with its energy breakdown and a certificate.",
         description="SI units throughout: m, rad, s, kg, N·m, W, J. Arrays over time are `[sample][joint]`. "
         "Every error is an `application/problem+json` whose `type` leads to a page that explains it.",
-        version=_version(),
+        version=__version__,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
         docs_url=None,
         redoc_url=None,
@@ -49,10 +48,3 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for routes in (optimize, ik, robots, health, problems, docs):
         app.include_router(routes.router)
     return app
-
-
-def _version() -> str:
-    try:
-        return version("joulepath")
-    except PackageNotFoundError:  # run from a source tree
-        return "0"

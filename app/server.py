@@ -7,6 +7,7 @@ import math
 import socket
 
 import uvicorn
+from fastapi import FastAPI
 
 from app.engine import Engine
 from app.main import create_app
@@ -19,8 +20,13 @@ _SETTLING_TIME = 0.05
 class _Server(uvicorn.Server):
     """Tells the engine when a shutdown begins: the lifespan's end comes only after the last answer."""
 
+    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+        super().__init__(config)
+        self._app = app
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        engine: Engine = self.config.loaded_app.state.engine
+        """Lets the requests in flight finish, or be refused."""
+        engine: Engine = self._app.state.engine
         engine.drain()
         for server in self.servers:
             server.close()
@@ -30,8 +36,9 @@ class _Server(uvicorn.Server):
 
 def serve(settings: Settings) -> None:
     """Serves in this process until a signal comes."""
+    app = create_app(settings)
     config = uvicorn.Config(
-        create_app(settings),
+        app,
         host=settings.host,
         port=settings.port,
         loop="uvloop",
@@ -43,4 +50,4 @@ def serve(settings: Settings) -> None:
         # requests in flight are refused by the engine before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )
-    _Server(config).run()
+    _Server(config, app).run()

@@ -28,7 +28,7 @@ class Settings(BaseSettings):
     max_body_bytes: int = Field(default=65_536, ge=1024, description="Largest request body [byte].")
     max_deadline: float = Field(default=120.0, gt=0, le=600, description="Longest deadline a caller may ask for [s].")
     deadline_grace: float = Field(
-        default=2.0, gt=0, description="Time past the deadline after which a worker is killed [s]."
+        default=5.0, gt=0, description="Time past the deadline after which a worker is killed [s]."
     )
     shutdown_grace: float = Field(
         default=8.0,

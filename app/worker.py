@@ -11,6 +11,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -123,7 +124,11 @@ def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     configure_logging(log_level)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    warm()
+    try:
+        warm()
+    except Exception:
+        logger.exception("warm-up failed")
+        sys.exit(1)
     pipe.send("warm")
     while True:
         try:

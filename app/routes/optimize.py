@@ -49,10 +49,18 @@ async def optimize(
     returns it with its energy breakdown and a certificate that it holds every limit."""
     settings: Settings = request.app.state.settings
     engine: Engine = request.app.state.engine
-    if body.deadline > settings.max_deadline:
-        raise InvalidProblem("deadline", f"deadline must be at most {settings.max_deadline:g} s.")
     task = OptimizeTask(body, request.state.id)
-    return to_http(await _unless_disconnected(request, engine.run(task, body.deadline)))
+    work = engine.run(task, _deadline(body, settings.max_deadline))
+    return to_http(await _unless_disconnected(request, work))
+
+
+def _deadline(body: OptimizeRequest, most: float) -> float:
+    """The request's deadline [s]. Raises InvalidProblem when the caller asks for too much."""
+    if "deadline" not in body.model_fields_set:
+        return min(body.deadline, most)
+    if body.deadline > most:
+        raise InvalidProblem("deadline", f"deadline must be at most {most:g} s.")
+    return body.deadline
 
 
 async def _unless_disconnected(request: Request, work: Coroutine[None, None, Reply]) -> Reply:

@@ -18,6 +18,11 @@ def described(description: str, unit: str | None, example: Any, **constraints: A
     return Field(description=text, examples=[example], json_schema_extra=extra, **constraints)
 
 
+def part(description: str) -> Any:
+    """A field of an answer that is a model, or a list or dict of one, whose own fields show what it looks like."""
+    return Field(description=description)
+
+
 class Request(BaseModel):
     """A part of a request: JSON types as they are, no NaN or infinity, no unknown fields."""
 

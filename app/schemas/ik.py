@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.schemas.common import IDENTITY, Pose, Request, Response, RobotName, described
+from app.schemas.common import IDENTITY, Pose, Request, Response, RobotName, described, part
 
 _Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 
@@ -45,6 +45,4 @@ class IKResponse(Response):
         "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
     )
     robot: str = described("Name of the robot.", None, "ur5e")
-    solutions: list[IKSolution] = described(
-        "Solutions, one entry each.", None, [{"q": _Q, "label": "left/up/no_flip", "limit_distance": 1.57}]
-    )
+    solutions: list[IKSolution] = part("Solutions, one entry each.")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, Field
 
-from app.schemas.common import Response, described
+from app.schemas.common import Response, described, part
 from app.schemas.response import Candidate
 
 PREFIX = "/problems/"
@@ -36,6 +36,11 @@ class Problem(Response):
         return tuple(name for name in cls.model_fields if name not in Problem.model_fields)
 
 
+def _fixed(value: Any, name: str) -> Any:
+    """A field that is the same in every problem of a type."""
+    return Field(default=value, description=Problem.model_fields[name].description, examples=[value])
+
+
 class FieldError(Response):
     """One thing wrong with the request."""
 
@@ -47,20 +52,18 @@ class Validation(Problem):
     """The request is malformed or contradicts itself: the body is no JSON, a field is missing, unknown, of the wrong
     type or length, out of bounds, or not finite. Correct what `errors` lists and send it again."""
 
-    type: Literal["/problems/validation"] = "/problems/validation"
-    title: Literal["Invalid request"] = "Invalid request"
-    status: Literal[422] = 422
-    errors: list[FieldError] = described(
-        "What is wrong, field by field.", None, [{"loc": ["body", "goal"], "msg": "Field required"}]
-    )
+    type: Literal["/problems/validation"] = _fixed("/problems/validation", "type")
+    title: Literal["Invalid request"] = _fixed("Invalid request", "title")
+    status: Literal[422] = _fixed(422, "status")
+    errors: list[FieldError] = part("What is wrong, field by field.")
 
 
 class UnknownRobot(Problem):
     """No robot has that name. Use one of the names in `known`, which `GET /robots` lists too."""
 
-    type: Literal["/problems/unknown-robot"] = "/problems/unknown-robot"
-    title: Literal["Unknown robot"] = "Unknown robot"
-    status: Literal[404] = 404
+    type: Literal["/problems/unknown-robot"] = _fixed("/problems/unknown-robot", "type")
+    title: Literal["Unknown robot"] = _fixed("Unknown robot", "title")
+    status: Literal[404] = _fixed(404, "status")
     known: list[str] = described("Names that there are.", None, ["ur5e"])
 
 
@@ -72,9 +75,9 @@ class UnreachablePose(_TargetProblem):
     """No arm configuration within the joint range reaches the pose. Move it nearer, check that `position` is in metres
     and in the robot's base frame, and that `tcp` is right."""
 
-    type: Literal["/problems/unreachable-pose"] = "/problems/unreachable-pose"
-    title: Literal["Unreachable pose"] = "Unreachable pose"
-    status: Literal[422] = 422
+    type: Literal["/problems/unreachable-pose"] = _fixed("/problems/unreachable-pose", "type")
+    title: Literal["Unreachable pose"] = _fixed("Unreachable pose", "title")
+    status: Literal[422] = _fixed(422, "status")
     distance: float | None = described(
         "Distance to the nearest reachable position; null where it is not known or not the cause.", "m", 0.12
     )
@@ -84,9 +87,9 @@ class SingularPose(_TargetProblem):
     """Every arm configuration that reaches the pose is singular: there the arm cannot move in some direction. Move the
     pose a few millimetres, tilt it by a degree, or give joint positions."""
 
-    type: Literal["/problems/singular-pose"] = "/problems/singular-pose"
-    title: Literal["Singular pose"] = "Singular pose"
-    status: Literal[422] = 422
+    type: Literal["/problems/singular-pose"] = _fixed("/problems/singular-pose", "type")
+    title: Literal["Singular pose"] = _fixed("Singular pose", "title")
+    status: Literal[422] = _fixed(422, "status")
     smallest_singular_value: float = described("The largest among the configurations.", "1", 1e-9)
 
 
@@ -94,9 +97,9 @@ class OutsideLimits(Problem):
     """A joint position of the start or goal lies beyond the joint's range, the robot's own or the request's. Give one
     between `lower` and `upper`."""
 
-    type: Literal["/problems/outside-limits"] = "/problems/outside-limits"
-    title: Literal["Joint position outside its limits"] = "Joint position outside its limits"
-    status: Literal[422] = 422
+    type: Literal["/problems/outside-limits"] = _fixed("/problems/outside-limits", "type")
+    title: Literal["Joint position outside its limits"] = _fixed("Joint position outside its limits", "title")
+    status: Literal[422] = _fixed(422, "status")
     joint: str = described("Name of the joint.", None, "elbow_joint")
     value: float = described("Its position.", "rad", 3.5)
     lower: float = described("Least position allowed.", "rad", -3.1416)
@@ -107,9 +110,9 @@ class DurationTooShort(Problem):
     """No motion within the limits is as fast as `duration` demands. Allow at least `shortest`, or leave the duration to
     the optimiser."""
 
-    type: Literal["/problems/duration-too-short"] = "/problems/duration-too-short"
-    title: Literal["Duration too short"] = "Duration too short"
-    status: Literal[422] = 422
+    type: Literal["/problems/duration-too-short"] = _fixed("/problems/duration-too-short", "type")
+    title: Literal["Duration too short"] = _fixed("Duration too short", "title")
+    status: Literal[422] = _fixed(422, "status")
     shortest: float = described("The least feasible duration.", "s", 0.83)
 
 
@@ -117,45 +120,43 @@ class TorqueInfeasible(Problem):
     """The arm cannot hold or move that load. Lighten the payload, bring it closer to the flange, or relax the torque
     limit."""
 
-    type: Literal["/problems/torque-infeasible"] = "/problems/torque-infeasible"
-    title: Literal["Not enough torque"] = "Not enough torque"
-    status: Literal[422] = 422
+    type: Literal["/problems/torque-infeasible"] = _fixed("/problems/torque-infeasible", "type")
+    title: Literal["Not enough torque"] = _fixed("Not enough torque", "title")
+    status: Literal[422] = _fixed(422, "status")
     joint: str = described("The joint that is too weak.", None, "shoulder_lift_joint")
     needed: float = described("Torque that it needs.", "N·m", 171.0)
     available: float = described("Torque that it has.", "N·m", 150.0)
 
 
 class _SearchProblem(Problem):
-    candidates: list[Candidate] = described(
-        "Every start and goal pair looked at, and why it failed.", None, [{"start": "left/up/flip", "status": "failed"}]
-    )
+    candidates: list[Candidate] = part("Every start and goal pair looked at, and why it failed.")
 
 
 class NoTrajectory(_SearchProblem):
     """Every pair of start and goal configurations failed; `candidates` tells why. Relax a limit, allow a longer
     duration, or leave the branch free."""
 
-    type: Literal["/problems/no-trajectory"] = "/problems/no-trajectory"
-    title: Literal["No trajectory found"] = "No trajectory found"
-    status: Literal[422] = 422
+    type: Literal["/problems/no-trajectory"] = _fixed("/problems/no-trajectory", "type")
+    title: Literal["No trajectory found"] = _fixed("No trajectory found", "title")
+    status: Literal[422] = _fixed(422, "status")
 
 
 class DeadlineExceeded(_SearchProblem):
     """The deadline passed before any motion was verified. Time spent waiting for a worker counts. Allow a longer
     `deadline`, or try again when the service is less busy."""
 
-    type: Literal["/problems/deadline-exceeded"] = "/problems/deadline-exceeded"
-    title: Literal["Deadline exceeded"] = "Deadline exceeded"
-    status: Literal[504] = 504
+    type: Literal["/problems/deadline-exceeded"] = _fixed("/problems/deadline-exceeded", "type")
+    title: Literal["Deadline exceeded"] = _fixed("Deadline exceeded", "title")
+    status: Literal[504] = _fixed(504, "status")
 
 
 class Busy(Problem):
     """Every worker is taken and the queue is full. Try again after the seconds that the `Retry-After` header gives."""
 
     retry_after: ClassVar[int | None] = 2
-    type: Literal["/problems/busy"] = "/problems/busy"
-    title: Literal["Busy"] = "Busy"
-    status: Literal[503] = 503
+    type: Literal["/problems/busy"] = _fixed("/problems/busy", "type")
+    title: Literal["Busy"] = _fixed("Busy", "title")
+    status: Literal[503] = _fixed(503, "status")
 
 
 class NotReady(Problem):
@@ -163,50 +164,50 @@ class NotReady(Problem):
     `Retry-After` header gives."""
 
     retry_after: ClassVar[int | None] = 2
-    type: Literal["/problems/not-ready"] = "/problems/not-ready"
-    title: Literal["Not ready"] = "Not ready"
-    status: Literal[503] = 503
+    type: Literal["/problems/not-ready"] = _fixed("/problems/not-ready", "type")
+    title: Literal["Not ready"] = _fixed("Not ready", "title")
+    status: Literal[503] = _fixed(503, "status")
 
 
 class ShuttingDown(Problem):
     """The service is stopping and gave this request up. Send it again: another instance, or the next one, answers."""
 
     retry_after: ClassVar[int | None] = 5
-    type: Literal["/problems/shutting-down"] = "/problems/shutting-down"
-    title: Literal["Shutting down"] = "Shutting down"
-    status: Literal[503] = 503
+    type: Literal["/problems/shutting-down"] = _fixed("/problems/shutting-down", "type")
+    title: Literal["Shutting down"] = _fixed("Shutting down", "title")
+    status: Literal[503] = _fixed(503, "status")
 
 
 class NotFound(Problem):
     """There is nothing at that path. `GET /openapi.json` lists what there is."""
 
-    type: Literal["/problems/not-found"] = "/problems/not-found"
-    title: Literal["Not found"] = "Not found"
-    status: Literal[404] = 404
+    type: Literal["/problems/not-found"] = _fixed("/problems/not-found", "type")
+    title: Literal["Not found"] = _fixed("Not found", "title")
+    status: Literal[404] = _fixed(404, "status")
 
 
 class MethodNotAllowed(Problem):
     """The path does not take that HTTP method. Use one from the `Allow` header."""
 
-    type: Literal["/problems/method-not-allowed"] = "/problems/method-not-allowed"
-    title: Literal["Method not allowed"] = "Method not allowed"
-    status: Literal[405] = 405
+    type: Literal["/problems/method-not-allowed"] = _fixed("/problems/method-not-allowed", "type")
+    title: Literal["Method not allowed"] = _fixed("Method not allowed", "title")
+    status: Literal[405] = _fixed(405, "status")
 
 
 class BodyTooLarge(Problem):
     """The request's body is larger than the service accepts. Every honest request fits in a few kilobytes."""
 
-    type: Literal["/problems/body-too-large"] = "/problems/body-too-large"
-    title: Literal["Body too large"] = "Body too large"
-    status: Literal[413] = 413
+    type: Literal["/problems/body-too-large"] = _fixed("/problems/body-too-large", "type")
+    title: Literal["Body too large"] = _fixed("Body too large", "title")
+    status: Literal[413] = _fixed(413, "status")
 
 
 class Internal(Problem):
     """A defect of the service: it is logged with the request's id. Please report it, with the value of `instance`."""
 
-    type: Literal["/problems/internal"] = "/problems/internal"
-    title: Literal["Internal error"] = "Internal error"
-    status: Literal[500] = 500
+    type: Literal["/problems/internal"] = _fixed("/problems/internal", "type")
+    title: Literal["Internal error"] = _fixed("Internal error", "title")
+    status: Literal[500] = _fixed(500, "status")
 
 
 PROBLEMS: tuple[type[Problem], ...] = (

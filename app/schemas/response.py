@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import Response, described
+from app.schemas.common import Response, described, part
 
 Joints = list[float]
 Samples = list[float]
@@ -27,8 +27,8 @@ class Configuration(Response):
 class Branches(Response):
     """The chosen pair of arm configurations."""
 
-    start: Configuration = described("At the start.", None, {"label": _LABEL, "q": _Q})
-    goal: Configuration = described("At the goal.", None, {"label": _LABEL, "q": _Q})
+    start: Configuration = part("At the start.")
+    goal: Configuration = part("At the goal.")
 
 
 class Spline(Response):
@@ -53,11 +53,7 @@ class Trajectory(Response):
         "Motor torque at the joint, friction included.", "N·m", [[0.0, -38.1, -16.4, -1.2, 0.0, 0.0]]
     )
     power: Samples = described("Power drawn from the bus.", "W", [42.5, 43.1, 45.0])
-    spline: Spline = described(
-        "The motion itself, from which all the rest follows.",
-        None,
-        {"degree": 5, "knots": [0.0, 1.8], "control_points": [_Q, _Q]},
-    )
+    spline: Spline = part("The motion itself, from which all the rest follows.")
 
 
 class ElectricalEnergy(Response):
@@ -93,9 +89,9 @@ class JointEnergy(Response):
 class Energy(Response):
     """Everything about the motion's energy."""
 
-    electrical: ElectricalEnergy = described("Energy drawn from the bus.", None, {"total": 152.4, "idle": 66.1})
-    mechanical: MechanicalEnergy = described("Absolute mechanical work.", None, {"total": 61.7})
-    per_joint: JointEnergy = described("Losses and shaft work per joint.", None, {"friction": [20.0, 15.0, 9.0]})
+    electrical: ElectricalEnergy = part("Energy drawn from the bus.")
+    mechanical: MechanicalEnergy = part("Absolute mechanical work.")
+    per_joint: JointEnergy = part("The same, joint by joint.")
     peak_power: float = described("Greatest power drawn from the bus.", "W", 236.0)
     mean_power: float = described("Mean power drawn from the bus.", "W", 84.7)
     lower_bound: float = described(
@@ -160,9 +156,9 @@ class EndError(Response):
 class Certificate(Response):
     """The motion recomputed by Pinocchio on a 1 ms grid, apart from the solver."""
 
-    worst_ratio: WorstRatio = described("Worst value / limit, per limit.", None, {"velocity": 0.74, "torque": 0.55})
-    start_error: EndError = described("At the start.", None, {"position": 2e-12, "rotation": 4e-12})
-    goal_error: EndError = described("At the goal.", None, {"position": 2e-12, "rotation": 4e-12})
+    worst_ratio: WorstRatio = part("Worst value / limit, per limit.")
+    start_error: EndError = part("At the start.")
+    goal_error: EndError = part("At the goal.")
     energy_error: float = described("Fine quadrature against the reported total, relative.", "1", 1e-6)
     balance_error: float = described("Sum of the parts against the total, relative.", "1", 1e-6)
 
@@ -192,14 +188,10 @@ class OptimizeResponse(Response):
         None,
         "optimal",
     )
-    branch: Branches = described("The chosen pair of arm configurations.", None, {"start": {"label": _LABEL, "q": _Q}})
-    trajectory: Trajectory = described("The motion.", None, {"t": [0.0, 0.008], "power": [42.5, 43.1]})
-    energy: Energy = described("Its energy.", None, {"peak_power": 236.0, "mean_power": 84.7})
-    baselines: Annotated[list[Baseline], Field(min_length=1)] = described(
-        "What other methods spend between the same ends.", None, [{"name": "quintic", "duration": 1.8}]
-    )
-    candidates: Annotated[list[Candidate], Field(min_length=1)] = described(
-        "Every start and goal pair looked at.", None, [{"start": _LABEL, "goal": _LABEL, "status": "solved"}]
-    )
-    certificate: Certificate = described("Proof that the motion holds.", None, {"energy_error": 1e-6})
-    solver: Solver = described("What it cost to compute.", None, {"wall_time": 0.41, "iterations": 52})
+    branch: Branches = part("The arm configurations chosen at both ends.")
+    trajectory: Trajectory = part("The motion.")
+    energy: Energy = part("Its energy.")
+    baselines: Annotated[list[Baseline], Field(min_length=1)] = part("What other methods spend between the same ends.")
+    candidates: Annotated[list[Candidate], Field(min_length=1)] = part("Every start and goal pair looked at.")
+    certificate: Certificate = part("Proof that the motion holds.")
+    solver: Solver = part("What it cost to compute.")

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from typing import Literal
 
-from app.schemas.common import Response, described
-
-_FIGURE = {
-    "value": [150.0, 150.0, 150.0, 28.0, 28.0, 28.0],
-    "unit": "N·m",
-    "source": "Universal_Robots_ROS2_Description",
-    "trust": "A",
-    "note": "Of the motor at the joint.",
-}
+from app.schemas.common import Response, described, part
 
 
 class Figure(Response):
     """One figure of a robot; lists run over the joints from base to flange."""
 
-    value: float | list[float] | list[list[float]] = described("The figure.", None, _FIGURE["value"])
+    value: float | list[float] | list[list[float]] = described(
+        "The figure.", None, [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
+    )
     unit: str = described("Its unit; `1` where it has none.", None, "N·m")
-    source: str = described("Where it comes from.", None, _FIGURE["source"])
+    source: str = described(
+        "Where it comes from.", None, "github.com/UniversalRobots/Universal_Robots_ROS2_Description"
+    )
     trust: Literal["A", "B", "C", "T", "E"] = described("How far to trust it: see `trust`.", None, "A")
-    note: str = described("What else to know.", None, _FIGURE["note"])
+    note: str = described("What else to know.", None, "Of the motor at the joint.")
 
 
 Figures = dict[str, Figure]
@@ -36,14 +32,14 @@ class FrictionLaw(Response):
     formula: str = described(
         "Torque at joint speed v.", None, "coulomb v / sqrt(v² + knee²) + curved asinh(v / speed) + viscous v"
     )
-    coefficients: Figures = described("The formula's coefficients.", None, {"coulomb": _FIGURE})
+    coefficients: Figures = part("The formula's coefficients.")
 
 
 class Friction(Response):
     """Joint friction: what was measured, and the laws fitted to it."""
 
-    table: Figures = described("Measurements.", None, {"torque": _FIGURE})
-    laws: list[FrictionLaw] = described("The laws, the default one first.", None, [{"name": "curved"}])
+    table: Figures = part("Measurements.")
+    laws: list[FrictionLaw] = part("The laws, the default one first.")
 
 
 class RobotSummary(Response):
@@ -57,21 +53,17 @@ class RobotSummary(Response):
 class RobotList(Response):
     """Every robot there is."""
 
-    robots: list[RobotSummary] = described(
-        "The robots.", None, [{"name": "ur5e", "title": "Universal Robots UR5e", "joints": ["shoulder_pan_joint"]}]
-    )
+    robots: list[RobotSummary] = part("The robots.")
 
 
 class RobotDetail(RobotSummary):
     """All that is known of a robot, each figure with its source and trust."""
 
     trust: dict[str, str] = described("What the trust letters mean.", None, {"A": "maker's own file or data packet"})
-    kinematics: Figures = described("Geometry.", None, {"dh_a": _FIGURE})
-    inertials: Figures = described("Masses and inertias of the links.", None, {"mass": _FIGURE})
-    limits: Figures = described("Limits and rated payload.", None, {"torque": _FIGURE})
-    drives: Figures = described("Motors, gears and inverters.", None, {"torque_constant": _FIGURE})
-    electronics: Figures = described("What the arm draws besides its motors.", None, {"idle_power": _FIGURE})
-    friction: Friction = described("Joint friction.", None, {"laws": [{"name": "curved", "default": True}]})
-    default_motion: Figures = described(
-        "How the robot's own controller moves when it is told nothing.", None, {"velocity": _FIGURE}
-    )
+    kinematics: Figures = part("Geometry.")
+    inertials: Figures = part("Masses and inertias of the links.")
+    limits: Figures = part("Limits and rated payload.")
+    drives: Figures = part("Motors, gears and inverters.")
+    electronics: Figures = part("What the arm draws besides its motors.")
+    friction: Friction = part("Joint friction.")
+    default_motion: Figures = part("How the robot's own controller moves when it is told nothing.")

@@ -1,0 +1,34 @@
+"""The service as tests reach it: in this process, and as a server of its own. Both drive the real optimiser."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.main import create_app
+from app.settings import Settings
+from tests.app.live import Server, serving
+
+# a cold start: imports, loading the compiled kernel, a first solve [s]
+WARM_UP = 60.0
+
+
+@pytest.fixture(scope="session")
+def client() -> Iterator[TestClient]:
+    """The service in this process, its two workers warm."""
+    with TestClient(create_app(Settings(workers=2, queue_size=4)), raise_server_exceptions=False) as client:
+        end = time.monotonic() + WARM_UP
+        while client.get("/readyz").status_code != 200:
+            assert time.monotonic() < end, "the workers do not warm up"
+            time.sleep(0.05)
+        yield client
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    """`python -m app` in a process of its own, warm."""
+    with serving(workers=2, queue_size=4, max_deadline=30) as server:
+        yield server

@@ -1,0 +1,112 @@
+"""`python -m app` as a subprocess, talked to over a real socket."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import httpx2
+
+ROOT = Path(__file__).parents[2]
+WARM_UP = 60.0
+"""A cold start [s]."""
+EXIT = 30.0
+"""From SIGTERM to the end of the process, at most [s]."""
+
+
+@dataclass(frozen=True)
+class Server:
+    """A running service."""
+
+    process: subprocess.Popen[bytes]
+    url: str
+    log: IO[bytes]
+
+    def get(self, path: str) -> httpx2.Response:
+        return httpx2.get(self.url + path, timeout=30)
+
+    def post(self, path: str, body: Any, **options: Any) -> httpx2.Response:
+        return httpx2.post(self.url + path, json=body, timeout=60, **options)
+
+    def logged(self) -> list[dict[str, Any]]:
+        """Every line logged so far: each must be JSON."""
+        self.log.seek(0)
+        return [json.loads(line) for line in self.log]
+
+    def descendants(self) -> set[int]:
+        """Process ids of the server's children, theirs, and so on."""
+        found, parents = set(), {self.process.pid}
+        while parents:
+            parents = {pid for pid, parent in _parents().items() if parent in parents} - found
+            found |= parents
+        return found
+
+    def workers(self) -> list[int]:
+        """Process ids of the workers that became warm and live."""
+        alive = self.descendants()
+        return [entry["pid"] for entry in self.logged() if entry["message"] == "worker warm" and entry["pid"] in alive]
+
+    def terminate(self) -> int:
+        """Exit code after a SIGTERM."""
+        self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(EXIT)
+
+    def wait_ready(self) -> None:
+        end = time.monotonic() + WARM_UP
+        while True:
+            assert self.process.poll() is None, "the server ended by itself"
+            assert time.monotonic() < end, "the workers do not warm up"
+            try:
+                if self.get("/readyz").status_code == 200:
+                    return
+            except httpx2.TransportError:
+                pass
+            time.sleep(0.05)
+
+
+@contextmanager
+def serving(**settings: Any) -> Iterator[Server]:
+    """A warm server with these settings."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
+    environment |= {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
+    with tempfile.TemporaryFile() as log:
+        process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=log)
+        server = Server(process, f"http://127.0.0.1:{port}", log)
+        try:
+            server.wait_ready()
+            yield server
+        finally:
+            process.kill()
+            process.wait()
+
+
+def alive(pid: int) -> bool:
+    """Whether a process exists and is no zombie."""
+    return pid in _parents()
+
+
+def _parents() -> dict[int, int]:
+    """Parent of every living process."""
+    parents = {}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, parent = status.read_text().rpartition(")")[2].split()[:2]
+        except OSError:  # it has just ended
+            continue
+        if state != "Z":
+            parents[int(status.parent.name)] = int(parent)
+    return parents

@@ -1,0 +1,25 @@
+"""Requests that several tests send."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.schemas.examples import OPTIMIZE_EXAMPLES
+
+HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
+EXAMPLES: dict[str, dict[str, Any]] = {name: example["value"] for name, example in OPTIMIZE_EXAMPLES.items()}
+
+
+def move(**fields: Any) -> dict[str, Any]:
+    """A short motion between joint positions, and whatever else is given."""
+    return {"start": {"q": HOME}, "goal": {"q": NEAR}, **fields}
+
+
+def long_search(deadline: float) -> dict[str, Any]:
+    """A search over thousands of candidates that takes as long as it may."""
+    start, goal = (
+        {"pose": {"position": position, "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+        for position in ([0.4, 0.2, 0.35], [0.3, -0.4, 0.2])
+    )
+    return {"start": start, "goal": goal, "objective": "mechanical", "duration": {"max": 5.0}, "deadline": deadline}

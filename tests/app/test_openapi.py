@@ -1,0 +1,117 @@
+"""The OpenAPI document: complete, true to what is sent, and its examples valid."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import jsonschema_rs
+import pytest
+import schemathesis
+from hypothesis import HealthCheck, Phase, settings
+from schemathesis.checks import not_a_server_error
+from schemathesis.specs.openapi.checks import positive_data_acceptance
+from starlette.testclient import TestClient
+
+from app import __version__
+from app.main import create_app
+from app.schemas.problems import PROBLEMS
+from app.settings import Settings
+from tests.app.live import ROOT, Server, serving
+
+
+@pytest.fixture(scope="module")
+def document(client: TestClient) -> dict[str, Any]:
+    content: dict[str, Any] = client.get("/openapi.json").json()
+    return content
+
+
+def properties(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every property of every schema, by name."""
+    for name, schema in document["components"]["schemas"].items():
+        for field, content in schema.get("properties", {}).items():
+            yield f"{name}.{field}", content
+
+
+def is_number(schema: dict[str, Any]) -> bool:
+    return '"number"' in repr(schema).replace("'", '"')
+
+
+def is_composite(schema: dict[str, Any]) -> bool:
+    return "$ref" in repr(schema)
+
+
+def test_every_field_is_described(document: dict[str, Any]) -> None:
+    missing = [name for name, schema in properties(document) if not schema.get("description")]
+    assert missing == []
+
+
+def test_every_plain_field_has_an_example(document: dict[str, Any]) -> None:
+    missing = [name for name, schema in properties(document) if "examples" not in schema and not is_composite(schema)]
+    assert missing == []
+
+
+def test_every_number_has_its_unit(document: dict[str, Any]) -> None:
+    # a robot's figure brings its unit along
+    missing = [
+        name
+        for name, schema in properties(document)
+        if is_number(schema) and "x-unit" not in schema and name != "Figure.value"
+    ]
+    assert missing == []
+
+
+def test_examples_are_valid(document: dict[str, Any]) -> None:
+    components = {"components": document["components"]}
+    for name, schema in properties(document):
+        for example in schema.get("examples", []):
+            assert jsonschema_rs.is_valid(schema | components, example), (name, example)
+    content = document["paths"]["/optimize"]["post"]["requestBody"]["content"]["application/json"]
+    for example in content["examples"].values():
+        assert jsonschema_rs.is_valid(content["schema"] | components, example["value"])
+
+
+def test_every_problem_is_documented(document: dict[str, Any]) -> None:
+    assert {problem.__name__ for problem in PROBLEMS} <= document["components"]["schemas"].keys()
+    for path in document["paths"].values():
+        for operation in path.values():
+            for status, response in operation["responses"].items():
+                expected = "application/problem+json" if int(status) >= 400 else None
+                assert expected in (None, *response["content"])
+                if status == "503":
+                    assert "Retry-After" in response["headers"]
+
+
+def test_no_error_model_of_the_framework_is_left(document: dict[str, Any]) -> None:
+    assert "HTTPValidationError" not in repr(document)
+
+
+def test_version_is_the_projects(document: dict[str, Any]) -> None:
+    assert document["info"]["version"] == __version__
+    assert f'version = "{__version__}"' in (ROOT / "pyproject.toml").read_text()
+
+
+# short deadlines: generated requests are valid, and some are hard
+MAX_DEADLINE = 0.5
+schema = schemathesis.openapi.from_dict(create_app(Settings(max_deadline=MAX_DEADLINE)).openapi())
+
+
+@pytest.fixture(scope="module")
+def fuzzed() -> Iterator[Server]:
+    with serving(workers=2, queue_size=16, max_deadline=MAX_DEADLINE) as server:
+        yield server
+
+
+@schema.parametrize()
+@settings(
+    max_examples=60,
+    derandomize=True,
+    deadline=None,
+    phases=[Phase.explicit, Phase.generate],
+    suppress_health_check=list(HealthCheck),
+)
+def test_holds_for_generated_requests(case: Any, fuzzed: Server) -> None:
+    # what the schema allows may still be out of reach (422), and a deadline may pass (504): both are documented
+    checks = [positive_data_acceptance, not_a_server_error]
+    answer = case.call_and_validate(base_url=fuzzed.url, excluded_checks=checks, timeout=30)
+    assert answer.status_code != 500, [entry for entry in fuzzed.logged() if entry["level"] == "error"]

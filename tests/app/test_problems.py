@@ -1,0 +1,169 @@
+"""Every type of problem: raised for real, with its own fields, and explained by a page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.errors import TABLE
+from app.main import create_app
+from app.schemas import problems
+from app.schemas.problems import PROBLEMS, Problem
+from app.settings import Settings
+from tests.app.requests import HOME, move
+
+DOWN = [0.0, 1.0, 0.0, 0.0]
+
+
+def refused(answer: Any, kind: type[Problem]) -> dict[str, Any]:
+    """The content of an answer that must be a problem of that kind."""
+    assert answer.status_code == kind.model_fields["status"].default, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    kind.model_validate_json(answer.content)
+    content: dict[str, Any] = answer.json()
+    assert content["instance"] == answer.headers["x-request-id"]
+    assert re.fullmatch(r"[^.\n]([^\n]*[^.\n])?[.]", content["detail"]), "one sentence"
+    return content
+
+
+def to_pose(position: list[float], quaternion: list[float] = DOWN) -> dict[str, Any]:
+    return {"start": {"q": HOME}, "goal": {"pose": {"position": position, "quaternion": quaternion}}}
+
+
+def test_unknown_robot(client: TestClient) -> None:
+    pose = {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}
+    answers = [
+        client.post("/optimize", json=move(robot="r2d2")),
+        client.post("/ik", json={"robot": "r2d2", "pose": pose}),
+        client.get("/robots/r2d2"),
+    ]
+    for answer in answers:
+        assert refused(answer, problems.UnknownRobot)["known"] == ["ur5e"]
+        assert "r2d2" not in answer.text
+
+
+def test_unreachable_pose(client: TestClient) -> None:
+    for answer in (
+        client.post("/optimize", json=to_pose([2.0, 0.0, 0.3])),
+        client.post("/ik", json={"pose": {"position": [2.0, 0.0, 0.3], "quaternion": DOWN}}),
+    ):
+        content = refused(answer, problems.UnreachablePose)
+        assert content["target"] == "goal"
+        # the arm is 0.95 m long
+        assert 0.9 < content["distance"] < 1.4
+
+
+def test_singular_pose(client: TestClient) -> None:
+    # stretched straight up, where shoulder, elbow and wrist are all singular
+    top = {"position": [0.0, -0.2329, 1.0794], "rpy": [1.5707963267948966, 0.0, 0.0]}
+    content = refused(client.post("/ik", json={"pose": top}), problems.SingularPose)
+    assert content["target"] == "goal"
+    assert content["smallest_singular_value"] < 1e-3
+
+
+def test_outside_limits(client: TestClient) -> None:
+    q = [0.0, -1.57, 3.5, -1.57, -1.57, 0.0]
+    content = refused(client.post("/optimize", json=move(start={"q": q})), problems.OutsideLimits)
+    assert content["joint"] == "elbow_joint"
+    assert content["value"] == 3.5
+    assert content["lower"] == pytest.approx(-3.14159265)
+    assert content["upper"] == pytest.approx(3.14159265)
+
+
+def test_outside_the_limits_of_the_request(client: TestClient) -> None:
+    limits = {"position": {"upper": [1.0, 1.0, 1.5, 1.0, 1.0, 1.0]}}
+    content = refused(client.post("/optimize", json=move(limits=limits)), problems.OutsideLimits)
+    assert (content["joint"], content["upper"]) == ("elbow_joint", 1.5)
+
+
+def test_duration_too_short(client: TestClient) -> None:
+    content = refused(client.post("/optimize", json=move(duration=0.05)), problems.DurationTooShort)
+    assert 0.1 < content["shortest"] < 1.5
+    again = client.post("/optimize", json=move(duration=content["shortest"] * 1.01))
+    assert again.status_code == 200, "what it says is the least feasible duration is feasible"
+
+
+def test_torque_infeasible(client: TestClient) -> None:
+    request = move(payload={"mass": 5.0, "com": [0.0, 1.0, 0.0]})
+    content = refused(client.post("/optimize", json=request), problems.TorqueInfeasible)
+    assert content["joint"] == "wrist_1_joint"
+    assert content["available"] == 28.0
+    # 5 kg a metre away, give or take the arm's own weight
+    assert content["needed"] == pytest.approx(49, rel=0.2)
+
+
+def test_deadline_exceeded(client: TestClient) -> None:
+    content = refused(client.post("/optimize", json=move(deadline=1e-6)), problems.DeadlineExceeded)
+    assert isinstance(content["candidates"], list)
+
+
+@pytest.mark.parametrize("path", ["/nothing", "/optimize/", "/robots/", "/problems/nothing", "/docs/nothing"])
+def test_not_found(client: TestClient, path: str) -> None:
+    refused(client.get(path), problems.NotFound)
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allow"),
+    [("GET", "/optimize", "POST"), ("DELETE", "/robots", "GET"), ("POST", "/healthz", "GET"), ("FANCY", "/ik", "POST")],
+)
+def test_method_not_allowed(client: TestClient, method: str, path: str, allow: str) -> None:
+    answer = client.request(method, path)
+    refused(answer, problems.MethodNotAllowed)
+    assert answer.headers["allow"] == allow
+
+
+def test_head_is_refused_alike(client: TestClient) -> None:
+    answer = client.head("/healthz")
+    assert (answer.status_code, answer.headers["allow"]) == (405, "GET")
+
+
+@pytest.mark.parametrize("declared", [True, False])
+def test_body_too_large(client: TestClient, declared: bool) -> None:
+    def chunks() -> Iterator[bytes]:
+        for _ in range(100):
+            yield b" " * 1000
+
+    content = b" " * 100_000 if declared else chunks()
+    answer = client.post("/optimize", content=content, headers={"content-type": "application/json"})
+    refused(answer, problems.BodyTooLarge)
+
+
+def test_not_ready(tmp_path: Any) -> None:
+    # the engine starts with the lifespan, which is not entered here: it is at its very beginning
+    app = create_app(Settings(workers=1))
+    with TestClient(app) as client:
+        answer = client.get("/readyz")
+        assert client.get("/healthz").json() == {"status": "alive"}
+    refused(answer, problems.NotReady)
+    assert int(answer.headers["retry-after"]) > 0
+
+
+def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("caller-secret")
+
+    monkeypatch.setattr("app.routes.ik.to_matrix", fail)
+    pose = {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}
+    answer = client.post("/ik", json={"pose": pose})
+    refused(answer, problems.Internal)
+    assert "caller-secret" not in answer.text
+
+
+@pytest.mark.parametrize("kind", PROBLEMS)
+def test_has_a_page(client: TestClient, kind: type[Problem]) -> None:
+    page = client.get(kind.model_fields["type"].default)
+    assert page.status_code == 200
+    assert page.headers["content-type"].startswith("text/html")
+    assert kind.model_fields["title"].default in page.text
+    for field in kind.own_fields():
+        assert f"<code>{field}</code>" in page.text
+    assert "://" not in page.text
+
+
+def test_every_problem_is_in_the_table() -> None:
+    assert set(TABLE.values()) == set(PROBLEMS)
+    assert len({kind.slug() for kind in PROBLEMS}) == len(PROBLEMS)

@@ -1,0 +1,96 @@
+"""Robots, inverse kinematics, health, request ids and the documentation pages."""
+
+from __future__ import annotations
+
+import re
+import uuid
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.convert import to_matrix
+from app.schemas.common import QuaternionPose
+from app.schemas.ik import IKResponse
+from app.schemas.robots import RobotDetail, RobotList
+from models.registry import load_robot
+from optimizer.inverse_kinematics import inverse_kinematics_for
+
+POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+
+
+def test_robots(client: TestClient) -> None:
+    answer = client.get("/robots")
+    robots = RobotList.model_validate_json(answer.content).robots
+    assert [robot.name for robot in robots] == ["ur5e"]
+    assert len(robots[0].joints) == 6
+
+
+def test_robot_shows_every_figure(client: TestClient) -> None:
+    answer = client.get("/robots/ur5e")
+    robot = RobotDetail.model_validate_json(answer.content)
+    figures = load_robot("ur5e").figures
+    for section in ("kinematics", "inertials", "limits", "drives", "electronics", "default_motion"):
+        assert answer.json()[section] == figures[section]
+    assert [(law.name, law.default) for law in robot.friction.laws] == [("curved", True), ("coulomb_viscous", False)]
+    for law in robot.friction.laws:
+        assert "asinh" in law.formula
+        assert law.coefficients["viscous"].unit == "N·m·s/rad"
+
+
+def test_ik_gives_every_solution(client: TestClient) -> None:
+    answer = client.post("/ik", json={"pose": POSE, "tcp": {"position": [0, 0, 0.1], "rotvec": [0, 0, 0]}})
+    assert answer.headers["content-type"] == "application/json"
+    solutions = IKResponse.model_validate_json(answer.content).solutions
+    robot = load_robot("ur5e")
+    T = to_matrix(QuaternionPose(**POSE))
+    T_tcp = np.eye(4)
+    T_tcp[2, 3] = 0.1
+    expected = inverse_kinematics_for(robot).solve(T, T_tcp, robot.limits, True, "goal")
+    assert [solution.q for solution in solutions] == [solution.q.tolist() for solution in expected]
+    assert [solution.label for solution in solutions] == [str(solution.label) for solution in expected]
+    assert len({solution.label for solution in solutions}) > 1
+
+
+def test_ik_without_windings_gives_one_per_branch(client: TestClient) -> None:
+    solutions = client.post("/ik", json={"pose": POSE, "windings": False}).json()["solutions"]
+    labels = [solution["label"] for solution in solutions]
+    assert len(labels) == len(set(labels)) == 8
+
+
+def test_ready(client: TestClient) -> None:
+    assert client.get("/readyz").json() == {"status": "ready", "workers": 2}
+
+
+def test_a_sane_request_id_is_kept(client: TestClient) -> None:
+    headers = {"X-Request-ID": "Order-7.item_3"}
+    assert client.get("/healthz", headers=headers).headers["x-request-id"] == "Order-7.item_3"
+    refusal = client.get("/nothing", headers=headers)
+    assert refusal.json()["instance"] == refusal.headers["x-request-id"] == "Order-7.item_3"
+
+
+@pytest.mark.parametrize("given", ["", "a b", "x" * 65, "<script>", "ä"])
+def test_any_other_is_replaced(client: TestClient, given: str) -> None:
+    answer = client.get("/healthz", headers={"X-Request-ID": given.encode()})
+    assert uuid.UUID(answer.headers["x-request-id"]).version == 4
+
+
+@pytest.mark.parametrize("path", ["/docs", "/redoc"])
+def test_documentation_needs_no_internet(client: TestClient, path: str) -> None:
+    page = client.get(path)
+    assert page.status_code == 200
+    assert "//" not in re.sub(r"//.*|<!--.*?-->", "", page.text.replace("://", "EXTERNAL")), (
+        "no scheme-relative address"
+    )
+    assert "EXTERNAL" not in page.text.replace("://", "EXTERNAL")
+    assert "default-src 'self'" in page.headers["content-security-policy"]
+    assets = re.findall(r'(?:src|href|spec-url)="(/[^"]+)"', page.text)
+    assert len(assets) >= 2
+    for asset in assets:
+        answer = client.get(asset)
+        assert answer.status_code == 200
+        assert b"cdn.redoc" not in answer.content
+
+
+def test_swagger_asks_no_validator(client: TestClient) -> None:
+    assert '"validatorUrl": null' in client.get("/docs").text
