@@ -42,7 +42,7 @@ QP_ROUNDS = 10
 Status = Literal["solved", "infeasible", "stalled", "out of time"]
 
 _DAQP_OPTIMAL = 1
-_SOFT = 8
+_ACTIVE, _SOFT = 1, 8
 
 
 @dataclass(frozen=True)
@@ -217,10 +217,13 @@ class _Solver:
         A = np.concatenate([A_torque, self._kinematic_rows(places, sign, T, time_scale)])
         b = np.concatenate([b_torque, 1 - size[places]])
         soft = False
+        working = np.concatenate([np.zeros(self.n + len(k), dtype=bool), self.active[places]])
         for attempt in range(QP_ROUNDS):
             sense = np.zeros(self.n + len(b), dtype=np.int32)
             if soft:
                 sense[self.n :] = _SOFT
+            else:
+                sense[: len(working)][working] = _ACTIVE
             least = np.concatenate([lower, np.full(len(b), -1e30)])
             most = np.concatenate([upper, b])
             x, _, flag, info = daqp.solve(H, g, A, most, least, sense, primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6)
@@ -229,6 +232,7 @@ class _Solver:
                 continue
             if flag < _DAQP_OPTIMAL:
                 return None
+            working = info["lam"] > 0
             predicted = ratio + (self.grid_free @ x[: self.count].reshape(free.shape)) / self.rates(T)[:, None, :]
             if self.free_time:
                 predicted /= np.maximum(1 + self.orders * x[-1] * time_scale / T, 1e-3)[:, None, None]
