@@ -28,6 +28,8 @@ MARGIN = 2 * FEASIBILITY
 # times that limits are tightened where the motion breaks them between the nodes, and by how much beyond the excess
 REPAIRS = 6
 REPAIR_MARGIN = 2e-4
+# a motion is slowed by at most this factor in place of another solve
+MOST_STRETCH = 1 + 5e-4
 # first durations tried, in multiples of the shortest that the guess allows
 STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # points per knot span at which torque is checked between the nodes
@@ -128,6 +130,9 @@ class Solver:
                 return Attempt("infeasible", reason, iterations, solves)
             spline = spline_of(guess.space, programme.joint_points(result.free), result.duration)
             excess = self._excess(spline)
+            if excess is not None:
+                spline = self._stretched(spline, excess)
+                excess = self._excess(spline)
             if excess is None:
                 return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)
             limits = _divided(limits, excess)
@@ -163,6 +168,13 @@ class Solver:
             if cost < best:
                 best, chosen = cost, duration
         return chosen
+
+    def _stretched(self, spline: Spline, excess: Limits) -> Spline:
+        """The motion slowed until speed, acceleration and jerk hold their limits, if that takes next to no time."""
+        needed = max(float((getattr(excess, f"{x}_max") ** (1 / d)).max()) for d, x in enumerate("vaj", start=1))
+        if needed > MOST_STRETCH or spline.duration * needed > self.t_max:
+            return spline
+        return replace(spline, knots=spline.knots * needed)
 
     def _excess(self, spline: Spline) -> Limits | None:
         """By which factors (≥ 1) each limit must be tightened, None when the motion holds them all."""
