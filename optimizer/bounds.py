@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, FrictionLaw, Limits
 from optimizer.motion import Task
 from optimizer.profile import shortest_duration
 
@@ -44,31 +44,74 @@ def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Arr
     """Bound on the electrical energy [J] of motions with the given joint travel (P, nq) and climb (P,) [J].
 
     Drawn energy ≥ ∫ P_net dt = base · T + climb + friction + copper + inverter, for the surplus is at best given back.
-    With regeneration below 1 giving back is worth less, so the inequality stays.
-    friction: v · tau_f(v) ≥ g(|v|) - deficit with g(v) = v (coulomb + curved asinh(v / speed) + viscous v) convex, so
-    by Jensen ∫ g dt ≥ T g(|travel| / T).
-    copper, inverter ≥ their constants. The sum is convex in T, as g's perspective is, so that bisection on its slope
-    finds the least value in [t_min, t_max].
+    With regeneration below 1 giving back is worth less, so the inequality stays. Copper and inverter ≥ their constants.
+
+    friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
+    The Coulomb part is at least coulomb · |travel|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
+    ∫ g'(h) m(h) dh, ∫ m(h) dh ≥ |travel|, and m(h) ≤ T - 2 t(h), where t(h) ≥ h / a_max (and half a jerk ramp more
+    above half its speed) is the least time from rest to speed h and back. As g' grows, the least integral fills m up to
+    its limit from h = 0 on, until the travel is reached at h = c:
+
+        |travel| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
+
+    This is the value of a linear programme whose right-hand side is linear in T, so it is convex in T, with slope
+    g(c) - c g'(c). Bisection on the slope finds the least sum in [t_min, t_max].
     """
     problem = task.problem
     friction, drives, electronics = problem.friction_law, problem.robot.drives, problem.robot.electronics
     base = electronics.idle_power + electronics.controller_power + float(drives.inverter_constant.sum())
     base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
     distance = np.abs(travel)
-
-    def slope(T: Array) -> Array:
-        # d/dT of T g(d / T) = g - (d / T) g'
-        mean = distance / T[:, None]
-        curved = friction.curved * mean / np.hypot(mean, friction.speed)
-        return np.asarray(base - (mean * (curved + friction.viscous * mean)).sum(axis=-1))
+    cruise = _Cruise(distance, friction, problem.active_limits)
 
     low, high = t_min.copy(), np.maximum(t_max, t_min)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
-        rising = slope(middle) > 0
+        rising = base + cruise.slope(middle) > 0
         high, low = np.where(rising, middle, high), np.where(rising, low, middle)
     # convex: the tangent at the lower end stays below the curve up to the upper end
-    mean = distance / low[:, None]
-    losses = friction.coulomb + friction.curved * np.arcsinh(mean / friction.speed) + friction.viscous * mean
-    value = base * low + climb + (distance * losses).sum(axis=-1)
-    return np.asarray(value + np.minimum(slope(low), 0.0) * (high - low))
+    value = base * low + climb + distance @ friction.coulomb + cruise.loss(low)
+    return np.asarray(value + np.minimum(base + cruise.slope(low), 0.0) * (high - low))
+
+
+class _Cruise:
+    """The least loss ∫ g(|v|) dt of joints that travel `distance` (P, nq) under acceleration and jerk limits."""
+
+    def __init__(self, distance: Array, friction: FrictionLaw, limits: Limits) -> None:
+        self.distance, self.friction, self.a = distance, friction, limits.a_max
+        self.jerk_ramp = limits.a_max / limits.j_max
+        self.ramp_speed = limits.a_max * self.jerk_ramp / 2
+
+    def speed(self, T: Array) -> tuple[Array, Array]:
+        """c (P, nq) for durations T (P,), and the jerk ramp's time that it is subject to."""
+        T = T[:, None]
+        moving = T - self.jerk_ramp
+        room = moving**2 - 4 * (self.distance - self.jerk_ramp * self.ramp_speed) / self.a
+        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(room, 0.0)))
+        without = self.a / 2 * (T - np.sqrt(np.maximum(T**2 - 4 * self.distance / self.a, 0.0)))
+        ramped = with_jerk > self.ramp_speed
+        return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
+
+    def slope(self, T: Array) -> Array:
+        """Derivative (P,) of the loss by T [W]."""
+        c, _ = self.speed(T)
+        law = self.friction
+        # g - c g'
+        return -np.asarray((c * (law.curved * c / np.hypot(c, law.speed) + law.viscous * c)).sum(axis=-1))
+
+    def loss(self, T: Array) -> Array:
+        """The loss (P,) [J], by parts: T g(c) - 2 ∫ g' t dh."""
+        c, ramp = self.speed(T)
+        to_speed = (c * self._g(c) - self._integral(c)) / self.a
+        ramping = ramp / 2 * (self._g(c) - self._g(self.ramp_speed))
+        return np.asarray((T[:, None] * self._g(c) - 2 * (to_speed + ramping)).sum(axis=-1))
+
+    def _g(self, v: Array) -> Array:
+        law = self.friction
+        return np.asarray(v * (law.curved * np.arcsinh(v / law.speed) + law.viscous * v))
+
+    def _integral(self, v: Array) -> Array:
+        """∫_0^v g."""
+        law, s = self.friction, self.friction.speed
+        curved = (v * v / 2 + s * s / 4) * np.arcsinh(v / s) - v * np.hypot(v, s) / 4
+        return np.asarray(law.curved * curved + law.viscous * v**3 / 3)
