@@ -6,7 +6,7 @@ system's C compiler once and kept under `JOULEPATH_CACHE_DIR` (default `~/.cache
 that they depend on. Until the compiled file is there, or where there is no compiler, CasADi's virtual machine
 evaluates the same expressions.
 
-`python -m optimizer.kernel` compiles the kernels of all robots.
+`python -m optimizer.precompile` compiles the kernels of all robots.
 """
 
 from __future__ import annotations
@@ -28,7 +28,6 @@ import casadi as ca
 import numpy as np
 
 import models.robot
-from models.registry import load_robot, robot_names
 from models.robot import Array, Drives, FrictionLaw, Robot
 from optimizer import dynamics, energy
 from optimizer.dynamics import SymbolicPayload, inverse_dynamics
@@ -217,12 +216,8 @@ class _Mapped:
     def __init__(self, function: ca.Function, count: int) -> None:
         self._function = function.map(count)
         self._buffer, self._run = self._function.buffer()
-        self.arguments = [
-            np.zeros(self._function.size_in(i)[::-1]) for i in range(self._function.n_in())
-        ]
-        self.results = [
-            np.zeros(self._function.size_out(i)[::-1]) for i in range(self._function.n_out())
-        ]
+        self.arguments = [np.zeros(self._function.size_in(i)[::-1]) for i in range(self._function.n_in())]
+        self.results = [np.zeros(self._function.size_out(i)[::-1]) for i in range(self._function.n_out())]
         for i, array in enumerate(self.arguments):
             self._buffer.set_arg(i, memoryview(array))
         for i, array in enumerate(self.results):
@@ -317,8 +312,3 @@ def _loader(robot: Robot) -> _Loader:
 def kernel_for(robot: Robot) -> Kernel:
     """The kernel of a robot: compiled if the cache has it, else interpreted while the compiler runs."""
     return _loader(robot).get()
-
-
-if __name__ == "__main__":
-    for robot_name in robot_names():
-        print(compile_kernel(load_robot(robot_name)))

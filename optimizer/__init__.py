@@ -1,0 +1,39 @@
+"""Finds a robot arm's motion of least energy. A library: `optimize(Problem(start, goal))` gives a `Solution`.
+
+The names below are the public ones; robots and their figures are in `models`.
+"""
+
+from optimizer.exceptions import (
+    DeadlineExceeded,
+    DurationTooShort,
+    InvalidProblem,
+    JoulepathError,
+    NoTrajectory,
+    OutsideLimits,
+    SingularPose,
+    TorqueInfeasible,
+    UnknownRobot,
+    UnreachablePose,
+)
+from optimizer.optimize import optimize
+from optimizer.problem import BranchFilter, Payload, Pose, Problem
+from optimizer.solution import Solution
+
+__all__ = [
+    "BranchFilter",
+    "DeadlineExceeded",
+    "DurationTooShort",
+    "InvalidProblem",
+    "JoulepathError",
+    "NoTrajectory",
+    "OutsideLimits",
+    "Payload",
+    "Pose",
+    "Problem",
+    "SingularPose",
+    "Solution",
+    "TorqueInfeasible",
+    "UnknownRobot",
+    "UnreachablePose",
+    "optimize",
+]
