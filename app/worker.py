@@ -25,7 +25,7 @@ logger = logging.getLogger(__name__)
 
 # Workers are forked from a server process that has imported the libraries once: a replacement starts at once.
 _CONTEXT = multiprocessing.get_context("forkserver")
-_PRELOADED = ["app.tasks"]
+_PRELOADED = ["app.preload"]
 
 
 class Task(Protocol):

@@ -14,8 +14,8 @@ MAX_DURATION = 600.0
 MAX_SAMPLES = 100_000
 """Most samples that an answer holds."""
 
-Positive = Annotated[float, Field(gt=0, le=1e6)]
-Seconds = Annotated[float, Field(gt=0, le=MAX_DURATION)]
+Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
+Seconds = Annotated[float, Field(ge=1e-3, le=MAX_DURATION)]
 Angle = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
@@ -213,7 +213,7 @@ class OptimizeRequest(Request):
         "s",
         10.0,
         default=10.0,
-        gt=0,
+        ge=1e-3,
         le=MAX_DURATION,
     )
 

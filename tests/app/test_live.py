@@ -15,7 +15,7 @@ import pytest
 
 from app.schemas.problems import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
 from app.schemas.response import OptimizeResponse
-from tests.app.live import Server, alive, serving
+from tests.app.live import EXIT, Server, alive, serving
 from tests.app.requests import EXAMPLES, long_search, move
 
 # What /healthz may take while the workers are at it [s]. Alone it takes 2 ms; two busy cores are shared here.
@@ -46,7 +46,7 @@ def test_answers(server: Server) -> None:
 
 def test_long_requests_hold_up_nobody(server: Server) -> None:
     with ThreadPoolExecutor() as pool:
-        (long,) = in_background(pool, server, long_search(deadline=4))
+        (long,) = in_background(pool, server, long_search(deadline=6))
         for _ in range(20):
             began = time.monotonic()
             assert server.get("/healthz").status_code == 200
@@ -57,7 +57,7 @@ def test_long_requests_hold_up_nobody(server: Server) -> None:
     # what was found by the deadline
     assert answer.status_code == 200
     assert answer.json()["status"] == "feasible"
-    assert answer.json()["solver"]["wall_time"] < 4 + PATIENCE
+    assert answer.json()["solver"]["wall_time"] < 6 + PATIENCE
 
 
 def test_refuses_what_it_cannot_queue(server: Server) -> None:
@@ -146,13 +146,16 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
             server.get("/healthz")
 
 
-def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
-    with serving(workers=1) as server:
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_to_every_process_ends_cleanly(signum: signal.Signals) -> None:
+    # as a terminal's Ctrl-C does, and a service manager
+    with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
-        # a terminal signals the whole foreground group
-        for pid in (server.process.pid, *everyone):
-            os.kill(pid, signal.SIGINT)
-        assert server.process.wait(30) == 0
+        (future,) = in_background(pool, server, long_search(deadline=1.5))
+        for pid in (*everyone, server.process.pid):
+            os.kill(pid, signum)
+        assert future.result().status_code == 200
+        assert server.process.wait(EXIT) == 0
         until(lambda: not any(alive(pid) for pid in everyone))
         assert not [entry for entry in server.logged() if entry["level"] == "error"]
 

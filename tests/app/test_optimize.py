@@ -133,7 +133,7 @@ def test_a_quaternion_is_normalised(client: TestClient) -> None:
     assert client.post("/optimize", json=goal(1.0011)).status_code == 422
 
 
-@pytest.mark.parametrize("deadline", [1e-6, 0.05, 0.3])
+@pytest.mark.parametrize("deadline", [1e-3, 0.05, 0.3])
 def test_deadline_gives_the_best_so_far_or_says_so(client: TestClient, deadline: float) -> None:
     answer = client.post("/optimize", json=long_search(deadline))
     if answer.status_code == 200:
