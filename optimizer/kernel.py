@@ -163,11 +163,12 @@ def digest(robot: Robot) -> str:
         h.update(Path(str(module.__file__)).read_bytes())
     h.update(Path(__file__).read_bytes())
     h.update(repr((ca.__version__, COMPILER_FLAGS, os.uname().machine)).encode())
-    for placement, body in zip(robot.model.jointPlacements, robot.model.inertias, strict=True):
-        h.update(np.asarray(placement.homogeneous).tobytes())
-        h.update(np.asarray(body.toDynamicParameters()).tobytes())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
-    h.update(np.asarray(flange.homogeneous).tobytes())
+    figures = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
+    figures += [body.toDynamicParameters() for body in robot.model.inertias]
+    for figure in figures:
+        # rounded, since the last digit of a sine differs between processors; + 0.0 makes -0.0 and 0.0 one
+        h.update((np.round(figure, 12) + 0.0).tobytes())
     return h.hexdigest()[:24]
 
 
