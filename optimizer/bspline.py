@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +51,7 @@ def quadrature(knots: Array, per_span: int) -> tuple[Array, Array]:
 
 
 def fit(samples: Array, at: Array, knots: Array) -> Array:
-    """Control points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at points (k,) in [0, 1]."""
+    """Control points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,) in [0, 1]."""
     matrix = basis_matrix(knots, at)
     points = np.zeros((matrix.shape[1], samples.shape[1]))
     points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
@@ -65,7 +66,7 @@ def refit(points: Array, knots: Array, onto: Array) -> Array:
     Exact where `onto` refines `knots`.
     """
     x = greville(onto)
-    return np.linalg.solve(basis_matrix(onto, x), basis_matrix(knots, x) @ points)
+    return np.asarray(np.linalg.solve(basis_matrix(onto, x), basis_matrix(knots, x) @ points), dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +109,7 @@ class Basis:
         grid = (edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)).ravel()
         step = np.arange(len(grid)) % (per_span + 1)
         x = greville(knots)
+        quintic = x**3 * (10 - 15 * x + 6 * x**2)
         return Basis(
             knots=knots,
             nodes=nodes,
@@ -115,7 +117,7 @@ class Basis:
             at_nodes=np.stack([basis_matrix(knots, nodes, d) for d in range(3)]),
             at_grid=np.stack([basis_matrix(knots, grid, d) for d in range(1, 4)]),
             anchors=np.stack([step % (per_span // parts) == 0 for parts in ANCHORS]),
-            quintic=np.linalg.solve(basis_matrix(knots, x), x**3 * (10 - 15 * x + 6 * x**2)),
+            quintic=np.asarray(np.linalg.solve(basis_matrix(knots, x), quintic), dtype=float),
         )
 
 
@@ -132,7 +134,7 @@ def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
     """
     edges = np.concatenate([[0.0], switches[(switches > 1e-3) & (switches < 1 - 1e-3)], [1.0]])
     breaks = [0.0]
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in pairwise(edges):
         breaks += np.linspace(a, b, math.ceil((b - a) / widest) + 1)[1:-1].tolist()
         breaks += [b] * (repeat if b < 1.0 else 1)
     return Basis.of(clamped(np.array(breaks)))

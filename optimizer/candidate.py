@@ -15,7 +15,7 @@ from optimizer.bspline import Basis
 from optimizer.motion import Task, fine_samples, peak_rates, spline_of
 from optimizer.nlp import Coordinates, Programme
 from optimizer.solution import Spline
-from optimizer.solve import FEASIBILITY, Result, solve
+from optimizer.solve import FEASIBILITY, solve
 
 # control points of a first attempt with evenly spaced knots
 COARSE = 13
@@ -75,7 +75,7 @@ class Solver:
         self.coordinates = self._coordinates(_scaled(problem.active_limits, 1 - MARGIN))
 
     def solve(self) -> Attempt:
-        """From the ground up; with knots made for haste where there is little time or evenly spaced ones find nothing."""
+        """From the ground up; over knots made for haste where time is short or evenly spaced ones find nothing."""
         if self.on_line:
             return self._on_line()
         shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
@@ -86,12 +86,10 @@ class Solver:
             if first.status in ("solved", "out of time"):
                 return first
         second = self.improve(self.in_haste())
-        return replace(
-            second, iterations=first.iterations + second.iterations, solves=first.solves + second.solves
-        )
+        return replace(second, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
 
     def in_haste(self) -> Guess:
-        """The fastest motion under the limits on speed, acceleration and jerk, in a space that holds its jerk's jumps."""
+        """The fastest motion under limits on speed, acceleration and jerk, in a space that holds its jerk's jumps."""
         line = self.coordinates
         fastest = time_optimal(line.limits, line.start, line.goal)
         duration = max(fastest.duration, LEAST_DURATION)

@@ -55,9 +55,7 @@ def inverse_dynamics(
     joints = range(1, model.njoints)
     if any(model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints):
         raise ValueError("the model must be a serial chain of joints that turn about their z axes")
-    rotations = {
-        i: _tidy(model.jointPlacements[i].rotation) @ _rotation_z(q[i - 1]) for i in joints
-    }
+    rotations = {i: _tidy(model.jointPlacements[i].rotation) @ _rotation_z(q[i - 1]) for i in joints}
     offsets = {i: _tidy(model.jointPlacements[i].translation) for i in joints}
     forces: dict[int, ca.SX] = {}
     moments: dict[int, ca.SX] = {}
@@ -86,7 +84,7 @@ def inverse_dynamics(
 
 
 def _link(model: pin.Model, i: int, payload: SymbolicPayload) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Mass, first moment (3,) and inertia (3, 3) about the origin of joint i's frame; the last link bears the payload."""
+    """Mass, first moment (3,) and inertia (3, 3) about the origin of joint i's frame; the last link bears the load."""
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
     mass = ca.SX(body.mass)

@@ -49,9 +49,7 @@ def power_flow(tau: Any, v: Any, drives: Drives, friction: FrictionLaw, width: A
     tau_motor = tau + friction_torque
     i = tau_motor / drives.torque_constant
     inverter = (
-        drives.inverter_constant
-        + drives.inverter_linear * smooth_abs(i, width, xp)
-        + drives.inverter_quadratic * i * i
+        drives.inverter_constant + drives.inverter_linear * smooth_abs(i, width, xp) + drives.inverter_quadratic * i * i
     )
     return PowerFlow(
         tau_motor=tau_motor,

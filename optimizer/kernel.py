@@ -21,6 +21,7 @@ import tempfile
 import threading
 from dataclasses import astuple, dataclass
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -120,9 +121,7 @@ def build(robot: Robot) -> list[ca.Function]:
     bent, sloped = ca.hessian(cost, inner)
     friction_bent, _ = ca.hessian(ca.dot(multiplier, friction.torque(w, ca)), w)
     local = [cost, flow.tau_motor, sloped, bent, ca.jacobian(friction.torque(w, ca), w), friction_bent]
-    cost, tau_motor, sloped, bent, friction_slope, friction_bent = ca.substitute(
-        local, [t, w], [tau, v]
-    )
+    cost, tau_motor, sloped, bent, friction_slope, friction_bent = ca.substitute(local, [t, w], [tau, v])
 
     # the chain rule by hand: a third of the operations that differentiating the composed cost twice would take
     J_tau = ca.jacobian(tau, y)
@@ -162,7 +161,7 @@ def digest(robot: Robot) -> str:
     for module in (models.robot, dynamics, energy):
         h.update(Path(str(module.__file__)).read_bytes())
     h.update(Path(__file__).read_bytes())
-    h.update(repr((ca.__version__, COMPILER_FLAGS, os.uname().machine)).encode())
+    h.update(repr((version("casadi"), COMPILER_FLAGS, os.uname().machine)).encode())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     figures = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
     figures += [body.toDynamicParameters() for body in robot.model.inertias]
@@ -236,9 +235,9 @@ class _Mapped:
         self.arguments = [np.zeros(self._function.size_in(i)[::-1]) for i in range(self._function.n_in())]
         self.results = [np.zeros(self._function.size_out(i)[::-1]) for i in range(self._function.n_out())]
         for i, array in enumerate(self.arguments):
-            self._buffer.set_arg(i, memoryview(array))
+            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self.results):
-            self._buffer.set_res(i, memoryview(array))
+            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """Evaluate; row k of every argument belongs to node k. The results are overwritten by the next call."""

@@ -85,7 +85,7 @@ class Task:
 
     @cached_property
     def fastest_parameters(self) -> Array:
-        """Parameters that make the duration the cost; a little energy beside it keeps the programme well conditioned."""
+        """Parameters that make the duration the cost; a little energy beside it conditions the programme."""
         return self.parameters(electrical=1.0, time=HASTE)
 
     @property

@@ -16,10 +16,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from models.robot import Array, Limits
 from optimizer.bspline import REST_POINTS, Basis
 from optimizer.kernel import Kernel
+
+Index = npt.NDArray[np.intp]
 
 # travel below this counts as none where a shared time law is limited by the joints' own limits [rad]
 SHORTEST_TRAVEL = 1e-12
@@ -66,14 +69,14 @@ class Coordinates:
         travel = q_goal - q_start
         length = np.maximum(np.abs(travel), SHORTEST_TRAVEL)
         zero, one = np.zeros(1), np.ones(1)
-        rates = [np.array([(limit / length).min()]) for limit in (limits.v_max, limits.a_max, limits.j_max)]
-        shared = Limits(zero, one, *rates, tau_max=limits.tau_max)
+        v_max, a_max, j_max = (np.array([(m / length).min()]) for m in (limits.v_max, limits.a_max, limits.j_max))
+        shared = Limits(zero, one, v_max, a_max, j_max, limits.tau_max)
         return Coordinates(q_start, travel[:, None], zero, one, shared)
 
     @property
     def r(self) -> int:
         """Number of coordinates."""
-        return self.directions.shape[1]
+        return int(self.directions.shape[1])
 
     def to_joints(self, points: Array) -> Array:
         """q (n, nq) for s (n, r)."""
@@ -206,7 +209,7 @@ class Programme:
         """Basis and derivatives of the free control points at the nodes, (N, 3, m)."""
         return np.ascontiguousarray(self.basis.at_nodes[:, :, self.basis.free].transpose(1, 0, 2))
 
-    def torque_rows(self, line: Linearisation, T: float, k: Array, j: Array) -> Array:
+    def torque_rows(self, line: Linearisation, T: float, k: Index, j: Index) -> Array:
         """Gradients (rows, n) of the torques of joints j at nodes k with respect to x."""
         J = line.jacobian[k, j]
         scale = np.array([1.0, 1.0 / T, 1.0 / (T * T)])

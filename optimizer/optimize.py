@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+
 import numpy as np
 from scipy.interpolate import BSpline
 
@@ -57,7 +58,9 @@ class _Run:
         search.bound(task, self.entries)
         if problem.payload.mass > problem.robot.rated_payload:
             rating = problem.robot.rated_payload
-            raise InvalidProblem("payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg.")
+            raise InvalidProblem(
+                "payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg."
+            )
         search.explore(task, self.entries, lambda entry: self.count(self.solver(entry).solve()), self.deadline)
         if self.best() is None:
             self.race()

@@ -45,6 +45,8 @@ class Pose:
         # 1e-9: a rotation assembled in double precision is orthonormal to about 1e-15
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-9 or np.linalg.det(rotation) < 0:
             raise InvalidProblem("pose", "The pose's rotation matrix must be orthonormal and right-handed.")
+        if self.T[3].tolist() != [0, 0, 0, 1]:
+            raise InvalidProblem("pose", "The last row of the pose's matrix must be 0, 0, 0, 1.")
 
 
 @dataclass(frozen=True)
@@ -69,12 +71,14 @@ class Payload:
             raise InvalidProblem("payload.mass", "payload.mass must be a finite number of kg, zero or more.")
         object.__setattr__(self, "com", _frozen(self.com, (3,), "payload.com"))
         object.__setattr__(self, "inertia", _frozen(self.inertia, (3, 3), "payload.inertia"))
+        if np.abs(self.inertia - self.inertia.T).max() > 1e-9 * np.abs(self.inertia).max():
+            raise InvalidProblem("payload.inertia", "payload.inertia must be symmetric.")
         principal = np.linalg.eigvalsh(self.inertia)
         slack = 1e-9 * max(1.0, float(principal[-1]))
         if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
             raise InvalidProblem(
                 "payload.inertia",
-                "payload.inertia is no body's: its principal moments must be positive and keep the triangle inequality.",
+                "payload.inertia fits no body: its principal moments must be positive and obey the triangle inequality.",
             )
 
 
@@ -149,10 +153,11 @@ class Problem:
 
     def _check_limits(self) -> None:
         limits, robot = self.active_limits, self.robot.limits
+        # asked so that NaN, which compares false with everything, is refused
         for public, name in LIMIT_NAMES.items():
             value, most = getattr(limits, name), getattr(robot, name)
-            if (value <= 0).any():
-                raise InvalidProblem(f"limits.{public}", f"limits.{public} must be positive.")
+            if value.shape != most.shape or not (value > 0).all():
+                raise InvalidProblem(f"limits.{public}", f"limits.{public} must be a positive number for every joint.")
             # the factor lets a caller pass the robot's own figure back after rounding
             if (value > most * (1 + 1e-9)).any():
                 joint = int(np.argmax(value / most))
@@ -161,7 +166,9 @@ class Problem:
                     f"limits.{public} may only tighten the robot's: {self.robot.joint_names[joint]} "
                     f"allows at most {most[joint]:.6g}.",
                 )
-        if (limits.q_min < robot.q_min - 1e-9).any() or (limits.q_max > robot.q_max + 1e-9).any():
+        if limits.q_min.shape != robot.q_min.shape or limits.q_max.shape != robot.q_max.shape:
+            raise InvalidProblem("limits.position", "limits.position must have one number for every joint.")
+        if not ((limits.q_min >= robot.q_min - 1e-9) & (limits.q_max <= robot.q_max + 1e-9)).all():
             raise InvalidProblem("limits.position", "limits.position may only tighten the robot's own range.")
         if (limits.q_min >= limits.q_max).any():
             raise InvalidProblem("limits.position", "limits.position.lower must be below limits.position.upper.")

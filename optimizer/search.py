@@ -79,9 +79,7 @@ def ends(task: Task, name: str) -> list[End]:
     wanted = problem.branch
     if wanted is not None:
         parts = ("shoulder", "elbow", "wrist")
-        solutions = [
-            s for s in solutions if all(getattr(wanted, p) in (None, getattr(s.label, p)) for p in parts)
-        ]
+        solutions = [s for s in solutions if all(getattr(wanted, p) in (None, getattr(s.label, p)) for p in parts)]
         if not solutions:
             raise UnreachablePose(
                 name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."

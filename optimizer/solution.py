@@ -1,4 +1,4 @@
-"""What is answered: trajectory, energy, every candidate's fate, and the certificate. SI units; arrays [sample][joint]."""
+"""What is answered: trajectory, energy, every candidate's fate, the certificate. SI units; arrays [sample][joint]."""
 
 from __future__ import annotations
 

@@ -16,8 +16,6 @@ from typing import Literal
 import daqp
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor
-from scipy.linalg import LinAlgError
 
 from models.robot import Array
 from optimizer.nlp import Linearisation, Programme
@@ -39,6 +37,8 @@ STEP = 1.5
 # times that a QP is solved again with the rows that its step would break
 QP_ROUNDS = 10
 
+Index = npt.NDArray[np.intp]
+Places = tuple[Index, Index, Index]  # derivative, grid point, coordinate
 Status = Literal["solved", "infeasible", "stalled", "out of time"]
 
 _DAQP_OPTIMAL = 1
@@ -65,13 +65,13 @@ class Result:
 
 @dataclass(frozen=True)
 class _Step:
-    """A QP's answer: the step in scaled unknowns, and the multipliers of kinematic and torque rows with their places."""
+    """A QP's answer: the step in scaled unknowns, multipliers of kinematic and torque rows and where these are."""
 
     x: Array
     soft: bool
-    places: tuple[Array, Array, Array]  # derivative, grid point, coordinate
+    places: Places
     kinematic: Array
-    nodes: tuple[Array, Array]  # node, joint
+    nodes: tuple[Index, Index]  # node, joint
     signs: Array
     torque: Array
 
@@ -103,13 +103,13 @@ class _Solver:
 
     def rates(self, T: float) -> Array:
         """Limits of the derivatives by τ, (3, r)."""
-        return self.p.rates * (T**self.orders)[:, None]
+        return np.asarray(self.p.rates * (T**self.orders)[:, None])
 
     def violations(self, kinematics: Array, T: float, tau: Array) -> Array:
         """Worst excess per derivative and coordinate, and per joint torque, as a share of the limit, (3 r + nq,)."""
-        kin = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.rates(T)
+        kin: Array = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.rates(T)
         torque = np.abs(tau).max(axis=0) / self.tau_max
-        return np.maximum(np.concatenate([kin.ravel(), torque]) - 1, 0.0)
+        return np.asarray(np.maximum(np.concatenate([kin.ravel(), torque]) - 1, 0.0))
 
     def solve(self, free: Array, T: float, multiplier: Array | None) -> Result:
         p, r = self.p, self.p.r
@@ -122,9 +122,9 @@ class _Solver:
         cost_scale = 1.0 / max(abs(line.cost), 1e-9)
         violation = self.violations(kin, T, line.tau)
         penalty = np.full(len(violation), 0.1)
-        curvature, stationarity, iteration = 0.0, np.inf, 0
+        curvature, stationarity, iterations = 0.0, np.inf, 0
         status: Status = "stalled"
-        for iteration in range(1, MAX_ITERATIONS + 1):
+        for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
             if self.clock() > self.deadline:
                 status = "out of time"
                 break
@@ -172,9 +172,9 @@ class _Solver:
                 break
             free, T, kin, violation = trial, trial_T, trial_kin, trial_violation
             line = p.derivatives(free, T, multiplier)
-        return Result(status, free, T, line.cost, iteration, float(violation.max()), stationarity, multiplier)
+        return Result(status, free, T, line.cost, iterations, float(violation.max()), stationarity, multiplier)
 
-    def _kinematic_rows(self, places: tuple[Array, Array, Array], sign: Array, T: float, time_scale: float) -> Array:
+    def _kinematic_rows(self, places: Places, sign: Array, T: float, time_scale: float) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""
         d, g, j = places
         A = np.zeros((len(d), self.n))
@@ -184,7 +184,9 @@ class _Solver:
             A[:, -1] = -(d + 1) / T * time_scale
         return A
 
-    def _torque_rows(self, line: Linearisation, T: float, time_scale: float) -> tuple[Array, Array, Array, Array, Array]:
+    def _torque_rows(
+        self, line: Linearisation, T: float, time_scale: float
+    ) -> tuple[Index, Index, Array, Array, Array]:
         """Node and joint of the rows that come near, their sign, gradients (rows, n) and room left."""
         share = line.tau / self.tau_max
         k, j = np.nonzero(np.abs(share) > NEAR_TORQUE)
@@ -212,7 +214,7 @@ class _Solver:
         lower, upper = self._bounds(free, T, time_scale)
         size = np.abs(ratio)
         chosen = (size > NEAR) & (self.anchors | _peaks(size)) | self.active
-        places = np.nonzero(chosen)
+        places: Places = np.nonzero(chosen)  # type: ignore[assignment]
         sign = np.sign(ratio[places])
         A = np.concatenate([A_torque, self._kinematic_rows(places, sign, T, time_scale)])
         b = np.concatenate([b_torque, 1 - size[places]])
@@ -241,7 +243,7 @@ class _Solver:
             if attempt == QP_ROUNDS - 1 or not broken.any():
                 break
             broken &= (self.anchors | _peaks(size)) & ~chosen
-            fresh = np.nonzero(broken)
+            fresh: Places = np.nonzero(broken)  # type: ignore[assignment]
             if not len(fresh[0]):
                 break
             chosen |= broken
@@ -249,7 +251,7 @@ class _Solver:
             fresh_sign = np.sign(predicted[fresh])
             A = np.concatenate([A, self._kinematic_rows(fresh, fresh_sign, T, time_scale)])
             b = np.concatenate([b, 1 - fresh_sign * ratio[fresh]])
-            places = tuple(np.concatenate(both) for both in zip(places, fresh, strict=True))
+            places = tuple(np.concatenate(both) for both in zip(places, fresh, strict=True))  # type: ignore[assignment]
             sign = np.concatenate([sign, fresh_sign])
         mu = np.maximum(info["lam"][self.n :], 0.0)
         torque, kinematic = mu[: len(k)], mu[len(k) :]
@@ -263,12 +265,12 @@ def _convex(H: Array) -> Array:
     """H if it is positive definite, else H with its eigenvalues clamped from below."""
     H = 0.5 * (H + H.T)
     try:
-        cho_factor(H, check_finite=False)
+        np.linalg.cholesky(H)
         return H
-    except LinAlgError:
+    except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(H)
         floor = EIGENVALUE_FLOOR * max(1.0, np.abs(values).max())
-        return (vectors * np.maximum(np.abs(values), floor)) @ vectors.T
+        return np.asarray((vectors * np.maximum(np.abs(values), floor)) @ vectors.T)
 
 
 def solve(
