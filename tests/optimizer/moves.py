@@ -1,0 +1,66 @@
+"""What the tests of the optimiser share: an arm, moves of it, and limits and targets made to measure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from models.registry import load_robot
+from models.robot import Array, Limits
+from optimizer.problem import Payload, Pose, Problem
+
+ROBOT = load_robot("ur5e")
+START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
+GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
+PAYLOAD = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003]))
+TILTED = np.array([2.0, -4.0, -8.7])
+CEILING = np.array([0.0, 0.0, 9.81])
+
+
+def problem(start: Any = START, goal: Any = GOAL, **given: Any) -> Problem:
+    return Problem(**{"start": start, "goal": goal} | given)
+
+
+def fixed(duration: float) -> dict[str, float]:
+    """The fields of a problem that fix its duration [s]."""
+    return {"duration_min": duration, "duration_max": duration}
+
+
+def limits(**given: Any) -> Limits:
+    """The robot's limits with some replaced: one number for all joints, or one each."""
+    return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
+
+
+def tcp_pose(q: Array, T_flange_tcp: Array | None = None) -> Pose:
+    """Pose of the TCP at q, by Pinocchio."""
+    data = ROBOT.model.createData()
+    pin.framesForwardKinematics(ROBOT.model, data, q)
+    T = data.oMf[ROBOT.model.getFrameId("flange")].homogeneous
+    return Pose(T if T_flange_tcp is None else T @ T_flange_tcp)
+
+
+def random_moves(seed: int, count: int) -> Iterator[tuple[Array, Array]]:
+    """Starts and goals within half a turn either way; every fourth move is a short one."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        start, goal = rng.uniform(-np.pi, np.pi, (2, 6))
+        yield start, start + 0.05 * (goal - start) if k % 4 == 3 else goal
+
+
+def torques(task: Problem, q: Array, v: Array, a: Array) -> Array:
+    """Rigid body and rotor torques (k, nq) by Pinocchio, payload and gravity included."""
+    load = task.payload
+    model = task.robot.loaded_model(load.mass, load.com, load.inertia, task.gravity)
+    data = model.createData()
+    return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+
+
+def potential(task: Problem, q: Array) -> float:
+    """Potential energy [J] of arm and payload by Pinocchio."""
+    load = task.payload
+    model = task.robot.loaded_model(load.mass, load.com, load.inertia, task.gravity)
+    return float(pin.computePotentialEnergy(model, model.createData(), q))
