@@ -78,7 +78,7 @@ class Payload:
         if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
             raise InvalidProblem(
                 "payload.inertia",
-                "payload.inertia fits no body: its principal moments must be positive and obey the triangle inequality.",
+                "payload.inertia fits no body: principal moments must be positive and obey the triangle inequality.",
             )
 
 
