@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from functools import cache
 
 import numpy as np
 from scipy.interpolate import BSpline
+from threadpoolctl import ThreadpoolController
 
 from models.registry import load_robot
 from models.robot import Array
@@ -38,7 +40,14 @@ def optimize(problem: Problem) -> Solution:
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, TorqueInfeasible, DurationTooShort,
     NoTrajectory, DeadlineExceeded, or InvalidProblem for a payload beyond the robot's rating.
     """
-    return _Run(problem).solution()
+    # matrices here are small: threads of a linear algebra library would cost more than they give
+    with _blas().limit(limits=1, user_api="blas"):
+        return _Run(problem).solution()
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    return ThreadpoolController()
 
 
 class _Run:
