@@ -182,7 +182,7 @@ def _seal(path: Path) -> Path:
 
 def _intact(path: Path) -> bool:
     try:
-        return _seal(path).read_text() == hashlib.sha256(path.read_bytes()).hexdigest()
+        return _seal(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
     except OSError:
         return False
 
