@@ -9,6 +9,9 @@ import numpy as np
 
 from models.robot import Array, Limits
 
+# switches closer than this share of the motion count as one
+CLOSEST = 1e-3
+
 
 def shortest_duration(travel: Array, limits: Limits) -> Array:
     """Least time [s] of a rest-to-rest motion under speed, acceleration and jerk limits; travel (..., nq) → (...).
@@ -32,18 +35,20 @@ def _durations(distance: Array, limits: Limits) -> Array:
 def switches(travel: Array, duration: float, limits: Limits) -> Array:
     """Where in [0, 1] the jerk of the leading joint switches when it takes `duration` [s] for travel (nq,), ascending.
 
-    The leading joint is the one whose own profile is longest; slowed to `duration`, it cruises at a lower speed. Empty
-    where it would not reach its greatest acceleration.
+    The leading joint is the one whose own profile is longest; slowed to `duration`, it cruises at a lower speed. A
+    duration shorter than its own counts as its own.
     """
     distance = np.abs(travel)
-    lead = int(_durations(distance, limits).argmax())
+    own = _durations(distance, limits)
+    lead = int(own.argmax())
+    duration = max(duration, float(own[lead]))
     d, a, j = distance[lead], limits.a_max[lead], limits.j_max[lead]
     # duration = d / v + v / a + a / j, solved for the speed v of the cruise
     moving = duration - a / j
-    root = moving * moving - 4 * d / a
-    speed = a / 2 * (moving - np.sqrt(max(root, 0.0)))
-    ramp = speed / a + a / j
-    if root < -1e-9 * moving * moving or speed < a * a / j or 2 * ramp > duration * (1 + 1e-9):
-        return np.zeros(0)
-    early = np.array([a / j, speed / a, ramp]) / duration
-    return np.unique(np.round(np.concatenate([early, 1 - early]), 9))
+    speed = a / 2 * (moving - np.sqrt(max(moving * moving - 4 * d / a, 0.0)))
+    if speed < a * a / j:
+        # it never holds its greatest acceleration: jerk alone shapes the motion
+        return np.array([0.25, 0.5, 0.75])
+    early = np.array([a / j, speed / a, speed / a + a / j]) / duration
+    both = np.unique(np.concatenate([early, 1 - early]))
+    return np.asarray(both[np.append(True, np.diff(both) > CLOSEST)])
