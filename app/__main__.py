@@ -10,13 +10,18 @@ from types import FrameType
 
 def main() -> None:
     """Serves until SIGTERM or Ctrl-C, then exits with 0."""
+    # for before uvicorn handles signals itself, and after: it raises the one it got again when it is done
+    signal.signal(signal.SIGTERM, _exit)
+    signal.signal(signal.SIGINT, _exit)
+
+    from app.forkserver import start_forkserver
+
+    start_forkserver()
+
     from app.logs import configure_logging
     from app.server import serve
     from app.settings import Settings
 
-    # before and after uvicorn handles signals itself; it raises the one it got again when it is done
-    signal.signal(signal.SIGTERM, _exit)
-    signal.signal(signal.SIGINT, _exit)
     settings = Settings()
     configure_logging(settings.log_level)
     serve(settings)

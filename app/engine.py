@@ -10,8 +10,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from app.errors import Busy, Reply, ShuttingDown, WorkerDied
+from app.forkserver import start_forkserver
 from app.settings import Settings
-from app.worker import Task, Worker, prepare_context
+from app.worker import Task, Worker
 from optimizer.exceptions import DeadlineExceeded
 
 logger = logging.getLogger(__name__)
@@ -54,7 +55,7 @@ class Engine:
 
     def start(self) -> None:
         """Starts the workers in the background."""
-        prepare_context()
+        start_forkserver()
         # `stop` is skipped when the operator forces the exit
         atexit.register(self._kill_all)
         self._keepers = [asyncio.create_task(self._keep(first=index == 0)) for index in range(self._settings.workers)]

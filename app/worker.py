@@ -19,13 +19,10 @@ from multiprocessing.connection import Connection, wait
 from typing import Protocol
 
 from app.errors import Reply, WorkerDied
+from app.forkserver import CONTEXT
 from app.logs import configure_logging
 
 logger = logging.getLogger(__name__)
-
-# Workers are forked from a server process that has imported the libraries once: a replacement starts at once.
-_CONTEXT = multiprocessing.get_context("forkserver")
-_PRELOADED = ["app.preload"]
 
 
 class Task(Protocol):
@@ -39,8 +36,8 @@ class Worker:
     """The parent's side of a worker process."""
 
     def __init__(self, warm: Callable[[], None], log_level: str, threads: Executor) -> None:
-        self._pipe, self._child_pipe = _CONTEXT.Pipe()
-        self._process = _CONTEXT.Process(
+        self._pipe, self._child_pipe = CONTEXT.Pipe()
+        self._process = CONTEXT.Process(
             target=_serve, args=(self._child_pipe, warm, log_level), name="joulepath-worker", daemon=True
         )
         self._threads = threads
@@ -106,14 +103,6 @@ class Worker:
         if not self._killed:
             logger.error("worker ended by itself", extra={"pid": self.pid, "exit_code": self._process.exitcode})
         self.ended.set()
-
-
-def prepare_context() -> None:
-    """To be called before the first worker starts."""
-    # one solve, one core: a thread pool of a linear algebra library in each worker would only fight the other workers
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
-    _CONTEXT.set_forkserver_preload(_PRELOADED)
 
 
 def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:

@@ -14,7 +14,8 @@ MAX_DURATION = 600.0
 MAX_SAMPLES = 100_000
 """Most samples that an answer holds."""
 
-Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
+# with less, a motion would last longer than any answer may
+Rate = Annotated[float, Field(ge=1e-2, le=1e6)]
 Seconds = Annotated[float, Field(ge=1e-3, le=MAX_DURATION)]
 Angle = Annotated[float, Field(ge=-1e3, le=1e3)]
 
@@ -30,9 +31,8 @@ def _by_shape(value: Any) -> str | None:
 _SHAPE = Discriminator(
     _by_shape, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
 )
-PositivePerJoint = Annotated[
-    Annotated[Positive, Tag("one")]
-    | Annotated[Annotated[list[Positive], Field(min_length=1, max_length=16)], Tag("each")],
+RatePerJoint = Annotated[
+    Annotated[Rate, Tag("one")] | Annotated[Annotated[list[Rate], Field(min_length=1, max_length=16)], Tag("each")],
     _SHAPE,
 ]
 AnglePerJoint = Annotated[
@@ -114,10 +114,10 @@ class PositionLimits(Request):
 class Limits(Request):
     """Limits tighter than the robot's. One number holds for every joint, a list gives one per joint."""
 
-    velocity: PositivePerJoint | None = described("Greatest joint speed.", "rad/s", 2.0, default=None)
-    acceleration: PositivePerJoint | None = described("Greatest joint acceleration.", "rad/s²", 5.0, default=None)
-    jerk: PositivePerJoint | None = described("Greatest joint jerk.", "rad/s³", 100.0, default=None)
-    torque: PositivePerJoint | None = described(
+    velocity: RatePerJoint | None = described("Greatest joint speed.", "rad/s", 2.0, default=None)
+    acceleration: RatePerJoint | None = described("Greatest joint acceleration.", "rad/s²", 5.0, default=None)
+    jerk: RatePerJoint | None = described("Greatest joint jerk.", "rad/s³", 100.0, default=None)
+    torque: RatePerJoint | None = described(
         "Greatest motor torque at the joint: rigid body, rotor and friction together.",
         "N·m",
         [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],

@@ -46,7 +46,8 @@ class Server:
 
     def descendants(self) -> set[int]:
         """Process ids of the server's children, theirs, and so on."""
-        found, parents = set(), {self.process.pid}
+        found: set[int] = set()
+        parents = {self.process.pid}
         while parents:
             parents = {pid for pid, parent in _parents().items() if parent in parents} - found
             found |= parents
@@ -76,8 +77,8 @@ class Server:
 
 
 @contextmanager
-def serving(**settings: Any) -> Iterator[Server]:
-    """A warm server with these settings."""
+def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
+    """A server with these settings, by default waited for until it is warm."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
@@ -87,7 +88,8 @@ def serving(**settings: Any) -> Iterator[Server]:
         process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=log)
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
-            server.wait_ready()
+            if warm:
+                server.wait_ready()
             yield server
         finally:
             process.kill()

@@ -8,7 +8,7 @@ from app.schemas.examples import OPTIMIZE_EXAMPLES
 
 HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
-EXAMPLES: dict[str, dict[str, Any]] = {name: example["value"] for name, example in OPTIMIZE_EXAMPLES.items()}
+EXAMPLES: dict[str, dict[str, Any]] = {name: example["value"] or {} for name, example in OPTIMIZE_EXAMPLES.items()}
 
 
 def move(**fields: Any) -> dict[str, Any]:

@@ -15,7 +15,7 @@ import pytest
 
 from app.schemas.problems import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
 from app.schemas.response import OptimizeResponse
-from tests.app.live import EXIT, Server, alive, serving
+from tests.app.live import EXIT, WARM_UP, Server, alive, serving
 from tests.app.requests import EXAMPLES, long_search, move
 
 # What /healthz may take while the workers are at it [s]. Alone it takes 2 ms; two busy cores are shared here.
@@ -132,7 +132,10 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
     with serving(workers=2, queue_size=4, shutdown_grace=3) as server, ThreadPoolExecutor(5) as pool:
         short = in_background(pool, server, long_search(deadline=2), 2)
         waiting = in_background(pool, server, long_search(deadline=20), 3)
-        workers = server.workers()
+        everyone = server.descendants()
+        # a service manager signals every process
+        for pid in everyone:
+            os.kill(pid, signal.SIGTERM)
         assert server.terminate() == 0
         answers = [future.result() for future in short + waiting]
         assert [answer.status_code for answer in answers[:2]] == [200, 200]
@@ -140,20 +143,26 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
         for answer in answers[2:]:
             ShuttingDown.model_validate_json(answer.content)
             assert "retry-after" in answer.headers
-        assert len(workers) == 2
-        assert not any(alive(pid) for pid in workers)
+        until(lambda: not any(alive(pid) for pid in everyone))
         with pytest.raises(httpx2.ConnectError):
             server.get("/healthz")
 
 
-@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_to_every_process_ends_cleanly(signum: signal.Signals) -> None:
-    # as a terminal's Ctrl-C does, and a service manager
+def test_sigterm_while_the_workers_warm_up() -> None:
+    with serving(warm=False, workers=1) as server:
+        until(lambda: any("running" in entry["message"] for entry in server.logged()), WARM_UP)
+        everyone = server.descendants()
+        assert server.terminate() == 0
+        until(lambda: not any(alive(pid) for pid in everyone))
+
+
+def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
         (future,) = in_background(pool, server, long_search(deadline=1.5))
+        # a terminal signals the whole foreground group
         for pid in (*everyone, server.process.pid):
-            os.kill(pid, signum)
+            os.kill(pid, signal.SIGINT)
         assert future.result().status_code == 200
         assert server.process.wait(EXIT) == 0
         until(lambda: not any(alive(pid) for pid in everyone))

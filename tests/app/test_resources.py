@@ -71,7 +71,7 @@ def test_a_sane_request_id_is_kept(client: TestClient) -> None:
 
 @pytest.mark.parametrize("given", ["", "a b", "x" * 65, "<script>", "ä"])
 def test_any_other_is_replaced(client: TestClient, given: str) -> None:
-    answer = client.get("/healthz", headers={"X-Request-ID": given.encode()})
+    answer = client.get("/healthz", headers={b"X-Request-ID": given.encode()})
     assert uuid.UUID(answer.headers["x-request-id"]).version == 4
 
 
