@@ -20,13 +20,15 @@ import numpy as np
 import ruckig
 
 from models.robot import Array, Limits
+from optimizer import bspline
 from optimizer.energy import breakdown
 from optimizer.problem import Problem
-from optimizer.solution import Baseline, BaselineName, Energy
+from optimizer.solution import Baseline, BaselineName, Energy, Spline
 from optimizer.verify import limit_ratios
 
 RATIO_TOLERANCE = 1e-6  # as the certificate's
-PANELS = 72  # least number of quadrature panels over a motion: error below 1e-4 of the energy, corners of |x| included
+PANELS = 72  # least number of quadrature panels over a motion: error of the energy below 1e-5 of it
+CLOSEST_BREAKS = 1e-7  # share of a motion: jumps of jerk that are nearer to each other are one
 
 # Gauss-Lobatto points and weights on [0, 1]: exact for polynomials of degree 9, and with a panel's ends among them,
 # where torque peaks when acceleration jumps or bends
@@ -222,20 +224,11 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
 
     Raises RuntimeError should Ruckig find no motion: between configurations at rest there always is one.
     """
-    given = ruckig.InputParameter(len(q_start))
-    given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()
-    given.max_velocity, given.max_acceleration = limits.v_max.tolist(), limits.a_max.tolist()
-    given.max_jerk = limits.j_max.tolist()
-    found = ruckig.Trajectory(len(q_start))
-    result = ruckig.Ruckig(len(q_start)).calculate(given, found)
-    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        raise RuntimeError(f"Ruckig found no motion: {result}")
+    found = _ruckig(limits, q_start, q_goal)
     if found.duration == 0:
         return rest(q_start, 0.0)
     profiles = found.profiles[0]
-    phases = np.array([profile.t for profile in profiles])
-    breaks = np.unique(np.round(np.append(phases.cumsum(axis=1), [0.0, found.duration]) / found.duration, 12))
-    tau, weights = _nodes(breaks)
+    tau, weights = _nodes(_breaks(found))
     t = tau * found.duration
     states = np.array([found.at_time(instant) for instant in t.tolist()])
     return SampledMotion(
@@ -248,6 +241,38 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
         peak_a=np.abs([profile.a for profile in profiles]).max(axis=1),
         peak_jerk=np.abs([profile.j for profile in profiles]).max(axis=1),
     )
+
+
+def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
+    """Ruckig's motion without loss: a spline with threefold knots wherever the jerk of a joint jumps."""
+    found = _ruckig(limits, q_start, q_goal)
+    breaks = _breaks(found)
+    inner = breaks[1:-1][np.diff(breaks[:-1]) > CLOSEST_BREAKS]
+    knots = bspline.clamped(np.concatenate([[0.0], np.repeat(inner, 3), [1.0]]))
+    at = bspline.greville(knots)
+    q = np.array([found.at_time(x * found.duration)[0] for x in at.tolist()])
+    points = np.linalg.solve(bspline.basis_matrix(knots, at), q)
+    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
+    return Spline(bspline.DEGREE, knots * found.duration, points)
+
+
+def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
+    given = ruckig.InputParameter(len(q_start))
+    given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()
+    given.max_velocity, given.max_acceleration = limits.v_max.tolist(), limits.a_max.tolist()
+    given.max_jerk = limits.j_max.tolist()
+    found = ruckig.Trajectory(len(q_start))
+    result = ruckig.Ruckig(len(q_start)).calculate(given, found)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise RuntimeError(f"Ruckig found no motion: {result}")
+    return found
+
+
+def _breaks(found: ruckig.Trajectory) -> Array:
+    """Where in [0, 1] the jerk of any joint jumps, both ends included, ascending."""
+    phases = np.array([profile.t for profile in found.profiles[0]])
+    ends = np.append(phases.cumsum(axis=1), [0.0, found.duration]) / found.duration
+    return np.asarray(np.unique(np.round(ends, 12)))
 
 
 def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> SampledMotion:

@@ -152,8 +152,8 @@ def fine_samples(spline: Spline, per_span: int) -> tuple[Array, Array, Array, Ar
 def peak_rates(spline: Spline) -> Array:
     """Greatest absolute speed, acceleration and jerk of every joint, (3, nq).
 
-    Every knot span is expanded around its middle, so that both sides of a repeated knot count, and its greatest sample
-    is raised to the vertex of the parabola through its neighbours: exact for jerk, which is such a parabola.
+    Every knot span is expanded around its middle, so that both sides of a repeated knot count, and samples are
+    raised to the vertex of the parabola through their neighbours: exact for jerk, which is such a parabola.
     """
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
     edges = np.unique(spline.knots)
@@ -167,6 +167,7 @@ def peak_rates(spline: Spline) -> Array:
         values = np.tensordot(powers[:, : 6 - d], series[d:], axes=1) / half[:, None] ** d
         low, top, high = np.abs(values[:-2]), np.abs(values[1:-1]), np.abs(values[2:])
         bend = 2 * top - low - high
-        vertex = np.where((top >= low) & (top >= high) & (bend > 0), (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
+        # the vertex counts where it lies between the two outer samples
+        vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
         peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=(0, 1)), (top + vertex).max(axis=(0, 1))))
     return np.array(peaks)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import bspline, search
-from optimizer.baselines import baselines, guesses, nearest
+from optimizer.baselines import baselines, guesses, nearest, time_optimal_spline
 from optimizer.candidate import COARSE, EXACT, REFINED, Attempt, Guess, Solver
 from optimizer.exceptions import (
     DeadlineExceeded,
@@ -24,7 +25,7 @@ from optimizer.kernel import kernel_for
 from optimizer.motion import Task
 from optimizer.problem import Problem
 from optimizer.search import Entry
-from optimizer.solution import Baseline, Branch, Solution, SolverReport, Spline
+from optimizer.solution import Baseline, BaselineName, Branch, Energy, Solution, SolverReport, Spline
 from optimizer.verify import certify
 
 # share of the deadline kept for checking and reporting the answer, at most [s]
@@ -132,11 +133,14 @@ class _Run:
         space = solver.graded(duration, repeat)
         s = solver.coordinates.from_joints(q)
         outcome = self.count(solver.improve(Guess(space, bspline.fit(s, t / duration, space.knots), duration)))
-        if outcome.spline is None:
-            return
-        energy = self.task.objective_of(self.task.energy(outcome.spline))
-        if entry.energy is None or energy < entry.energy:
-            entry.attempt, entry.energy, entry.status, entry.reason = outcome, energy, "solved", outcome.reason
+        if outcome.spline is not None:
+            self.keep(entry, outcome, self.task.energy(outcome.spline))
+
+    def keep(self, entry: Entry, outcome: Attempt, energy: Energy) -> None:
+        """Take an outcome as the entry's if it spends less."""
+        objective = self.task.objective_of(energy)
+        if entry.energy is None or objective < entry.energy:
+            entry.attempt, entry.energy, entry.status, entry.reason = outcome, objective, "solved", outcome.reason
 
     def refine(self, entry: Entry) -> None:
         """More control points for the winner, placed where jerk switches, warm."""
@@ -148,25 +152,40 @@ class _Run:
     def compared(self, best: Entry) -> list[Baseline]:
         """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
         for repeat in (REFINED, EXACT, None):
-            assert best.attempt is not None and best.attempt.spline is not None and best.energy is not None
-            duration = best.attempt.spline.duration
-            peers = [e for e in self.entries if np.array_equal(e.q_start, best.q_start)]
-            q_goals = np.array([e.q_goal for e in peers])
-            table = baselines(
-                self.problem, best.q_start, q_goals, duration, best.energy, self.task.torques, self.task.potential
-            )
+            table, q_nearest = self.baselines(best)
             better = [b.name for b in table if b.within_limits and b.saving < -SLACK and self.allows(b.duration)]
             # a baseline off the straight line is no guess for a motion along it
-            if not better or repeat is None or self.problem.method == "time_scaling":
+            if not better or self.problem.method == "time_scaling":
+                return table
+            entry = next(e for e in self.entries if (e.q_start == best.q_start).all() and (e.q_goal == q_nearest).all())
+            if repeat is None:
+                self.adopt(entry, better)
                 break
-            q_nearest = nearest(self.problem, best.q_start, q_goals)
-            entry = next(e for e in peers if np.array_equal(e.q_goal, q_nearest))
-            motions = guesses(self.problem, best.q_start, q_nearest, duration)
+            motions = guesses(self.problem, best.q_start, q_nearest, best.duration)
             for name in better:
                 if time.perf_counter() < self.deadline:
                     self.improve(entry, motions[name].q, motions[name].t, repeat)
             best = self.best() or best
-        return table
+        return self.baselines(self.best() or best)[0]
+
+    def baselines(self, best: Entry) -> tuple[list[Baseline], Array]:
+        """What other methods spend, and the nearest goal (nq,) that they go to."""
+        assert best.energy is not None
+        q_goals = np.array([e.q_goal for e in self.entries if (e.q_start == best.q_start).all()])
+        task = self.task
+        table = baselines(self.problem, best.q_start, q_goals, best.duration, best.energy, task.torques, task.potential)
+        return table, nearest(self.problem, best.q_start, q_goals)
+
+    def adopt(self, entry: Entry, better: list[BaselineName]) -> None:
+        """A time-optimal motion that no spline tried comes up to is itself the answer."""
+        spline = time_optimal_spline(self.problem.active_limits, entry.q_start, entry.q_goal)
+        if "ruckig" not in better:
+            best = self.best()
+            assert best is not None
+            spline = replace(spline, knots=spline.knots * (best.duration / spline.duration))
+        energy = self.task.energy(spline)
+        if certify(self.problem, spline, entry.q_start, entry.q_goal, energy).valid:
+            self.keep(entry, Attempt("solved", "the time-optimal motion itself", spline=spline), energy)
 
     def allows(self, duration: float) -> bool:
         """Whether the request lets a motion take that long."""

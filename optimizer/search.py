@@ -49,9 +49,13 @@ class Entry:
     attempt: Attempt | None = field(default=None, repr=False)
     holdable: bool = True
 
+    @property
+    def duration(self) -> float:
+        """Length of the motion found [s]; NaN where none is."""
+        return self.attempt.spline.duration if self.attempt and self.attempt.spline else np.nan
+
     def report(self) -> Candidate:
         """The candidate as it is answered."""
-        spline = self.attempt.spline if self.attempt is not None else None
         return Candidate(
             start=self.start.label,
             goal=self.goal.label,
@@ -61,7 +65,7 @@ class Entry:
             reason=self.reason,
             lower_bound=self.lower_bound,
             energy=self.energy,
-            duration=None if spline is None else spline.duration,
+            duration=None if self.energy is None else self.duration,
         )
 
 
