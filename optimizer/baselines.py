@@ -250,10 +250,18 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
     inner = breaks[1:-1][np.diff(breaks[:-1]) > CLOSEST_BREAKS]
     knots = bspline.clamped(np.concatenate([[0.0], np.repeat(inner, 3), [1.0]]))
     at = bspline.greville(knots)
-    q = np.array([found.at_time(x * found.duration)[0] for x in at.tolist()])
-    points = np.linalg.solve(bspline.basis_matrix(knots, at), q)
+    points = np.linalg.solve(bspline.basis_matrix(knots, at), _positions(found, at))
     points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
     return Spline(bspline.DEGREE, knots * found.duration, points)
+
+
+def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
+    """Where Ruckig's motion is (k, nq) at the shares `at` (k,) of its duration."""
+    return _positions(_ruckig(limits, q_start, q_goal), at)
+
+
+def _positions(found: ruckig.Trajectory, at: Array) -> Array:
+    return np.array([found.at_time(instant)[0] for instant in (at * found.duration).tolist()])
 
 
 def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer import bspline, profile, shortest_line
-from optimizer.baselines import time_optimal
+from optimizer.baselines import time_optimal, time_optimal_positions
 from optimizer.bounds import LEAST_DURATION, LONGEST_DURATION
 from optimizer.bspline import Basis
 from optimizer.motion import Task, fine_samples, peak_rates, spline_of
@@ -79,10 +79,10 @@ class Solver:
         if self.on_line:
             return self._on_line()
         shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        first = Attempt("infeasible", "not tried")
+        first = Attempt("failed", "not tried")
         if not self.hurried and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
-            first = self.improve(Guess(space, self._straight(space), 0.0))
+            first = self.improve(Guess(space, self._smoothed(space), 0.0))
             if first.status in ("solved", "out of time"):
                 return first
         second = self.improve(self.in_haste())
@@ -124,8 +124,8 @@ class Solver:
             if result.status == "out of time":
                 return Attempt("out of time", "the deadline passed", iterations, solves)
             if result.violation > FEASIBILITY:
-                reason = f"no motion of {guess.space.n} control points holds the limits"
-                return Attempt("infeasible", reason, iterations, solves)
+                reason = f"found no motion of {guess.space.n} control points that holds the limits"
+                return Attempt("failed", reason, iterations, solves)
             spline = spline_of(guess.space, programme.joint_points(result.free), result.duration)
             excess = self._excess(spline)
             if excess is not None:
@@ -142,9 +142,15 @@ class Solver:
         build = Coordinates.straight_line if self.on_line else Coordinates.joints
         return build(self.q_start, self.q_goal, limits)
 
-    def _straight(self, space: Basis) -> Array:
+    def _smoothed(self, space: Basis) -> Array:
+        """Control points (n, r) of the fastest motion with its corners rounded: its positions at the Greville points.
+
+        Control values set to a function's values there give a spline that varies less than the function (Schoenberg).
+        """
         line = self.coordinates
-        return np.asarray(line.start + np.outer(space.quintic, line.goal - line.start))
+        points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
+        points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
+        return points
 
     def _first_duration(self, programme: Programme, free: Array, least: float) -> float:
         """The cheapest of a few durations at which the guess holds the limits on speed, acceleration and jerk."""

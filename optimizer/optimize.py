@@ -200,8 +200,12 @@ class _Run:
         certificate = certify(self.problem, spline, best.q_start, best.q_goal, energy)
         if not certificate.valid:
             return None
+        open_ends = [e for e in self.entries if e.status in ("unvisited", "failed")]
+        for entry in open_ends:
+            if entry.lower_bound >= self.task.objective_of(energy):
+                entry.status, entry.reason = "pruned", search.PRUNED
         return Solution(
-            status="feasible" if any(e.status in ("unvisited", "failed") for e in self.entries) else "optimal",
+            status="feasible" if any(e.status != "pruned" for e in open_ends) else "optimal",
             start=Branch(best.start.label, best.q_start),
             goal=Branch(best.goal.label, best.q_goal),
             trajectory=self.task.trajectory(spline),

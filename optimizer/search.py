@@ -21,6 +21,7 @@ from optimizer.solution import Candidate, CandidateStatus
 FULL_TURN = 2 * np.pi
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
+PRUNED = "its lower bound is not below the best energy found"
 
 
 @dataclass(frozen=True)
@@ -174,7 +175,7 @@ def explore(
         if entry.status != "unvisited":
             continue
         if best is not None and best.energy is not None and entry.lower_bound >= best.energy:
-            entry.status, entry.reason = "pruned", "its lower bound is not below the best energy found"
+            entry.status, entry.reason = "pruned", PRUNED
             continue
         if clock() > deadline:
             break
