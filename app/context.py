@@ -47,6 +47,8 @@ class RequestContext:
             await send(message)
 
         began = time.perf_counter()
+        asked = {"request_id": request_id, "method": scope["method"], "path": scope["path"]}
+        logger.debug("received", extra=asked)
         try:
             await self._app(scope, receive, send_with_id)
         except ClientDisconnected:
@@ -61,11 +63,5 @@ class RequestContext:
                 # probes come every second or so and say nothing new
                 logging.DEBUG if scope["path"] in _PROBES else logging.INFO,
                 "request",
-                extra={
-                    "request_id": request_id,
-                    "method": scope["method"],
-                    "path": scope["path"],
-                    "status": status,
-                    "duration": round(time.perf_counter() - began, 6),
-                },
+                extra=asked | {"status": status, "duration": round(time.perf_counter() - began, 6)},
             )

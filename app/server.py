@@ -13,6 +13,8 @@ from app.engine import Engine
 from app.main import create_app
 from app.settings import Settings
 
+_REFUSING_TIME = 0.25
+"""Time [s] in which new requests are still taken, to be refused, while whoever sends them learns of the end."""
 _SETTLING_TIME = 0.05
 """Time [s] in which what has arrived on open connections is read before the idle ones are closed."""
 
@@ -28,6 +30,7 @@ class _Server(uvicorn.Server):
         """Lets the requests in flight finish, or be refused."""
         engine: Engine = self._app.state.engine
         engine.drain()
+        await asyncio.sleep(_REFUSING_TIME)
         for server in self.servers:
             server.close()
         await asyncio.sleep(_SETTLING_TIME)

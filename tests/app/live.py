@@ -83,7 +83,7 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
-    environment |= {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
+    environment |= {"JOULEPATH_LOG_LEVEL": "debug", "JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
     with tempfile.TemporaryFile() as log:
         process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=log)
         server = Server(process, f"http://127.0.0.1:{port}", log)

@@ -32,9 +32,14 @@ def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
 
 
 def in_background(pool: ThreadPoolExecutor, server: Server, body: Any, count: int = 1) -> list[Future[httpx2.Response]]:
-    """Requests under way."""
+    """Requests that the server has received."""
+
+    def received() -> int:
+        return sum(entry["message"] == "received" and entry["path"] == "/optimize" for entry in server.logged())
+
+    expected = received() + count
     futures = [pool.submit(server.post, "/optimize", body) for _ in range(count)]
-    time.sleep(0.5)
+    until(lambda: received() >= expected)
     return futures
 
 
@@ -82,6 +87,7 @@ def test_a_crash_fails_its_request_only(server: Server) -> None:
     with ThreadPoolExecutor() as pool:
         # two, so that the one worker that is killed has one of them
         futures = in_background(pool, server, long_search(deadline=3), 2)
+        time.sleep(0.3)  # until the workers have them
         os.kill(before.pop(), signal.SIGKILL)
         answers = [future.result() for future in futures]
     assert sorted(answer.status_code for answer in answers) == [200, 500]
@@ -97,7 +103,7 @@ def test_hanging_up_frees_the_worker(server: Server) -> None:
             server.url + "/optimize", json=long_search(deadline=30), timeout=1, headers={"X-Request-ID": "gone"}
         )
     until(lambda: bool(before - set(server.workers())))
-    until(lambda: any(entry.get("request_id") == "gone" and entry["status"] == 499 for entry in server.logged()))
+    until(lambda: any(entry.get("request_id") == "gone" and entry.get("status") == 499 for entry in server.logged()))
     until(lambda: len(server.workers()) == 2)
 
 
@@ -111,7 +117,9 @@ def test_logs_one_line_per_request(server: Server) -> None:
     server.post("/optimize", move(duration=-1), headers={"X-Request-ID": "logged-once"})
 
     def entries() -> list[dict[str, Any]]:
-        return [entry for entry in server.logged() if entry.get("request_id") == "logged-once"]
+        return [
+            entry for entry in server.logged() if entry.get("request_id") == "logged-once" and entry["level"] == "info"
+        ]
 
     until(lambda: bool(entries()))
     (entry,) = entries()
