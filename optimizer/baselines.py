@@ -250,7 +250,7 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
     inner = breaks[1:-1][np.diff(breaks[:-1]) > CLOSEST_BREAKS]
     knots = bspline.clamped(np.concatenate([[0.0], np.repeat(inner, 3), [1.0]]))
     at = bspline.greville(knots)
-    points = np.linalg.solve(bspline.basis_matrix(knots, at), _positions(found, at))
+    points = np.asarray(np.linalg.solve(bspline.basis_matrix(knots, at), _positions(found, at)), dtype=float)
     points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
     return Spline(bspline.DEGREE, knots * found.duration, points)
 

@@ -213,9 +213,9 @@ class Programme:
         """Gradients (rows, n) of the torques of joints j at nodes k with respect to x."""
         J = line.jacobian[k, j]
         scale = np.array([1.0, 1.0 / T, 1.0 / (T * T)])
-        by_points = np.einsum("kdm,kdr->kmr", self._nodes_free[k] * scale[:, None], J).reshape(len(k), -1)
+        by_points = np.einsum("kdm,kdr->kmr", self._nodes_free[k] * scale[:, None], J)
         by_time = np.einsum("kdr,kdr->k", J, line.rate[k])
-        return np.hstack([by_points, by_time[:, None]])
+        return np.hstack([by_points.reshape(len(k), self.free_count * self.r), by_time[:, None]])
 
     def kinematics(self, free: Array) -> Array:
         """First to third derivative of s by τ on the fine grid, (3, M, r)."""

@@ -5,7 +5,10 @@ Jerk up, hold, jerk down, cruise, and the same in reverse (Biagiotti, Melchiorri
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
+from scipy.optimize import brentq
 
 from models.robot import Array, Limits
 
@@ -32,6 +35,11 @@ def _durations(distance: Array, limits: Limits) -> Array:
     return np.asarray(np.where(distance >= v * ramp, distance / v + ramp, short))
 
 
+def _jerk_limited(speed: float, distance: float, jerk: float) -> float:
+    """Time [s] to travel a distance > 0 at a cruising speed that jerk alone limits the way to."""
+    return float(distance / speed + 2 * np.sqrt(speed / jerk))
+
+
 def switches(travel: Array, duration: float, limits: Limits) -> Array:
     """Where in [0, 1] the jerk of the leading joint switches when it takes `duration` [s] for travel (nq,), ascending.
 
@@ -43,12 +51,19 @@ def switches(travel: Array, duration: float, limits: Limits) -> Array:
     lead = int(own.argmax())
     duration = max(duration, float(own[lead]))
     d, a, j = distance[lead], limits.a_max[lead], limits.j_max[lead]
+    if d == 0:
+        return np.zeros(0)
     # duration = d / v + v / a + a / j, solved for the speed v of the cruise
     moving = duration - a / j
     speed = a / 2 * (moving - np.sqrt(max(moving * moving - 4 * d / a, 0.0)))
     if speed < a * a / j:
-        # it never holds its greatest acceleration: jerk alone shapes the motion
-        return np.array([0.25, 0.5, 0.75])
-    early = np.array([a / j, speed / a, speed / a + a / j]) / duration
+        # it never holds its greatest acceleration: duration = d / v + 2 sqrt(v / j), which falls with v up to no cruise
+        top = min(a * a / j, float(np.cbrt(d * d * j / 4)))
+        needed = functools.partial(_jerk_limited, distance=d, jerk=j)
+        speed = top if needed(top) >= duration else brentq(lambda v: needed(v) - duration, d / duration, top)
+        ramp = np.sqrt(speed / j)
+        early = np.array([ramp, 2 * ramp]) / duration
+    else:
+        early = np.array([a / j, speed / a, speed / a + a / j]) / duration
     both = np.unique(np.concatenate([early, 1 - early]))
     return np.asarray(both[np.append(True, np.diff(both) > CLOSEST)])

@@ -100,6 +100,10 @@ def test_switches_are_ruckigs_at_the_shortest_duration() -> None:
     assert seen > 50
 
 
+# signs of the jerk between switches: with and without a time of greatest acceleration
+PATTERNS = {6: [1, 0, -1, 0, -1, 0, 1], 4: [1, -1, 0, -1, 1]}
+
+
 @pytest.mark.parametrize("stretch", [1.0001, 1.05, 1.5, 4.0])
 def test_switches_make_a_motion_of_the_travel(stretch: float) -> None:
     """±jerk switched there and integrated thrice: at rest at both ends, at its acceleration limit, all of the way."""
@@ -110,13 +114,13 @@ def test_switches_make_a_motion_of_the_travel(stretch: float) -> None:
         own = limits(v_max=v, a_max=a, j_max=j)
         duration = stretch * float(shortest_duration(one_joint(d), own))
         at = switches(one_joint(d), duration, own) * duration
-        if len(at) == 0:
+        whole = len(at) == 6 or (len(at) == 4 and at[1] == pytest.approx(2 * at[0]))
+        if not whole:  # switches came so close that they count as one
             continue
-        assert len(at) == 6
         q = v_now = a_now = 0.0
         peak = 0.0
         steps = np.diff(np.concatenate([[0.0], at, [duration]]))
-        for jerk, h in zip(j * np.array([1, 0, -1, 0, -1, 0, 1]), steps, strict=True):
+        for jerk, h in zip(j * np.array(PATTERNS[len(at)]), steps, strict=True):
             q, v_now, a_now = (
                 q + v_now * h + a_now * h**2 / 2 + jerk * h**3 / 6,
                 v_now + a_now * h + jerk * h**2 / 2,
@@ -126,7 +130,8 @@ def test_switches_make_a_motion_of_the_travel(stretch: float) -> None:
         slack = 1e-7  # switches rounded to 1e-9 of the duration, integrated three times
         assert q == pytest.approx(abs(d), rel=slack, abs=slack * j * duration**3)
         assert abs(v_now) < slack * j * duration**2 and abs(a_now) < slack * j * duration
-        assert peak == pytest.approx(a, abs=slack * j * duration)
+        if len(at) == 6:
+            assert peak == pytest.approx(a, abs=slack * j * duration)
         seen += 1
     assert seen > 20
 
@@ -141,8 +146,11 @@ def test_the_joint_that_needs_longest_leads() -> None:
     assert len(switches(alone, duration, own)) == 6
 
 
-def test_no_switches_where_acceleration_stays_below_its_limit() -> None:
+def test_jerk_alone_shapes_motions_that_stay_below_the_acceleration_limit() -> None:
     own = limits()
-    short = one_joint(1e-3)  # jerk alone shapes a motion below 2 a³ / j² = 5 cm
-    assert len(switches(short, float(shortest_duration(short, own)), own)) == 0
-    assert len(switches(one_joint(1.0), 60.0, own)) == 0  # at leisure
+    short = one_joint(1e-3)  # below 2 a³ / j² = 5 cm: half of the way up, half of the way down
+    at = switches(short, float(shortest_duration(short, own)), own)
+    assert at == pytest.approx([0.25, 0.5, 0.75], abs=1e-6)
+    at = switches(one_joint(1.0), 4.0, own)  # at leisure: a short ramp at either end of a long cruise
+    assert len(at) == 4 and at[1] < 0.02 and at[2] > 0.98
+    assert len(switches(np.zeros(6), 1.0, own)) == 0
