@@ -25,7 +25,7 @@ def problem(start: Any = START, goal: Any = GOAL, **given: Any) -> Problem:
     return Problem(**{"start": start, "goal": goal} | given)
 
 
-def fixed(duration: float) -> dict[str, float]:
+def fixed(duration: float) -> dict[str, Any]:
     """The fields of a problem that fix its duration [s]."""
     return {"duration_min": duration, "duration_max": duration}
 
