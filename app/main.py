@@ -13,6 +13,7 @@ from app.context import RequestContext
 from app.documentation import install_openapi
 from app.engine import Engine
 from app.handlers import install_handlers
+from app.json_body import JsonBody
 from app.routes import docs, health, ik, optimize, problems, robots
 from app.settings import Settings
 
@@ -42,6 +43,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.add_middleware(BodyLimit, most=settings.max_body_bytes)
+    app.add_middleware(JsonBody)
     app.add_middleware(RequestContext)  # added last: the outermost
     install_handlers(app)
     install_openapi(app, settings)

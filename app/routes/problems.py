@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from functools import cache
 from html import escape
 
@@ -38,11 +39,16 @@ def _page(problem: type[Problem]) -> str:
     title, status = (problem.model_fields[name].default for name in ("title", "status"))
     explanation = inspect.cleandoc(problem.__doc__ or "")
     fields = "".join(
-        f"<dt><code>{name}</code></dt><dd>{escape(problem.model_fields[name].description or '')}</dd>"
+        f"<dt><code>{name}</code></dt><dd>{_text(problem.model_fields[name].description or '')}</dd>"
         for name in problem.own_fields()
     )
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
         f"<h1>{escape(title)}</h1><p><code>{problem.slug()}</code>, HTTP status {status}</p>"
-        f"<p>{escape(explanation)}</p>" + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
+        f"<p>{_text(explanation)}</p>" + (f"<h2>Fields of its own</h2><dl>{fields}</dl>" if fields else "")
     )
+
+
+def _text(markdown: str) -> str:
+    """Escaped, with what stands between backquotes as code."""
+    return re.sub("`(.+?)`", r"<code>\1</code>", escape(markdown))
