@@ -32,7 +32,9 @@ def lower_bounds(task: Task, travel: Array, climb: Array) -> tuple[Array, Array]
     t_min = np.maximum(shortest, problem.duration_min or 0.0)
     t_max = np.full_like(t_min, LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
     bound = electrical(task, travel, climb, t_min, t_max) if problem.objective == "electrical" else mechanical(climb)
-    return np.where(t_min > t_max, np.inf, np.maximum(bound, 0.0)), shortest
+    if problem.objective == "mechanical" or problem.robot.electronics.regeneration == 0:
+        bound = np.maximum(bound, 0.0)  # nothing is given back
+    return np.where(t_min > t_max, np.inf, bound), shortest
 
 
 def mechanical(climb: Array) -> Array:
