@@ -42,12 +42,24 @@ def greville(knots: Array) -> Array:
     return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
 
 
-def quadrature(knots: Array, per_span: int) -> tuple[Array, Array]:
-    """Gauss-Legendre points and weights (spans · per_span,) over every knot span of [0, 1]."""
-    x, w = np.polynomial.legendre.leggauss(per_span)
-    edges = np.unique(knots)
-    half = np.diff(edges)[:, None] / 2
-    return (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+@cache
+def _gauss_legendre(n: int) -> tuple[Array, Array]:
+    """Nodes and weights (n,) over [-1, 1]."""
+    return np.polynomial.legendre.leggauss(n)
+
+
+def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[Array, Array]:
+    """Gauss-Legendre points and weights (panels · per_panel,) over the knots' range.
+
+    Panels are the knot spans, divided evenly where they are longer than `longest`.
+    """
+    x, w = _gauss_legendre(per_panel)
+    spans = np.unique(knots)
+    if np.diff(spans).max() > longest:
+        parts = [np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False) for a, b in pairwise(spans)]
+        spans = np.concatenate([*parts, spans[-1:]])
+    half = np.diff(spans)[:, None] / 2
+    return (spans[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
 
 def fit(samples: Array, at: Array, knots: Array) -> Array:

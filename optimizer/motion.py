@@ -22,8 +22,9 @@ KNEE = 0.02
 WIDTH = 0.5
 # what a second costs where the shortest duration is looked for [W]: a hundred times what energy could make up for
 HASTE = 1e4
-# quadrature points per knot span for reported energies
+# quadrature points per panel for reported energies, the longest panel [s], and how many there are at most
 REPORT_NODES = 16
+LONGEST_PANEL, MOST_PANELS = 0.2, 2000
 # points per knot span at which peaks of speed, acceleration and jerk are looked for
 RATE_POINTS = 33
 
@@ -143,9 +144,10 @@ def _sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
     return curve(t), curve(t, 1), curve(t, 2)
 
 
-def fine_samples(spline: Spline, per_span: int) -> tuple[Array, Array, Array, Array]:
-    """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of every knot span."""
-    points, weights = bspline.quadrature(spline.knots, per_span)
+def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, Array]:
+    """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of panels of a knot span at most."""
+    longest = max(LONGEST_PANEL, spline.duration / MOST_PANELS)
+    points, weights = bspline.quadrature(spline.knots, per_panel, longest)
     return weights, *_sample(spline, points)
 
 

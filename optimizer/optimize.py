@@ -116,10 +116,13 @@ class _Run:
             if spline is not None and (best is None or spline.duration < best.duration):
                 winner, best = entry, spline
         if winner is None or best is None:
-            return
-        if best.duration > longest:
+            least = min(entry.shortest for entry in self.entries)
+            if least > longest:
+                raise DurationTooShort(least)
+        elif best.duration > longest:
             raise DurationTooShort(best.duration)
-        self.learn(winner, best)
+        else:
+            self.learn(winner, best)
 
     def learn(self, entry: Entry, spline: Spline, repeat: int = EXACT) -> None:
         """Optimise the entry from a motion, over knots where jerk switches, and keep what spends less."""
