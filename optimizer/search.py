@@ -133,33 +133,29 @@ def bound(task: Task, entries: Sequence[Entry]) -> None:
 
     Raises TorqueInfeasible when the arm can hold no pair at all.
     """
-    problem = task.problem
-    tau_max = problem.active_limits.tau_max
+    tau_max, joints = task.problem.active_limits.tau_max, task.problem.robot.joint_names
     potential: dict[int, float] = {}
-    holding: dict[int, Array] = {}
-    for entry in entries:
-        for end in (entry.start, entry.goal):
-            if id(end) not in potential:
-                zero = np.zeros_like(end.q)
-                potential[id(end)] = task.potential(end.q)
-                holding[id(end)] = np.abs(task.torques(end.q[None], zero[None], zero[None])[0])
+    overload: dict[int, TorqueInfeasible] = {}
+    for end in {id(end): end for entry in entries for end in (entry.start, entry.goal)}.values():
+        potential[id(end)] = task.potential(end.q)
+        still = np.zeros((1, len(end.q)))
+        needed = np.abs(task.torques(end.q[None], still, still)[0])
+        j = int((needed / tau_max).argmax())
+        if needed[j] > tau_max[j]:
+            overload[id(end)] = TorqueInfeasible(joints[j], float(needed[j]), float(tau_max[j]))
     travel = np.array([entry.q_goal - entry.q_start for entry in entries])
     climb = np.array([potential[id(entry.goal)] - potential[id(entry.start)] for entry in entries])
     bounds, shortest = lower_bounds(task, travel, climb)
     for entry, value, least in zip(entries, bounds.tolist(), shortest.tolist(), strict=True):
         entry.lower_bound, entry.shortest = value, least
-        for end in (entry.start, entry.goal):
-            excess = holding[id(end)] / tau_max
-            if excess.max() > 1:
-                joint = problem.robot.joint_names[int(excess.argmax())]
-                entry.status, entry.reason = "infeasible", f"{joint} cannot hold the load at an end of the motion"
-                entry.lower_bound, entry.holdable = np.inf, False
-        if entry.status == "unvisited" and not np.isfinite(value):
+        error = overload.get(id(entry.start)) or overload.get(id(entry.goal))
+        if error is not None:
+            entry.status, entry.reason = "infeasible", f"{error.joint} cannot hold the load at an end of the motion"
+            entry.lower_bound, entry.holdable = np.inf, False
+        elif not np.isfinite(value):
             entry.status, entry.reason = "infeasible", f"takes at least {least:.4f} s"
     if not any(entry.holdable for entry in entries):
-        _, worst = min(((holding[key] / tau_max).max(), key) for key in holding if (holding[key] / tau_max).max() > 1)
-        j = int((holding[worst] / tau_max).argmax())
-        raise TorqueInfeasible(problem.robot.joint_names[j], float(holding[worst][j]), float(tau_max[j]))
+        raise min(overload.values(), key=lambda error: error.needed / error.available)
 
 
 def explore(
