@@ -35,7 +35,7 @@ lint: $(VENV)/.dev
 	$(PY) -m mypy
 	$(VENV)/bin/lint-imports --no-logo
 
-bench: $(VENV)/.dev kernels
+bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
 kernels: $(VENV)/.runtime $(COMPILER)
@@ -49,6 +49,12 @@ $(VENV)/.runtime: requirements.lock $(PY)
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
+	@echo "Installing $< into $(VENV) ..."
+	@$(INSTALL) -r $<
+	@touch $@
+
+# The peers that the benchmarks compare with, on top of the runtime.
+$(VENV)/.benchmarks: requirements-benchmarks.lock $(VENV)/.runtime
 	@echo "Installing $< into $(VENV) ..."
 	@$(INSTALL) -r $<
 	@touch $@
@@ -69,6 +75,8 @@ LOCK = $(VENV)/bin/uv pip compile --universal --generate-hashes --no-emit-index-
 lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml --output-file requirements.lock
 	$(LOCK) pyproject.toml --group dev --constraints requirements.lock --output-file requirements-dev.lock
+	$(LOCK) pyproject.toml --group benchmarks --constraints requirements-dev.lock \
+		--output-file requirements-benchmarks.lock
 	$(LOCK) --group compiler --output-file requirements-compiler.lock
 
 clean:

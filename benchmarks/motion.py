@@ -1,0 +1,123 @@
+"""Motions of any origin on one fine grid: exact energy and the share of every limit that they use."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import pinocchio as pin
+from scipy.interpolate import BSpline
+
+from models.robot import Array
+from optimizer.energy import breakdown
+from optimizer.problem import Problem
+from optimizer.solution import Energy
+from optimizer.verify import limit_ratios
+
+PERIOD = 1e-3  # of the fine grid, at most [s]
+
+
+class Motion(Protocol):
+    """A motion that can be sampled."""
+
+    @property
+    def duration(self) -> float:
+        """Its length [s]."""
+
+    def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
+        """q, v, a and jerk (k, nq) at times t (k,); no jerk where acceleration jumps, which makes it unbounded."""
+
+
+@dataclass(frozen=True)
+class SplineMotion:
+    """A B-spline: knots (m,) [s], control points (n, nq) [rad], degree."""
+
+    knots: Array
+    control_points: Array
+    degree: int
+
+    @property
+    def duration(self) -> float:
+        """Its length [s]."""
+        return float(self.knots[-1] - self.knots[0])
+
+    @cached_property
+    def _curve(self) -> BSpline:
+        return BSpline(self.knots, self.control_points, self.degree)
+
+    def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
+        """As `Motion` has it."""
+        curve = self._curve
+        return curve(t), curve(t, 1), curve(t, 2), curve(t, 3)
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A motion on the fine grid: its energy, the worst share of each limit, and how far its ends are off [rad]."""
+
+    duration: float
+    energy: Energy
+    shares: dict[str, float]
+    end_error: float
+
+    @property
+    def worst(self) -> float:
+        """The greatest share of any limit."""
+        return max(self.shares.values())
+
+
+def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> Replay:
+    """Evaluate a motion between two configurations (nq,) by Pinocchio and the exact energy formulas."""
+    t, weights = fine_grid(motion.duration)
+    q, v, a, jerk = motion.sample(t)
+    tau = torques(problem, q, v, a)
+    model, data = _model(problem)
+    climb = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
+    energy = breakdown(
+        weights,
+        v,
+        tau,
+        climb[1] - climb[0],
+        problem.robot.drives,
+        problem.friction_law,
+        problem.robot.electronics,
+    )
+    ends = max(float(np.abs(q[0] - q_start).max()), float(np.abs(q[-1] - q_goal).max()))
+    return Replay(motion.duration, energy, _shares(problem, q, v, a, jerk, tau), ends)
+
+
+def limit_shares(problem: Problem, motion: Motion) -> dict[str, float]:
+    """The worst value / limit on the fine grid, per kind of limit."""
+    t, _ = fine_grid(motion.duration)
+    q, v, a, jerk = motion.sample(t)
+    return _shares(problem, q, v, a, jerk, torques(problem, q, v, a))
+
+
+def torques(problem: Problem, q: Array, v: Array, a: Array) -> Array:
+    """Rigid body and rotor torques (k, nq) by Pinocchio."""
+    model, data = _model(problem)
+    rows = zip(*(np.ascontiguousarray(each) for each in (q, v, a)), strict=True)
+    return np.array([pin.rnea(model, data, *row) for row in rows])
+
+
+def fine_grid(duration: float) -> tuple[Array, Array]:
+    """Times (k,) [s], both ends included, and the weights (k,) [s] of Simpson's rule over them."""
+    pairs = max(math.ceil(duration / PERIOD / 2), 50)
+    t = np.linspace(0.0, duration, 2 * pairs + 1)
+    weights = np.full(len(t), 2.0)
+    weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
+    return t, weights * (duration / (6 * pairs))
+
+
+def _model(problem: Problem) -> tuple[pin.Model, pin.Data]:
+    payload = problem.payload
+    model = problem.robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.gravity)
+    return model, model.createData()
+
+
+def _shares(problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array) -> dict[str, float]:
+    jerk = np.full_like(a, np.inf) if jerk is None else jerk
+    return limit_ratios(problem.active_limits, q, v, a, jerk, tau + problem.friction_law.torque(v))

@@ -1,0 +1,113 @@
+"""A plain CasADi script: a B-spline transcribed with `Opti`, solved by IPOPT with exact derivatives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from benchmarks.motion import SplineMotion
+from benchmarks.peers.peer import CONTROL_POINTS, NODES
+from models.robot import Array, FrictionLaw, Robot
+from optimizer.bspline import DEGREE, Basis, basis_matrix, clamped
+from optimizer.dynamics import SymbolicPayload, inverse_dynamics
+from optimizer.energy import drawn_power, power_flow
+from optimizer.profile import shortest_duration
+
+WIDTH = 0.5  # of the rounded corners of power [W]
+KNEE = 0.02  # of friction's rounded reversal [rad/s]
+SLOWED = 1.5  # first duration, in multiples of the shortest that speed, acceleration and jerk allow
+RESTING = 3  # control points that coincide at either end
+GRID = np.linspace(0.0, 1.0, 61)  # where limits hold that are not held by the hull
+OPTIONS: dict[str, Any] = {"print_time": False}
+IPOPT: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": 300, "tol": 1e-6}
+
+
+class CasadiOpti:
+    """The programme is built once with the two configurations as parameters, as one would for many solves.
+
+    Torque limits hold at Gauss-Legendre nodes, over which the cost is summed; limits on speed, acceleration and jerk
+    hold for the control points of the derivatives, and by the hull everywhere.
+    """
+
+    title = "CasADi Opti with IPOPT, hull bounds"
+    packages: tuple[str, ...] = ("casadi",)
+    what = "B-spline of 13 control points on 32 nodes, duration free, the same dynamics and energy, hull bounds"
+    hull = True
+
+    def __init__(self, robot: Robot, n: int = CONTROL_POINTS, nodes: int = NODES) -> None:
+        self.robot = robot
+        self.basis = basis = Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)), nodes)
+        limits, columns = robot.limits, n - 2 * RESTING
+
+        opti = self.opti = ca.Opti()
+        self.free, self.duration = opti.variable(robot.nq, columns), opti.variable()
+        self.q_start, self.q_goal = opti.parameter(robot.nq), opti.parameter(robot.nq)
+        self.points = ca.horzcat(*[self.q_start] * RESTING, self.free, *[self.q_goal] * RESTING)
+        states = [self.points @ basis.at_nodes[d].T / self.duration**d for d in range(3)]
+        power, tau = _node(robot).map(len(basis.nodes))(*states)
+        opti.minimize(self.duration * (power @ basis.weights))
+        opti.subject_to(opti.bounded(-1, ca.vec(tau / _wide(limits.tau_max, len(basis.nodes))), 1))
+        for order, most in enumerate((limits.v_max, limits.a_max, limits.j_max), start=1):
+            inner = derivative_points(basis.knots, order) if self.hull else basis_matrix(basis.knots, GRID, order)
+            rate = self.points @ inner.T / self.duration**order
+            opti.subject_to(opti.bounded(-1, ca.vec(rate / _wide(most, len(inner))), 1))
+        lower, upper = _wide(limits.q_min, columns), _wide(limits.q_max, columns)
+        opti.subject_to(opti.bounded(lower.ravel("F"), ca.vec(self.free), upper.ravel("F")))
+        opti.subject_to(opti.bounded(0.01, self.duration, 600.0))
+        opti.solver("ipopt", OPTIONS, IPOPT)
+
+    def plan(self, q_start: Array, q_goal: Array, bulge: Array | None = None) -> SplineMotion | None:
+        """As `Peer` has it; `bulge` (n - 6, nq) is added to the first guess's free control points."""
+        opti, basis = self.opti, self.basis
+        free = q_start + np.outer(basis.quintic[RESTING:-RESTING], q_goal - q_start)
+        opti.set_value(self.q_start, q_start)
+        opti.set_value(self.q_goal, q_goal)
+        opti.set_initial(self.free, (free if bulge is None else free + bulge).T)
+        opti.set_initial(self.duration, SLOWED * float(shortest_duration(q_goal - q_start, self.robot.limits)))
+        try:
+            solution = opti.solve()
+        except RuntimeError:  # what Opti raises when the solver gives up
+            return None
+        duration = float(solution.value(self.duration))
+        return SplineMotion(basis.knots * duration, np.array(solution.value(self.points)).T, DEGREE)
+
+
+class CasadiOptiGrid(CasadiOpti):
+    """The same, with limits on speed, acceleration and jerk on a grid: less wary, and broken in between."""
+
+    title = "CasADi Opti with IPOPT, bounds on a grid"
+    what = "as before, with bounds on speed, acceleration and jerk at 61 points instead of the hull's"
+    hull = False
+
+
+def derivative_points(knots: Array, order: int) -> Array:
+    """Matrix (n - order, n) from control points to those of a derivative (de Boor 1978, ch. X)."""
+    n = len(knots) - DEGREE - 1
+    matrix = np.eye(n)
+    for k in range(order):
+        degree = DEGREE - k
+        spans = np.array([knots[i + DEGREE + 1] - knots[i + k + 1] for i in range(n - k - 1)])
+        matrix = degree * np.diff(matrix, axis=0) / spans[:, None]
+    return matrix
+
+
+def _wide(limit: Array, columns: int) -> Array:
+    """A limit (nq,) for every column, (nq, columns)."""
+    return np.tile(limit[:, None], columns)
+
+
+def _node(robot: Robot) -> ca.Function:
+    """(q, v, a) → drawn power [W] and motor torque (nq,), corners rounded."""
+    q, v, a = (ca.SX.sym(name, robot.nq) for name in "qva")
+    nothing = SymbolicPayload(ca.SX(0), ca.SX(3, 1), ca.SX(6, 1))
+    tau = inverse_dynamics(
+        robot.model, q, v, a, nothing, ca.SX(robot.model.gravity.linear), ca.SX(robot.drives.rotor_inertia)
+    )
+    law = robot.friction
+    friction = FrictionLaw(law.name, law.coulomb, law.curved, law.speed, law.viscous, KNEE)
+    flow = power_flow(tau, v, robot.drives, friction, 0.1 * WIDTH, ca)
+    electronics = robot.electronics
+    net = electronics.idle_power + electronics.controller_power + ca.sum1(flow.joints)
+    return ca.Function("node", [q, v, a], [drawn_power(net, electronics.regeneration, WIDTH, ca), flow.tau_motor])

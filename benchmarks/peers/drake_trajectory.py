@@ -1,0 +1,165 @@
+"""Drake's KinematicTrajectoryOptimization with SNOPT, the electrical energy added as a cost with exact gradients."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.math import BsplineBasis
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import MultibodyForces_
+from pydrake.planning import KinematicTrajectoryOptimization
+from pydrake.solvers import SnoptSolver, SolverOptions
+from pydrake.trajectories import BsplineTrajectory
+
+from benchmarks.motion import SplineMotion
+from benchmarks.peers.peer import CONTROL_POINTS, NODES
+from models.robot import Array, Robot
+from optimizer.bspline import DEGREE, Basis, clamped
+from optimizer.profile import shortest_duration
+
+WIDTH = 0.5  # of the rounded corners of power [W]
+KNEE = 0.02  # of friction's rounded reversal [rad/s]
+SLOWED = 1.5  # first duration, in multiples of the shortest that speed, acceleration and jerk allow
+OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6, "Major iterations limit": 500}
+
+
+class DrakeTrajectory:
+    """Hull bounds on speed, acceleration and jerk, and effort bounds at the nodes, as Drake offers them.
+
+    Drake's plant knows no friction of this kind: effort bounds are tightened by the most that friction can take.
+    """
+
+    title = "Drake with SNOPT"
+    packages: tuple[str, ...] = ("drake",)
+    what = "KinematicTrajectoryOptimization, B-spline of 13 control points on 32 nodes, duration free, hull bounds"
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.basis = Basis.of(clamped(np.linspace(0.0, 1.0, CONTROL_POINTS - DEGREE + 1)), NODES)
+        self.plant = _plant(robot)
+        self.energy = _Energy(robot, self.plant, self.basis)
+        self.solver, self.options = SnoptSolver(), SolverOptions()
+        for name, value in OPTIONS.items():
+            self.options.SetOption(self.solver.solver_id(), name, value)
+
+    def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
+        """As `Peer` has it."""
+        limits, nq = self.robot.limits, self.robot.nq
+        duration = SLOWED * float(shortest_duration(q_goal - q_start, limits))
+        knots = self.basis.knots
+        guess = q_start + np.outer(self.basis.quintic, q_goal - q_start)
+        trajectory = BsplineTrajectory(
+            BsplineBasis(DEGREE + 1, (knots * duration).tolist()), [point[:, None] for point in guess]
+        )
+        programme = KinematicTrajectoryOptimization(trajectory)
+        none = np.zeros(nq)
+        for s, q in ((0.0, q_start), (1.0, q_goal)):
+            programme.AddPathPositionConstraint(q, q, s)
+            programme.AddPathVelocityConstraint(none, none, s)
+            programme.AddPathAccelerationConstraint(none, none, s)
+        programme.AddPositionBounds(limits.q_min, limits.q_max)
+        programme.AddVelocityBounds(-limits.v_max, limits.v_max)
+        programme.AddAccelerationBounds(-limits.a_max, limits.a_max)
+        programme.AddJerkBounds(-limits.j_max, limits.j_max)
+        programme.AddEffortBoundsAtNormalizedTimes(self.plant, self.basis.nodes)
+        programme.AddDurationConstraint(0.01, 600.0)
+        points = programme.control_points()
+        unknowns = np.append(points.T.ravel(), programme.duration())
+        programme.get_mutable_prog().AddCost(self.energy, unknowns)
+        result = self.solver.Solve(programme.prog(), None, self.options)
+        if not result.is_success():
+            return None
+        found = float(result.GetSolution(programme.duration()))
+        return SplineMotion(knots * found, np.asarray(result.GetSolution(points)).T, DEGREE)
+
+
+class _Energy:
+    """Drawn electrical energy [J, in hundreds] of control points row by row and a duration.
+
+    Torques and their derivatives come from the plant by automatic differentiation over the 3 nq states of a node; from
+    there to power and to the unknowns by the chain rule, which is far cheaper than 79 derivatives all the way.
+    """
+
+    SCALE = 1e-2
+
+    def __init__(self, robot: Robot, plant: MultibodyPlant, basis: Basis) -> None:
+        self.robot, self.basis = robot, basis
+        self.plant = plant.ToAutoDiffXd()
+        self.context = self.plant.CreateDefaultContext()
+        self.forces = MultibodyForces_[AutoDiffXd](self.plant)
+
+    def __call__(self, x: Array) -> Any:
+        """The cost, with its gradient where Drake asks for it."""
+        if x.dtype != object:
+            return self._evaluate(x)[0]
+        value, gradient = self._evaluate(ExtractValue(x).ravel())
+        return InitializeAutoDiff(np.array([value]), (gradient @ ExtractGradient(x))[None])[0, 0]
+
+    def _evaluate(self, x: Array) -> tuple[float, Array]:
+        nq, duration = self.robot.nq, x[-1]
+        rates = np.array([1.0, 1 / duration, 1 / duration**2])
+        states = (self.basis.at_nodes @ x[:-1].reshape(-1, nq)) * rates[:, None, None]
+        power, slopes = self._power(states)
+        weights = self.basis.weights
+        cost = duration * float(weights @ power)
+        weighted = slopes * (duration * weights)[None, :, None]
+        by_points = np.einsum("d,dkn,dkj->nj", rates, self.basis.at_nodes, weighted)
+        by_duration = cost / duration - float((weighted * states * np.arange(3)[:, None, None]).sum()) / duration
+        return self.SCALE * cost, self.SCALE * np.append(by_points.ravel(), by_duration)
+
+    def _power(self, states: Array) -> tuple[Array, Array]:
+        """Drawn power (N,) [W] at states (3, N, nq), and its derivatives by them."""
+        robot, v = self.robot, states[1]
+        tau, jacobian = self._torques(states)
+        law, drives, electronics = robot.friction, robot.drives, robot.electronics
+        root, bent = np.hypot(v, KNEE), np.hypot(v, law.speed)
+        friction = law.coulomb * v / root + law.curved * np.arcsinh(v / law.speed) + law.viscous * v
+        steepness = law.coulomb * KNEE**2 / root**3 + law.curved / bent + law.viscous
+        motor = tau + friction
+        i = motor / drives.torque_constant
+        size = np.hypot(i, 0.1 * WIDTH)
+        loss = drives.copper * i**2 + drives.inverter_linear * size + drives.inverter_quadratic * i**2
+        by_current = 2 * (drives.copper + drives.inverter_quadratic) * i + drives.inverter_linear * i / size
+        by_motor = v + by_current / drives.torque_constant
+        base = electronics.idle_power + electronics.controller_power + float(drives.inverter_constant.sum())
+        net = base + (motor * v + loss).sum(axis=1)
+        soft = np.hypot(net, WIDTH)
+        share = electronics.regeneration
+        drawn = ((1 - share) * soft + (1 + share) * net) / 2
+        by_net = ((1 - share) * net / soft + (1 + share)) / 2
+        slopes = np.einsum("kj,kjdi->dki", by_motor, jacobian)
+        slopes[1] += motor + by_motor * steepness
+        return drawn, slopes * by_net[None, :, None]
+
+    def _torques(self, states: Array) -> tuple[Array, Array]:
+        """Torques (N, nq) and their derivatives (N, nq, 3, nq) by q, v and a."""
+        nq, count = self.robot.nq, states.shape[1]
+        tau, jacobian = np.empty((count, nq)), np.empty((count, nq, 3, nq))
+        for k in range(count):
+            y = InitializeAutoDiff(states[:, k].reshape(-1)).ravel()
+            self.plant.SetPositionsAndVelocities(self.context, y[: 2 * nq])
+            self.plant.CalcForceElementsContribution(self.context, self.forces)
+            found = self.plant.CalcInverseDynamics(self.context, y[2 * nq :], self.forces)
+            tau[k] = ExtractValue(found).ravel()
+            jacobian[k] = ExtractGradient(found).reshape(nq, 3, nq)
+        return tau, jacobian
+
+
+def _plant(robot: Robot) -> MultibodyPlant:
+    """The robot's URDF with rotor inertia and effort limits on its joints."""
+    plant = MultibodyPlant(0.0)
+    urdf = (files("models") / robot.name / f"{robot.name}.urdf").read_text(encoding="utf-8")
+    Parser(plant).AddModelsFromString(urdf, "urdf")
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
+    limits = robot.limits
+    effort = limits.tau_max - robot.friction.torque(limits.v_max)
+    for name, most, inertia in zip(robot.joint_names, effort, robot.drives.rotor_inertia, strict=True):
+        actuator = plant.AddJointActuator(f"{name} drive", plant.GetJointByName(name), float(most))
+        actuator.set_default_gear_ratio(1.0)
+        actuator.set_default_rotor_inertia(float(inertia))
+    plant.Finalize()
+    return plant

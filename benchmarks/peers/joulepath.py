@@ -1,0 +1,79 @@
+"""joulepath itself: one candidate alone, the whole answer, and the straight line with an optimised time law."""
+
+from __future__ import annotations
+
+import time
+
+from benchmarks.motion import SplineMotion
+from models.robot import Array, Robot
+from optimizer.candidate import Solver
+from optimizer.exceptions import JoulepathError
+from optimizer.kernel import compile_kernel
+from optimizer.motion import Task
+from optimizer.optimize import optimize, warm_up
+from optimizer.problem import Problem
+from optimizer.solution import Spline
+
+PATIENCE = 10.0  # s
+
+
+class Candidate:
+    """One candidate, no refinement, no baselines, no certificate."""
+
+    title = "joulepath, one candidate"
+    packages: tuple[str, ...] = ()
+    what = "B-spline of 13 control points, duration free, least electrical energy; limits hold between the nodes too"
+
+    def __init__(self, robot: Robot) -> None:
+        _prepare(robot)
+        self.robot = robot
+
+    def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
+        """As `Peer` has it."""
+        task = Task(Problem(q_start, q_goal, self.robot))
+        return _motion(Solver(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
+
+
+class Answer:
+    """What a caller gets: refined, compared with the baselines, certified."""
+
+    title = "joulepath, whole answer"
+    packages: tuple[str, ...] = ()
+    what = "one candidate, refined over more control points, compared with all baselines, and certified"
+
+    def __init__(self, robot: Robot) -> None:
+        _prepare(robot)
+        self.robot = robot
+
+    def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
+        """As `Peer` has it."""
+        try:
+            return _motion(optimize(Problem(q_start, q_goal, self.robot)).trajectory.spline)
+        except JoulepathError:
+            return None
+
+
+class Line:
+    """One candidate, on the straight line in joint space."""
+
+    title = "joulepath, time-scaled line"
+    packages: tuple[str, ...] = ()
+    what = "straight line in joint space, its time law a B-spline of least electrical energy, duration free"
+
+    def __init__(self, robot: Robot) -> None:
+        _prepare(robot)
+        self.robot = robot
+
+    def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
+        """As `Peer` has it."""
+        task = Task(Problem(q_start, q_goal, self.robot, method="time_scaling"))
+        return _motion(Solver(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
+
+
+def _prepare(robot: Robot) -> None:
+    compile_kernel(robot)
+    warm_up(robot.name)
+
+
+def _motion(spline: Spline | None) -> SplineMotion | None:
+    return None if spline is None else SplineMotion(spline.knots, spline.control_points, spline.degree)

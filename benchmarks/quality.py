@@ -1,0 +1,62 @@
+"""Energy of the answers against the best of many starts on a fine grid, from `benchmarks.reference`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from benchmarks.command import keep, on_one_core, parser
+from benchmarks.figures import Spread
+from benchmarks.reference import fingerprint, load
+from benchmarks.tasks import move
+from models.registry import load_robot
+from optimizer.exceptions import JoulepathError
+from optimizer.kernel import compile_kernel
+from optimizer.optimize import optimize
+from optimizer.problem import Problem
+
+
+def main() -> None:
+    """Answer every task that has a reference, and compare."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
+    given = arguments.parse_args()
+    on_one_core()
+    robot = load_robot("ur5e")
+    compile_kernel(robot)
+    reference = load()
+    if reference["fingerprint"] != fingerprint(robot):
+        raise SystemExit("The robot's figures have changed: renew the references by python -m benchmarks.reference")
+    rows: list[dict[str, Any]] = []
+    for row in reference["tasks"][: given.count]:
+        task = move(reference["seed"], row["index"])
+        try:
+            energy = optimize(Problem(task.q_start, task.q_goal, robot)).energy.electrical.total
+        except JoulepathError as error:
+            print(f"index {task.index}: {error!r}")
+            energy = float("inf")
+        excess, fine_excess = energy / row["energy"] - 1, energy / row["fine"] - 1
+        rows.append({"index": task.index, "energy": energy, "excess": excess, "fine_excess": fine_excess})
+    worst = sorted(rows, key=lambda row: row["excess"], reverse=True)
+    figures = {
+        "seed": reference["seed"],
+        "count": len(rows),
+        "starts": reference["starts"],
+        "ipopt_starts": reference["ipopt_starts"],
+        "control_points": reference["control_points"],
+        "fine_control_points": reference["fine_control_points"],
+        "excess": Spread.of([row["excess"] for row in rows]),
+        "fine_excess": Spread.of([row["fine_excess"] for row in rows]),
+        "within_half_percent": sum(row["excess"] <= 0.005 for row in rows) / len(rows),
+        "within_one_percent": sum(row["excess"] <= 0.01 for row in rows) / len(rows),
+        "within_three_percent": sum(row["excess"] <= 0.03 for row in rows) / len(rows),
+        "worst": worst[:5],
+    }
+    print(f"energy above the best of {figures['starts']} starts: {figures['excess'].times(100).told(' %', 2)}")
+    print(f"above the same polished on a finer grid: {figures['fine_excess'].times(100).told(' %', 2)}")
+    print(f"within 1 %: {figures['within_one_percent']:.0%}, within 3 %: {figures['within_three_percent']:.0%}")
+    print(f"worst: {[(row['index'], round(row['excess'], 4)) for row in worst[:5]]}")
+    keep(given.json, figures)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,180 @@
+"""What the least energy of seeded tasks is, at great length: many starts on a fine grid, by two independent solvers.
+
+    python -m benchmarks.reference            writes benchmarks/reference_energies.json, in about half an hour
+
+Interrupted, it goes on where it was when it is started again.
+
+For every task: joulepath's own SQP from STARTS first guesses (the straight line and random bulges around it) on POINTS
+control points, IPOPT from a few more on the same spline, its motions then polished by the SQP so that they hold limits
+between the nodes as well, and the best of all polished once more on twice as many spans. All under the limits and the
+free duration that requests have. `make bench` compares answers with the stored figures.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import multiprocessing
+import time
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from benchmarks.command import on_one_core, parser
+from benchmarks.peers.casadi_opti import CasadiOptiGrid
+from benchmarks.tasks import Move, move
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer import bspline
+from optimizer.candidate import Guess, Solver
+from optimizer.kernel import compile_kernel
+from optimizer.motion import Task
+from optimizer.problem import Problem
+from optimizer.solution import Spline
+
+FILE = Path(__file__).with_name("reference_energies.json")
+SEED, TASKS = 1, 100
+STARTS, POINTS = 64, 25
+IPOPT_STARTS = 4
+FINE_POINTS = 45  # spans half as long as POINTS'
+MODES = 3  # half waves of which a bulge is made
+BULGES = (0.1, 1.5)  # least and greatest standard deviation of a bulge's waves [rad]
+PATIENCE = 60.0  # for one start [s]
+
+
+def bulge(rng: np.random.Generator, space: bspline.Basis, nq: int) -> Array:
+    """What a first guess's free control points (m, nq) are moved by: waves that vanish at the ends."""
+    size = np.exp(rng.uniform(*np.log(BULGES)))
+    at = bspline.greville(space.knots)[space.free]
+    waves = np.sin(np.pi * np.outer(at, np.arange(1, MODES + 1)))
+    return np.asarray(waves @ (rng.normal(size=(MODES, nq)) * (size / np.arange(1, MODES + 1)[:, None])))
+
+
+@cache
+def _opti() -> CasadiOptiGrid:
+    return CasadiOptiGrid(load_robot("ur5e"), POINTS, 2 * POINTS + 11)
+
+
+class Search:
+    """One task's best motion so far, by the exact energy [J]."""
+
+    def __init__(self, task: Move) -> None:
+        self.move, self.task = task, Task(Problem(task.q_start, task.q_goal))
+        self.best: Spline | None = None
+        self.energy = np.inf
+
+    def improve(self, guess: Guess) -> float:
+        """The energy from a first guess, inf where it leads nowhere; kept if it is the least."""
+        deadline = time.perf_counter() + PATIENCE
+        spline = Solver(self.task, self.move.q_start, self.move.q_goal, deadline).improve(guess).spline
+        if spline is None:
+            return float("inf")
+        energy = self.task.energy(spline).electrical.total
+        if energy < self.energy:
+            self.best, self.energy = spline, energy
+        return energy
+
+
+def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, Any]:
+    """The figures of one task."""
+    task = move(seed, index)
+    found, space = Search(task), bspline.uniform(POINTS)
+    nq = len(task.q_start)
+    straight = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
+    rng = np.random.default_rng([seed, index, 1])
+
+    def guess(points: Array) -> Guess:
+        return Guess(space, points, 0.0)
+
+    def bulged() -> Array:
+        points = straight.copy()
+        points[space.free] += bulge(rng, space, nq)
+        limits = found.task.problem.active_limits
+        return np.clip(points, limits.q_min, limits.q_max)
+
+    from_line = found.improve(guess(straight))
+    energies = [from_line, *(found.improve(guess(bulged())) for _ in range(starts - 1))]
+    by_ipopt = [_ipopt(found, bulged() - straight if k else None) for k in range(ipopt_starts)]
+    least = found.energy
+    if found.best is not None:
+        fine = bspline.uniform(FINE_POINTS)
+        unit = found.best.knots / found.best.duration
+        points = bspline.refit(found.best.control_points, unit, fine.knots)
+        found.improve(Guess(fine, points, found.best.duration))
+    solved = [energy for energy in energies if np.isfinite(energy)]
+    return {
+        "index": index,
+        "energy": least,
+        "fine": found.energy,
+        "duration": None if found.best is None else found.best.duration,
+        "from_line": from_line,
+        "by_ipopt": min(by_ipopt, default=float("inf")),
+        "starts_solved": len(solved),
+        "starts_within_a_thousandth": sum(energy <= 1.001 * least for energy in solved),
+    }
+
+
+def _ipopt(found: Search, moved: Array | None) -> float:
+    opti = _opti()
+    task = found.move
+    motion = opti.plan(task.q_start, task.q_goal, None if moved is None else moved[opti.basis.free])
+    if motion is None:
+        return float("inf")
+    return found.improve(Guess(bspline.uniform(POINTS), motion.control_points, motion.duration))
+
+
+def fingerprint(robot: Robot) -> str:
+    """Hash of the figures that energies and limits depend on: references hold for these alone."""
+    task = Task(Problem(np.zeros(robot.nq), np.zeros(robot.nq), robot))
+    limits = task.problem.active_limits
+    parts = [task.objective_parameters, limits.v_max, limits.a_max, limits.j_max, limits.tau_max]
+    parts += [placement.homogeneous.ravel() for placement in robot.model.jointPlacements]
+    parts += [body.toDynamicParameters() for body in robot.model.inertias]
+    text = " ".join(f"{value:.9g}" for value in np.round(np.concatenate(parts), 12).tolist())
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def load(path: Path = FILE) -> dict[str, Any]:
+    """The stored references."""
+    content: dict[str, Any] = orjson.loads(path.read_bytes())
+    return content
+
+
+def main() -> None:
+    """Search and store."""
+    arguments = parser(__doc__, seed=SEED)
+    arguments.add_argument("--count", type=int, default=TASKS, help="tasks (%(default)s)")
+    arguments.add_argument("--starts", type=int, default=STARTS, help="first guesses of the SQP (%(default)s)")
+    arguments.add_argument("--ipopt-starts", type=int, default=IPOPT_STARTS, help="and of IPOPT (%(default)s)")
+    arguments.add_argument("--processes", type=int, default=2, help="at a time (%(default)s)")
+    arguments.add_argument("--output", type=Path, default=FILE, help="where to (%(default)s)")
+    given = arguments.parse_args()
+    on_one_core()
+    robot = load_robot("ur5e")
+    compile_kernel(robot)
+    settings = {
+        "robot": robot.name,
+        "fingerprint": fingerprint(robot),
+        "seed": given.seed,
+        "starts": given.starts,
+        "ipopt_starts": given.ipopt_starts,
+        "control_points": POINTS,
+        "fine_control_points": FINE_POINTS,
+    }
+    before = load(given.output) if given.output.exists() else {}
+    goes_on = {name: before.get(name) for name in settings} == settings
+    rows: list[dict[str, Any]] = before["tasks"] if goes_on else []
+    done = {row["index"] for row in rows}
+    one: Callable[[int], dict[str, Any]] = partial(search, given.seed, given.starts, given.ipopt_starts)
+    with multiprocessing.get_context("spawn").Pool(given.processes) as pool:
+        for row in pool.imap_unordered(one, (index for index in range(given.count) if index not in done)):
+            rows = sorted([*rows, row], key=lambda each: int(each["index"]))
+            print(row, flush=True)
+            given.output.write_bytes(orjson.dumps({**settings, "tasks": rows}, option=orjson.OPT_INDENT_2) + b"\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,147 @@
+"""How the time of a solve grows: with control points, with degrees of freedom, with candidates."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from benchmarks.chains import chain
+from benchmarks.command import keep, on_one_core, parser
+from benchmarks.figures import Spread, exponent
+from benchmarks.tasks import ask, move, moves
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer import bspline
+from optimizer.candidate import Guess, Solver
+from optimizer.exceptions import JoulepathError
+from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.kernel import compile_kernel
+from optimizer.motion import Task
+from optimizer.optimize import optimize, warm_up
+from optimizer.problem import BranchFilter, Pose, Problem
+
+CONTROL_POINTS = (8, 10, 13, 16, 20, 24, 28, 32)
+JOINTS = (2, 3, 4, 5, 6, 7)
+PATIENCE = 60.0  # s
+
+
+def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
+    """One programme over evenly spaced knots, from the straight line, repairs between the nodes included."""
+    rows = []
+    for n in CONTROL_POINTS:
+        space = bspline.uniform(n)
+        walls, iterations, solved = [], [], 0
+        # the first task once more: what is built once per space is not part of a solve
+        for task in (move(seed, 0), *moves(seed, count)):
+            points = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
+            began = time.perf_counter()
+            solver = Solver(Task(Problem(task.q_start, task.q_goal)), task.q_start, task.q_goal, began + PATIENCE)
+            outcome = solver.improve(Guess(space, points, 0.0))
+            walls.append(time.perf_counter() - began)
+            iterations.append(outcome.iterations)
+            solved += outcome.status == "solved"
+        rows.append(_row(n, walls[1:], iterations[1:]) | {"nodes": len(space.nodes), "solved": solved - 1})
+    return rows
+
+
+def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
+    """One candidate of an arm with its chain cut short or made longer."""
+    robots = [chain(load_robot("ur5e"), joints) for joints in JOINTS]
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(compile_kernel, robots))
+    rows = []
+    for robot in robots:
+        walls, iterations, solved = [], [], 0
+        for task in (move(seed, 0, robot), *moves(seed, count, robot)):
+            began = time.perf_counter()
+            problem = Problem(task.q_start, task.q_goal, robot)
+            outcome = Solver(Task(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
+            walls.append(time.perf_counter() - began)
+            iterations.append(outcome.iterations)
+            solved += outcome.status == "solved"
+        rows.append(_row(robot.nq, walls[1:], iterations[1:]) | {"solved": solved - 1})
+    return rows
+
+
+def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
+    """A whole answer, library call, with more and more candidates allowed: one branch, all, full turns too."""
+    robot = load_robot("ur5e")
+    allowed = {
+        "one branch": (True, False),
+        "one branch, full turns": (True, True),
+        "all branches": (False, False),
+        "all branches, full turns": (False, True),
+    }
+    rows = []
+    for name, (one_branch, windings) in allowed.items():
+        walls, candidates, solves = [], [], []
+        for index in range(count):
+            task = ask(seed, index, "joint to pose")
+            q_start, goal = np.array(task.body["start"]["q"]), Pose(_orthonormal(task.T_goal))
+            branch = _branch(robot, task.T_goal) if one_branch else None
+            began = time.perf_counter()
+            try:
+                solution = optimize(Problem(q_start, goal, robot, branch=branch, windings=windings))
+            except JoulepathError:
+                continue
+            walls.append(time.perf_counter() - began)
+            candidates.append(len(solution.candidates))
+            solves.append(solution.solver.nlp_solves)
+        rows.append(_row(float(np.median(candidates)), walls, solves) | {"name": name})
+    return sorted(rows, key=lambda row: row["size"])
+
+
+def _branch(robot: Robot, T_goal: Array) -> BranchFilter:
+    label = inverse_kinematics_for(robot).branches(T_goal)[0].label
+    return BranchFilter(label.shoulder, label.elbow, label.wrist)
+
+
+def _orthonormal(T: Array) -> Array:
+    u, _, vt = np.linalg.svd(T[:3, :3])
+    result = T.copy()
+    result[:3, :3] = u @ vt
+    return result
+
+
+def _row(size: float, walls: list[float], iterations: Iterable[float]) -> dict[str, Any]:
+    return {"size": size, "wall": Spread.of(walls), "iterations": Spread.of(list(iterations))}
+
+
+def growth(rows: list[dict[str, Any]]) -> float:
+    """Exponent of the median time over the size."""
+    return exponent([row["size"] for row in rows], [row["wall"].p50 for row in rows])
+
+
+def per_iteration(rows: list[dict[str, Any]]) -> float:
+    """Exponent of the median time of an iteration over the size."""
+    each = [row["wall"].p50 / max(row["iterations"].p50, 1.0) for row in rows]
+    return exponent([row["size"] for row in rows], each)
+
+
+def main() -> None:
+    """Measure all three."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--count", type=int, default=25, help="tasks per size (%(default)s)")
+    given = arguments.parse_args()
+    on_one_core()
+    compile_kernel(load_robot("ur5e"))
+    warm_up("ur5e")
+    figures: dict[str, Any] = {"count": given.count}
+    for name, measure in (("control_points", by_control_points), ("joints", by_joints), ("candidates", by_candidates)):
+        rows = measure(given.seed, given.count)
+        figures[name] = {"rows": rows, "exponent": growth(rows), "exponent_per_iteration": per_iteration(rows)}
+        print(f"{name}: time grows with the power {growth(rows):.2f}, an iteration's with {per_iteration(rows):.2f}")
+        for row in rows:
+            print(
+                f"    {row['size']:6.0f} {row.get('name', '')} {row['wall'].times(1e3).told(' ms')}, "
+                f"iterations {row['iterations'].p50:.0f}, {row.get('solved', '')}"
+            )
+    keep(given.json, figures)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,158 @@
+"""The service as its users have it: `python -m app` in a process of its own, spoken to over HTTP."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+import orjson
+
+ROOT = Path(__file__).parents[1]
+START = 120.0  # until the service is ready, at most [s]
+STOP = 20.0  # from SIGTERM to its end, at most [s]
+PAUSE = 0.005  # between two tries [s]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A response: status, body as sent, headers, and the wall time from sending to the last byte [s]."""
+
+    status: int
+    raw: bytes
+    headers: dict[str, str]
+    wall: float
+
+    @property
+    def content(self) -> Any:
+        """The JSON in it."""
+        return orjson.loads(self.raw)
+
+
+class Client:
+    """One connection, kept alive. Not for several threads at once."""
+
+    def __init__(self, port: int) -> None:
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120)
+
+    def get(self, path: str) -> Answer:
+        """Raises OSError or http.client.HTTPException where nobody answers."""
+        return self._exchange("GET", path, None)
+
+    def optimize(self, body: dict[str, Any]) -> Answer:
+        """`POST /optimize`. Raises as `get`."""
+        return self._exchange("POST", "/optimize", orjson.dumps(body))
+
+    def _exchange(self, method: str, path: str, body: bytes | None) -> Answer:
+        began = time.perf_counter()
+        try:
+            self._connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
+            response = self._connection.getresponse()
+            raw = response.read()
+        except (OSError, http.client.HTTPException):
+            self._connection.close()
+            raise
+        wall = time.perf_counter() - began
+        return Answer(response.status, raw, {k.lower(): v for k, v in response.getheaders()}, wall)
+
+
+@dataclass(frozen=True)
+class Service:
+    """A running service; `began` is when its process was started [s, perf_counter]."""
+
+    process: subprocess.Popen[bytes]
+    port: int
+    began: float
+    log: IO[bytes]
+
+    def client(self) -> Client:
+        """A new connection."""
+        return Client(self.port)
+
+    @property
+    def age(self) -> float:
+        """Time since its process was started [s]."""
+        return time.perf_counter() - self.began
+
+    def wait(self, path: str) -> float:
+        """Wait until `path` answers 200; returns the service's age then [s]."""
+        client = self.client()
+        while True:
+            if self.process.poll() is not None:
+                raise RuntimeError("the service ended by itself:\n" + self.logged())
+            if self.age > START:
+                raise RuntimeError(f"no 200 from {path} within {START:g} s:\n" + self.logged())
+            try:
+                if client.get(path).status == 200:
+                    return self.age
+            except (OSError, http.client.HTTPException):
+                pass
+            time.sleep(PAUSE)
+
+    def logged(self) -> str:
+        """The end of its log."""
+        self.log.seek(0)
+        return self.log.read()[-4000:].decode(errors="replace")
+
+    def worker_pids(self) -> list[int]:
+        """Processes that the service started and that bear its workers' weight: all its descendants but helpers."""
+        return [pid for pid in _descendants(self.process.pid) if resident(pid) > 32]
+
+
+@contextmanager
+def running(ready: bool = True, **environment: str) -> Iterator[Service]:
+    """A service with its default settings on a free port, `ready` unless told otherwise, ended afterwards."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
+    with tempfile.TemporaryFile() as log:
+        began = time.perf_counter()
+        process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=given, stdout=log, stderr=log)
+        service = Service(process, port, began, log)
+        try:
+            if ready:
+                service.wait("/readyz")
+            yield service
+        finally:
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(STOP)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+
+
+def resident(pid: int) -> float:
+    """Resident memory of a process [MiB]; 0 when there is none."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def _descendants(pid: int) -> list[int]:
+    parents: dict[int, int] = {}
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, parent = status.read_text().rpartition(")")[2].split()[:2]
+        except OSError:  # it has just ended
+            continue
+        if state != "Z":
+            parents[int(status.parent.name)] = int(parent)
+    found, generation = [], {pid}
+    while generation:
+        generation = {child for child, parent in parents.items() if parent in generation}
+        found += sorted(generation)
+    return found

@@ -1,0 +1,114 @@
+"""Seeded random tasks. Nothing is picked: task `index` of a seed is whatever the generator of (seed, index) draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from models.registry import load_robot
+from models.robot import Array, Robot
+
+Kind = Literal["joint to pose", "pose to pose"]
+KINDS: tuple[Kind, ...] = ("joint to pose", "pose to pose")
+MOUNTS = {"floor": [0.0, 0.0, -9.81], "wall": [9.81, 0.0, 0.0], "ceiling": [0.0, 0.0, 9.81]}
+
+
+@dataclass(frozen=True)
+class Move:
+    """A motion between two configurations (nq,) [rad], each joint drawn evenly from one turn within its limits."""
+
+    seed: int
+    index: int
+    q_start: Array
+    q_goal: Array
+
+
+@dataclass(frozen=True)
+class Ask:
+    """A body for `POST /optimize`, and the poses T_base_flange (4, 4) that it asks for."""
+
+    seed: int
+    index: int
+    kind: Kind
+    body: dict[str, Any]
+    T_start: Array
+    T_goal: Array
+
+
+def move(seed: int, index: int, robot: Robot | None = None) -> Move:
+    """Task `index` of a seed: joint to joint."""
+    limits = (robot or load_robot("ur5e")).limits
+    rng = np.random.default_rng([seed, index])
+    lower, upper = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
+    q_start, q_goal = rng.uniform(lower, upper, (2, len(lower)))
+    return Move(seed, index, q_start, q_goal)
+
+
+def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
+    """The first `count` motions of a seed."""
+    return (move(seed, index, robot) for index in range(count))
+
+
+def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -> Ask:
+    """Task `index` of a seed: a request with default settings between targets that the arm reaches.
+
+    A target is the pose, or the joints, of a configuration drawn evenly from the whole joint range. Kinds alternate
+    unless one is asked for. `varied` adds what else a request may hold: payload, mount, tighter limits, another
+    objective, a duration, no windings; such a request may well be infeasible.
+    """
+    robot = load_robot("ur5e")
+    rng = np.random.default_rng([seed, index])
+    kind = KINDS[index % len(KINDS)] if kind is None else kind
+    q_start, q_goal = rng.uniform(robot.limits.q_min, robot.limits.q_max, (2, robot.nq))
+    T_start, T_goal = flange(robot, q_start), flange(robot, q_goal)
+    start = {"q": q_start.tolist()} if kind == "joint to pose" else {"pose": as_pose(T_start)}
+    body: dict[str, Any] = {"robot": robot.name, "start": start, "goal": {"pose": as_pose(T_goal)}}
+    if varied:
+        body |= _variation(rng, robot)
+    return Ask(seed, index, kind, body, T_start, T_goal)
+
+
+def asks(seed: int, count: int, kind: Kind | None = None, varied: bool = False) -> Iterator[Ask]:
+    """The first `count` requests of a seed; all of one kind if one is asked for."""
+    return (ask(seed, index, kind, varied) for index in range(count))
+
+
+def flange(robot: Robot, q: Array) -> Array:
+    """T_base_flange (4, 4) of a configuration (nq,)."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    placement = pin.updateFramePlacement(robot.model, data, robot.model.getFrameId("flange"))
+    return np.asarray(placement.homogeneous)
+
+
+def as_pose(T: Array) -> dict[str, list[float]]:
+    """A pose as requests give it."""
+    quaternion = pin.Quaternion(np.ascontiguousarray(T[:3, :3])).normalized()
+    return {"position": T[:3, 3].tolist(), "quaternion": quaternion.coeffs().tolist()}
+
+
+def _variation(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
+    """Fields of a request beside its targets, each present in about half of them."""
+    fields: dict[str, Any] = {}
+    if rng.random() < 0.5:
+        mass = float(rng.uniform(0.0, robot.rated_payload))
+        fields["payload"] = {"mass": mass, "com": rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.15]).tolist()}
+    if rng.random() < 0.5:
+        fields["gravity"] = MOUNTS[str(rng.choice(list(MOUNTS)))]
+    if rng.random() < 0.5:
+        fields["limits"] = {
+            "velocity": (robot.limits.v_max * rng.uniform(0.3, 1.0)).tolist(),
+            "acceleration": (robot.limits.a_max * rng.uniform(0.3, 1.0)).tolist(),
+            "jerk": (robot.limits.j_max * rng.uniform(0.3, 1.0)).tolist(),
+        }
+    if rng.random() < 0.3:
+        fields |= {"objective": "mechanical", "duration": {"max": float(rng.uniform(3.0, 6.0))}}
+    elif rng.random() < 0.3:
+        fields["duration"] = float(rng.uniform(1.5, 6.0))
+    if rng.random() < 0.3:
+        fields["windings"] = False
+    return fields
