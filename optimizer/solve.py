@@ -26,7 +26,7 @@ NEAR_TORQUE = 0.5
 # a programme counts as feasible when no row exceeds its limit by more than this share
 FEASIBILITY = 1e-4
 # relative decrease of cost that a further step must promise
-PROGRESS = 2e-5
+PROGRESS = 5e-5
 MAX_ITERATIONS = 60
 BACKTRACKS = 14
 # smallest eigenvalue that the QP's Hessian may have, relative to the largest or to 1, the scale of the cost
