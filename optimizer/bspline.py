@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -88,8 +88,7 @@ class Basis:
     `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, where cost and torque are evaluated;
     `at_nodes` (3, N, n): basis and its first two derivatives there. `at_grid` (3, M, n): first to third derivative on
     a grid fine enough to find the peaks of speed, acceleration and jerk; `anchors` (3, M) marks the few of its points
-    per span that hold each derivative down along a stretch at its limit. `quintic` (n,): the control values of the
-    rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which the space contains.
+    per span that hold each derivative down along a stretch at its limit.
     """
 
     knots: Array
@@ -98,17 +97,23 @@ class Basis:
     at_nodes: Array
     at_grid: Array
     anchors: npt.NDArray[np.bool_]
-    quintic: Array
 
     @property
     def n(self) -> int:
         """Number of control points."""
-        return len(self.quintic)
+        return len(self.knots) - DEGREE - 1
 
     @property
     def free(self) -> slice:
         """The control points that rest at the ends leaves free."""
         return slice(REST_POINTS, self.n - REST_POINTS)
+
+    @cached_property
+    def quintic(self) -> Array:
+        """Control values (n,) of the rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which every such space contains."""
+        x = greville(self.knots)
+        values = x**3 * (10 - 15 * x + 6 * x**2)
+        return np.asarray(np.linalg.solve(basis_matrix(self.knots, x), values), dtype=float)
 
     @staticmethod
     def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
@@ -120,8 +125,6 @@ class Basis:
         per_span = 4 * max(math.ceil(grid_points / spans / 4), 4)
         grid = (edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)).ravel()
         step = np.arange(len(grid)) % (per_span + 1)
-        x = greville(knots)
-        quintic = x**3 * (10 - 15 * x + 6 * x**2)
         return Basis(
             knots=knots,
             nodes=nodes,
@@ -129,7 +132,6 @@ class Basis:
             at_nodes=np.stack([basis_matrix(knots, nodes, d) for d in range(3)]),
             at_grid=np.stack([basis_matrix(knots, grid, d) for d in range(1, 4)]),
             anchors=np.stack([step % (per_span // parts) == 0 for parts in ANCHORS]),
-            quintic=np.asarray(np.linalg.solve(basis_matrix(knots, x), quintic), dtype=float),
         )
 
 
