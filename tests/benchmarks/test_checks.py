@@ -1,0 +1,114 @@
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import orjson
+import pytest
+
+from app.convert import to_problem, to_response
+from app.schemas.request import OptimizeRequest
+from benchmarks.checks import allowed, beats, faults
+from benchmarks.motion import SplineMotion, replay
+from benchmarks.tasks import Ask, ask
+from optimizer.optimize import optimize
+
+Json = dict[str, Any]
+ENERGY_ERROR = 1e-4  # relative, between Simpson's rule on 1 ms and the optimiser's quadrature
+RATIO_ERROR = 2e-3  # between the certificate's grid and this one
+
+
+@pytest.fixture(scope="module")
+def task() -> Ask:
+    return ask(0, 0)
+
+
+@pytest.fixture(scope="module")
+def answered(task: Ask) -> Json:
+    request = OptimizeRequest.model_validate(task.body)
+    content = to_response(request, "id", optimize(to_problem(request, 10.0)))
+    answer: Json = orjson.loads(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
+    return answer
+
+
+def found(task: Ask, answer: Json) -> list[str]:
+    return faults(task.body, answer, task.T_start, task.T_goal)
+
+
+def test_nothing_is_wrong_with_an_answer(task: Ask, answered: Json) -> None:
+    assert found(task, answered) == []
+
+
+def shift_goal(answer: Json) -> None:
+    answer["trajectory"]["spline"]["control_points"][-1][0] += 1e-5
+
+
+def hurry(answer: Json) -> None:
+    knots = answer["trajectory"]["spline"]["knots"]
+    answer["trajectory"]["spline"]["knots"] = [0.9 * knot for knot in knots]
+    answer["duration"] *= 0.9
+
+
+def lose_energy(answer: Json) -> None:
+    answer["energy"]["electrical"]["friction"] *= 0.9
+
+
+def boast(answer: Json) -> None:
+    answer["energy"]["lower_bound"] = 1.1 * answer["energy"]["electrical"]["total"]
+
+
+def break_a_limit(answer: Json) -> None:
+    answer["certificate"]["worst_ratio"]["jerk"] = 1.001
+
+
+def forget_a_limit(answer: Json) -> None:
+    answer["certificate"]["worst_ratio"]["torque"] = None
+
+
+def miss_the_start(answer: Json) -> None:
+    answer["certificate"]["start_error"]["rotation"] = 1e-5
+
+
+def be_beaten(answer: Json) -> None:
+    baseline = answer["baselines"][1]
+    baseline |= {"within_limits": True, "electrical": 0.99 * answer["energy"]["electrical"]["total"]}
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [shift_goal, hurry, lose_energy, boast, break_a_limit, forget_a_limit, miss_the_start, be_beaten],
+)
+def test_what_is_wrong_is_found(task: Ask, answered: Json, spoil: Callable[[Json], None]) -> None:
+    answer = copy.deepcopy(answered)
+    spoil(answer)
+    assert found(task, answer)
+
+
+def test_a_baseline_of_a_duration_that_was_not_allowed_does_not_count(answered: Json) -> None:
+    answer = copy.deepcopy(answered)
+    be_beaten(answer)
+    baseline = answer["baselines"][1]
+    assert beats({"duration": answer["duration"]}, answer, baseline)
+    baseline["duration"] = 2 * answer["duration"]
+    assert beats({}, answer, baseline)
+    assert not beats({"duration": answer["duration"]}, answer, baseline)
+    assert not beats({"duration": {"max": 1.5 * answer["duration"]}}, answer, baseline)
+
+
+def test_allowed_durations() -> None:
+    assert allowed(None) == (0.0, np.inf)
+    assert allowed({"max": 3.0}) == (0.0, 3.0)
+    assert allowed(2.0) == (2.0, 2.0)
+
+
+def test_replay_agrees_with_the_certificate(task: Ask, answered: Json) -> None:
+    spline = answered["trajectory"]["spline"]
+    points = np.array(spline["control_points"])
+    problem = to_problem(OptimizeRequest.model_validate(task.body), 10.0)
+    motion = replay(problem, SplineMotion(np.array(spline["knots"]), points, spline["degree"]), points[0], points[-1])
+    assert motion.end_error == 0
+    assert motion.energy.electrical.total == pytest.approx(answered["energy"]["electrical"]["total"], rel=ENERGY_ERROR)
+    for name, ratio in answered["certificate"]["worst_ratio"].items():
+        assert motion.shares[name] == pytest.approx(ratio, abs=RATIO_ERROR)

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from app.convert import to_problem
+from app.schemas.request import OptimizeRequest
+from benchmarks.chains import chain
+from benchmarks.figures import Spread, exponent
+from benchmarks.tasks import KINDS, ask, asks, flange, move, moves
+from models.registry import load_robot
+from models.robot import Robot
+from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.kernel import Kernel, build
+from optimizer.motion import Task
+from optimizer.problem import Problem
+
+POSE_ERROR = 1e-12  # rounding of a few products of rotations
+TORQUE_ERROR = 1e-9  # N·m
+
+
+@pytest.fixture
+def robot() -> Robot:
+    return load_robot("ur5e")
+
+
+def test_a_task_is_its_seed_and_index() -> None:
+    again = list(moves(3, 4))[2]
+    assert np.array_equal(move(3, 2).q_start, again.q_start) and np.array_equal(move(3, 2).q_goal, again.q_goal)
+    assert ask(3, 2).body == list(asks(3, 4))[2].body
+    assert ask(3, 2).body != ask(3, 3).body != ask(4, 3).body
+
+
+def test_moves_are_within_one_turn_and_the_limits(robot: Robot) -> None:
+    q = np.array([end for task in moves(0, 200) for end in (task.q_start, task.q_goal)])
+    assert (q >= robot.limits.q_min).all() and (q <= robot.limits.q_max).all() and np.abs(q).max() <= np.pi
+    # drawn evenly: both halves of every joint's range, and its outer tenths, are reached
+    assert (q.min(axis=0) < -0.9 * np.pi).all() and (q.max(axis=0) > 0.9 * np.pi).all()
+
+
+@pytest.mark.parametrize("index", range(20))
+def test_requests_are_valid_and_reachable(robot: Robot, index: int) -> None:
+    task = ask(0, index)
+    assert task.kind == KINDS[index % 2]
+    problem = to_problem(OptimizeRequest.model_validate(task.body), 10.0)
+    for target, T in ((problem.start, task.T_start), (problem.goal, task.T_goal)):
+        reached = flange(robot, target) if isinstance(target, np.ndarray) else target.T
+        assert np.abs(reached - T).max() < POSE_ERROR
+        assert inverse_kinematics_for(robot).branches(T)
+
+
+@pytest.mark.parametrize("index", range(40))
+def test_varied_requests_are_valid(index: int) -> None:
+    OptimizeRequest.model_validate(ask(0, index, varied=True).body)
+
+
+@pytest.mark.parametrize("joints", range(2, 8))
+def test_chains_move_as_pinocchio_says(robot: Robot, joints: int) -> None:
+    arm = chain(robot, joints)
+    assert arm.nq == joints and arm.limits.v_max.shape == arm.friction.coulomb.shape == (joints,)
+    kernel = Kernel(arm, build(arm), compiled=False)
+    q, v, a = np.random.default_rng(joints).normal(size=(3, 5, joints))
+    task = Task(Problem(np.zeros(joints), np.zeros(joints), arm))
+    tau = kernel.torque(q, v, a, task.objective_parameters)
+    data = task.model.createData()
+    for k in range(5):
+        assert np.abs(pin.rnea(task.model, data, q[k], v[k], a[k]) - tau[k]).max() < TORQUE_ERROR
+
+
+def test_a_chain_of_all_joints_is_the_robot(robot: Robot) -> None:
+    q = np.linspace(-1, 1, robot.nq)
+    assert np.array_equal(flange(chain(robot, robot.nq), q), flange(robot, q))
+
+
+def test_exponent_and_spread() -> None:
+    x = np.array([8.0, 13.0, 32.0])
+    assert exponent(x, 3 * x**2.5) == pytest.approx(2.5)
+    spread = Spread.of([1.0, 2.0, 3.0, 4.0, 10.0])
+    assert (spread.count, spread.least, spread.p50, spread.most) == (5, 1.0, 3.0, 10.0)
+    assert spread.times(1e3).p50 == 3000.0 and spread.times(1e3).count == 5
+    assert Spread.of([]).count == 0
