@@ -244,8 +244,13 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
 
 
 def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
-    """Ruckig's motion without loss: a spline with threefold knots wherever the jerk of a joint jumps."""
+    """Ruckig's motion without loss: a spline with threefold knots wherever the jerk of a joint jumps.
+
+    Between equal configurations, which takes Ruckig no time at all, it stands still for a second.
+    """
     found = _ruckig(limits, q_start, q_goal)
+    if found.duration == 0:
+        return Spline(bspline.DEGREE, bspline.clamped(np.array([0.0, 1.0])), np.tile(q_start, (bspline.DEGREE + 1, 1)))
     breaks = _breaks(found)
     inner = breaks[1:-1][np.diff(breaks[:-1]) > CLOSEST_BREAKS]
     knots = bspline.clamped(np.concatenate([[0.0], np.repeat(inner, 3), [1.0]]))

@@ -161,6 +161,7 @@ class _Solver:
             for _ in range(BACKTRACKS):
                 trial = free + alpha * dx[: self.count].reshape(free.shape)
                 trial_T = T + alpha * float(dx[-1]) * time_scale if self.free_time else T
+                trial_T = min(max(trial_T, p.t_min), p.t_max)  # rounding must not leave the bounds
                 trial_cost, trial_tau = p.value(trial, trial_T)
                 trial_kin = p.kinematics(trial)
                 trial_violation = self.violations(trial_kin, trial_T, trial_tau)

@@ -99,9 +99,12 @@ def test_every_motion_is_what_it_says(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_durations(name: str) -> None:
-    own = {"ruckig": time_optimal, "controller_default": controller_default}
+    own = {
+        "ruckig": time_optimal(problem().active_limits, START, GOAL).duration,
+        "controller_default": controller_default(problem(), START, GOAL).duration,
+    }
     motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
-    expected = own[name](problem(), START, GOAL).duration if name in own else DURATION
+    expected = own.get(name, DURATION)
     assert motion.duration == pytest.approx(expected, rel=EXACT)
 
 

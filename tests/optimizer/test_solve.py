@@ -25,11 +25,11 @@ from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, li
 # of the limit, and costs bend little with limits
 PEER = 5e-4
 # relative; what IPOPT may still find from where the optimiser stopped: along the flat valleys of mechanical energy a
-# step that promises less than 3e-6 may be the first of a long way
+# step that promises less than 5e-5 may be the first of a long way
 REST = 1e-3
 # share of the cost per greatest travel, or per doubling of the time, that no multiplier accounts for; the solver stops
-# where a further step promises 3e-6 of the cost: with a curvature of the cost of h, where (2 h · 3e-6)^½ is left, and h
-# reaches some hundreds
+# where a further step promises 5e-5 of the cost: with a curvature h of the cost, (2 h · 5e-5)^½ may be left, and h is
+# of order 10 along the softest directions
 STATIONARY = 0.05
 SAME = 1e-4  # relative; cost at one optimum reached along different ways
 GRID = 1e-3  # relative; a rate's peak between the points of the grid
