@@ -118,6 +118,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "identity": max((o.identity for o in solved), default=0.0),
         "gap": Spread.of([o.gap for o in solved]),
         "gaps": {kind: Spread.of([o.gap for o in solved if o.task.kind == kind]) for kind in KINDS},
+        "loosest": max(solved, key=lambda o: o.gap).name if solved else "",
         "wall": {kind: Spread.of([o.wall for o in solved if o.task.kind == kind]) for kind in KINDS},
         "slowest": max(outcomes, key=lambda o: o.wall).name if outcomes else "",
         "candidates": Spread.of([o.candidates for o in solved]),
@@ -149,7 +150,10 @@ def tell(figures: dict[str, Any]) -> None:
     for line in figures["refused"][:20]:
         print(f"    {line}")
     print(f"energy identity, worst                 {figures['identity']:.1e} of the total")
-    print(f"proven gap                             p50 {figures['gap'].p50:.1%}, p90 {figures['gap'].p90:.1%}")
+    gap = figures["gap"]
+    print(
+        f"proven gap                             p50 {gap.p50:.1%}, p90 {gap.p90:.1%}, widest in {figures['loosest']}"
+    )
     for kind, gap in figures["gaps"].items():
         print(f"    {kind:14s}                     p50 {gap.p50:.1%}, p90 {gap.p90:.1%}, most {gap.most:.1%}")
     for kind, wall in figures["wall"].items():
