@@ -104,7 +104,7 @@ def breakdown(
             copper=float(per_joint.copper.sum()),
             inverter=float(per_joint.inverter.sum()),
             braking=surplus,
-            recovered=-electronics.regeneration * surplus,
+            recovered=0.0 - electronics.regeneration * surplus,  # not -0.0
         ),
         mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),
         per_joint=per_joint,
