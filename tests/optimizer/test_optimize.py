@@ -145,6 +145,23 @@ def test_mechanical_answers_are_true(name: str, method: str) -> None:
         solved(task)
 
 
+SHORT: dict[str, dict[str, Any]] = {
+    "electrical": {},
+    "at least 1.4 s": {"duration_min": 1.4},
+    "mechanical": {"objective": "mechanical", "duration_max": 0.5},
+    "mechanical, loaded": {"objective": "mechanical", "duration_max": 3.0, "payload": PAYLOAD},
+}
+
+
+@pytest.mark.parametrize("name", list(SHORT))
+def test_short_moves_are_not_beaten(name: str) -> None:
+    """Of a milliradian to some hundredths: so slow that friction's reversal, which is smoothed, is all of the way."""
+    rng = np.random.default_rng(44)
+    for size in (1e-3, 3e-3, 1e-2, 3e-2):
+        start = rng.uniform(-np.pi, np.pi, 6)
+        solved(problem(start, np.clip(start + size * rng.normal(size=6), -np.pi, np.pi), **SHORT[name]))
+
+
 def pairs() -> Iterator[tuple[Problem, Problem]]:
     """Problems that differ in the method only, the second in the first's duration and between the same joints."""
     for k, (start, goal) in enumerate(random_moves(42, 6)):
