@@ -76,7 +76,7 @@ def main() -> int:
     figures = {name: run(name, given.share) if name in given.only else stored(name) for name in SECTIONS}
     took = time.perf_counter() - began
     report.write(given.output, machine, figures, took, whole=len(given.only) == len(SECTIONS))
-    broken = [name for name, found in figures.items() if found is None]
+    broken = [name for name in given.only if figures[name] is None]
     print(f"{given.output} written after {took:.0f} s" + (f"; without figures: {', '.join(broken)}" if broken else ""))
     return 1 if broken else 0
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from benchmarks.command import keep, on_one_core, parser
 from benchmarks.figures import Spread
-from benchmarks.reference import fingerprint, load
+from benchmarks.reference import FILE, fingerprint, load
 from benchmarks.tasks import move
 from models.registry import load_robot
 from optimizer.exceptions import JoulepathError
@@ -19,11 +20,12 @@ def main() -> None:
     """Answer every task that has a reference, and compare."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
+    arguments.add_argument("--reference", type=Path, default=FILE, help="the stored references (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
     compile_kernel(robot)
-    reference = load()
+    reference = load(given.reference)
     if reference["fingerprint"] != fingerprint(robot):
         raise SystemExit("The robot's figures have changed: renew the references by python -m benchmarks.reference")
     rows: list[dict[str, Any]] = []

@@ -113,17 +113,17 @@ def _starts(found: Figures) -> list[list[str]]:
         [
             "first request after a start, warm cache",
             "≤ 1 s",
-            f"{warm['first_after_ready']:.2f} s",
+            f"{warm['first_after_ready']:.2f} s once ready",
             verdict(warm["first_after_ready"] <= 1.0),
-            f"ready {warm['start_to_ready']:.1f} s after the start of the process; a request sent at once is answered "
-            f"{warm['start_to_answer']:.1f} s after it",
+            f"ready {warm['start_to_ready']:.1f} s after the start of the process; a request sent before that is "
+            f"answered {warm['start_to_answer']:.1f} s after the start",
         ],
         [
             "first request after a start, cold cache (nothing compiled)",
             "≤ 20 s, answered meanwhile",
-            f"{cold['start_to_answer']:.1f} s",
+            f"{cold['start_to_answer']:.1f} s from the start of the process",
             verdict(cold["start_to_answer"] <= 20.0 and cold["all_answered"]),
-            f"from the start of the process; compiled {_seconds(cold['compiled_after'])} after it, until then "
+            f"compiled {_seconds(cold['compiled_after'])} after the start, until then "
             f"{cold['answered_meanwhile']} requests answered, {ms(meanwhile)}; then {ms(cold['wall_afterwards'])}",
         ],
     ]
