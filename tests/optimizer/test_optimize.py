@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,6 +24,7 @@ from optimizer.exceptions import (
     DurationTooShort,
     InvalidProblem,
     JoulepathError,
+    NoTrajectory,
     SingularPose,
     TorqueInfeasible,
     UnreachablePose,
@@ -31,7 +33,8 @@ from optimizer.kernel import compile_kernel
 from optimizer.optimize import optimize
 from optimizer.problem import BranchFilter, Payload, Pose, Problem
 from optimizer.profile import shortest_duration
-from optimizer.solution import Solution
+from optimizer.solution import Certificate, Solution
+from optimizer.verify import certify
 from tests.optimizer.moves import (
     CEILING,
     GOAL,
@@ -339,6 +342,33 @@ def test_poses_out_of_reach_or_singular_are_refused() -> None:
     with pytest.raises(SingularPose) as singular:
         optimize(problem(start=tcp_pose(np.zeros(6))))  # stretched out: at the border of what can be reached
     assert singular.value.target == "start"
+
+
+@pytest.mark.parametrize("refused", ["all", "the first"])
+def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refused: str) -> None:
+    """A motion that its certificate does not confirm costs the candidate its place, and the next best takes it."""
+    judged: list[Array] = []
+    spoilt: set[tuple[float, ...]] = set()
+
+    def judge(task: Problem, motion: Any, q_start: Array, q_goal: Array, energy: Any) -> Certificate:
+        honest = certify(task, motion, q_start, q_goal, energy)
+        if refused == "all" or not spoilt or tuple(q_goal) in spoilt:
+            judged.append(q_goal)
+            spoilt.add(tuple(q_goal))
+            return replace(honest, worst_ratio=honest.worst_ratio | {"torque": 1.01})
+        return honest
+
+    # by its module, since the package gives the name to the function
+    monkeypatch.setattr(sys.modules["optimizer.optimize"], "certify", judge)
+    task = problem(goal=tcp_pose(GOAL), windings=False)
+    if refused == "the first":
+        solution = solved(task)
+        assert tuple(solution.goal.q) not in spoilt and solution.status == "feasible"
+        return
+    with pytest.raises(NoTrajectory) as refusal:
+        optimize(task)
+    assert any("certificate" in each.reason for each in refusal.value.candidates)
+    assert all(each.energy is None for each in refusal.value.candidates)
 
 
 # --- special motions ---

@@ -98,6 +98,26 @@ def test_between_poses_relative_travels_are_distinct() -> None:
 
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
+def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
+    """Each joint's travels, branch by branch: all of less than a full turn that the limits allow."""
+    task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
+    found: dict[tuple[str, str], list[Entry]] = {}
+    for entry in entries(task):
+        found.setdefault((entry.start.label, entry.goal.label), []).append(entry)
+    for group in found.values():
+        travels = np.array([entry.q_goal - entry.q_start for entry in group])
+        for j in range(6):
+            turns = TURN * np.arange(-2, 3)
+            inside = [
+                [q for q in each[j] + turns if own.q_min[j] <= q <= own.q_max[j]]
+                for each in (group[0].q_start, group[0].q_goal)
+            ]
+            possible = {round(b - a, 6) for a, b in product(*inside) if abs(b - a) < TURN - SAME}
+            assert possible <= {round(travel, 6) for travel in travels[:, j].tolist()}
+        assert len(travels) == np.prod([len(set(np.round(travels[:, j], 6).tolist())) for j in range(6)])
+
+
+@pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_nothing_that_may_be_best_is_missing(own: Any) -> None:
     """Every pair of configurations has a candidate of its own travel, or one that ends alike and travels no further."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
