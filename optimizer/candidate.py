@@ -108,8 +108,12 @@ class Solver:
         if law.duration_bound > self.t_max:
             return Attempt("infeasible", f"the straight line takes at least {law.duration_bound:.4f} s")
         self.t_min = max(self.t_min, law.duration_bound)
-        space = self.in_haste().space
-        return self.improve(Guess(space, law.fractions(space.knots)[:, None], self.t_min))
+        line = self.coordinates
+        space = self.graded(float(profile.shortest_duration(line.goal - line.start, line.limits)), EXACT)
+        # toppra's law jumps in acceleration: few control points round that off before many follow it
+        coarse = bspline.uniform(COARSE).knots
+        points = bspline.refit(law.fractions(coarse)[:, None], coarse, space.knots)
+        return self.improve(Guess(space, points, self.t_min))
 
     def improve(self, guess: Guess) -> Attempt:
         """Optimise from a guess, tightening the limits where the motion breaks them between the nodes."""

@@ -20,14 +20,14 @@ from optimizer.motion import Task
 
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
-GRID = np.linspace(0.0, 1.0, 61)
+GRID = np.linspace(0.0, 1.0, 41)
 # share of toppra's duration that counts as proven: its constraints hold at the grid points only
 TRUST = 0.98
 
 
 @dataclass(frozen=True)
 class ShortestLaw:
-    """Fractions of the line GRID (61,) reached at `times` (61,) [s], from rest to rest."""
+    """Fractions of the line GRID (41,) reached at `times` (41,) [s], from rest to rest."""
 
     times: Array
 
