@@ -161,7 +161,8 @@ def draw(peers: Peers, path: Path) -> None:
         )  # fmt: skip
     axes.set(xscale="log", xlabel="time to compute [ms]", ylabel="energy above the best motion found [%]")
     axes.set_yscale("symlog", linthresh=1)
-    axes.set_yticks([0, 0.5, 1, 2, 5, 10, 20], ["0", "0.5", "1", "2", "5", "10", "20"])
+    ticks = (-1, -0.5, 0, 0.5, 1, 2, 5, 10, 20)
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.grid(alpha=0.3)
     axes.spines[["right", "top"]].set_visible(False)
     handles, labels = axes.get_legend_handles_labels()
