@@ -346,24 +346,21 @@ def test_poses_out_of_reach_or_singular_are_refused() -> None:
 
 @pytest.mark.parametrize("refused", ["all", "the first"])
 def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refused: str) -> None:
-    """A motion that its certificate does not confirm costs the candidate its place, and the next best takes it."""
-    judged: list[Array] = []
-    spoilt: set[tuple[float, ...]] = set()
+    """A motion that its certificate does not confirm is not the answer; what it had ruled out may be."""
+    judged = []
 
-    def judge(task: Problem, motion: Any, q_start: Array, q_goal: Array, energy: Any) -> Certificate:
-        honest = certify(task, motion, q_start, q_goal, energy)
-        if refused == "all" or not spoilt or tuple(q_goal) in spoilt:
-            judged.append(q_goal)
-            spoilt.add(tuple(q_goal))
+    def judge(*given: Any) -> Certificate:
+        judged.append(given)
+        honest = certify(*given)
+        if refused == "all" or len(judged) == 1:
             return replace(honest, worst_ratio=honest.worst_ratio | {"torque": 1.01})
         return honest
 
     # by its module, since the package gives the name to the function
     monkeypatch.setattr(sys.modules["optimizer.optimize"], "certify", judge)
-    task = problem(goal=tcp_pose(GOAL), windings=False)
+    task = problem(goal=tcp_pose(GOAL), windings=False, deadline=5.0)
     if refused == "the first":
-        solution = solved(task)
-        assert tuple(solution.goal.q) not in spoilt and solution.status == "feasible"
+        assert optimize(task).certificate.valid and len(judged) > 1
         return
     with pytest.raises(NoTrajectory) as refusal:
         optimize(task)
