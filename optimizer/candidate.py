@@ -28,6 +28,8 @@ MARGIN = 2 * FEASIBILITY
 # times that limits are tightened where the motion breaks them between the nodes, and by how much beyond the excess
 REPAIRS = 6
 REPAIR_MARGIN = 2e-4
+# torque is tightened by this multiple of its excess: the peak that is held down between two nodes comes up beside them
+TORQUE_REPAIR = 1.5
 # a motion is slowed by at most this factor in place of another solve
 MOST_STRETCH = 1 + 5e-4
 # first durations tried, in multiples of the shortest that the guess allows
@@ -200,6 +202,7 @@ class Solver:
         if max(float(ratio.max()) for ratio in found.values()) <= held:
             return None
         factors = {name: np.where(r > held, r + REPAIR_MARGIN, 1.0) for name, r in found.items()}
+        factors["tau_max"] = 1 + TORQUE_REPAIR * (factors["tau_max"] - 1)
         return Limits(q_min=limits.q_min, q_max=limits.q_max, **factors)
 
 

@@ -157,12 +157,15 @@ class _Run:
         for repeat in (REFINED, EXACT, None):
             table, q_nearest = self.baselines(best)
             better = [b.name for b in table if b.within_limits and b.saving < -SLACK and self.allows(b.duration)]
-            # a baseline off the straight line is no guess for a motion along it
-            if not better or self.problem.method == "time_scaling":
+            if self.problem.method == "time_scaling":
+                # a baseline off the straight line is no guess for a motion along it
+                better = [name for name in better if name in ("trapezoid", "quintic")]
+            if not better:
                 return table
             entry = next(e for e in self.entries if (e.q_start == best.q_start).all() and (e.q_goal == q_nearest).all())
             if repeat is None:
-                self.adopt(entry, better)
+                if any(name.startswith("ruckig") for name in better):
+                    self.adopt(entry, better)
                 break
             motions = guesses(self.problem, best.q_start, q_nearest, best.duration)
             for name in better:

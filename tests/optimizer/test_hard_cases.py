@@ -64,6 +64,7 @@ CASES = {
     "payload on a tilted mount, low jerk, no spline as fast as ruckig": (1, 83),
     "two joints share the lead, each with switches of its own": (1, 137),
     "jerk peaks between a span's end and the first point looked at": (1, 140),
+    "on the line, torque peaks at a jump of jerk": (7, 21),
     "jerk alone shapes the motion, acceleration stays below its limit": (3, 3),
 }
 
@@ -77,7 +78,8 @@ def test_requests_that_once_failed(seed: int, index: int) -> None:
     assert solution.lower_bound <= energy
     least, most = problem.duration_min or 0.0, problem.duration_max or np.inf
     for baseline in solution.baselines:
-        if baseline.within_limits and least <= baseline.duration <= most:
+        off_line = problem.method == "time_scaling" and baseline.name.startswith("ruckig")
+        if baseline.within_limits and not off_line and least <= baseline.duration <= most:
             assert energy <= baseline.electrical * (1 + QUADRATURE), baseline.name
 
 
