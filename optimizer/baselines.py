@@ -260,6 +260,12 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
     return Spline(bspline.DEGREE, knots * found.duration, points)
 
 
+def quintic_spline(q_start: Array, q_goal: Array, duration: float) -> Spline:
+    """The rest-to-rest quintic as a spline of one span."""
+    knots = bspline.clamped(np.array([0.0, 1.0])) * duration
+    return Spline(bspline.DEGREE, knots, np.repeat([q_start, q_goal], bspline.REST_POINTS, axis=0))
+
+
 def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
     """Where Ruckig's motion is (k, nq) at the shares `at` (k,) of its duration."""
     return _positions(_ruckig(limits, q_start, q_goal), at)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline
 
-from models.robot import Array, FrictionLaw
+from models.robot import Array, FrictionLaw, Limits
 from optimizer import bspline
 from optimizer.energy import breakdown, drawn_power, power_flow
 from optimizer.kernel import Kernel, Parameters, kernel_for
@@ -23,8 +23,8 @@ WIDTH = 0.5
 # what a second costs where the shortest duration is looked for [W]: a hundred times what energy could make up for
 HASTE = 1e4
 # quadrature points per panel for reported energies, the longest panel [s], and how many there are at most
-REPORT_NODES = 16
-LONGEST_PANEL, MOST_PANELS = 0.2, 2000
+REPORT_NODES = 8
+LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 # points per knot span at which peaks of speed, acceleration and jerk are looked for
 RATE_POINTS = 33
 
@@ -125,7 +125,7 @@ class Task:
         duration, period = spline.duration, self.problem.sample_period
         # a remainder below a millionth of a period is rounding, not a sample of its own
         t = np.append(np.arange(int(np.ceil(duration / period - 1e-6))) * period, duration)
-        q, v, a = _sample(spline, t)
+        q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
         robot = self.problem.robot
         flow = power_flow(tau, v, robot.drives, self.friction)
@@ -139,16 +139,17 @@ def spline_of(basis: bspline.Basis, control_points: Array, duration: float) -> S
     return Spline(bspline.DEGREE, basis.knots * duration, control_points)
 
 
-def _sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
+def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
+    """q, v, a (k, nq) at times t (k,)."""
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
     return curve(t), curve(t, 1), curve(t, 2)
 
 
 def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, Array]:
     """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of panels of a knot span at most."""
-    longest = max(LONGEST_PANEL, spline.duration / MOST_PANELS)
+    longest = max(min(LONGEST_PANEL, spline.duration / LEAST_PANELS), spline.duration / MOST_PANELS)
     points, weights = bspline.quadrature(spline.knots, per_panel, longest)
-    return weights, *_sample(spline, points)
+    return weights, *sample(spline, points)
 
 
 def peak_rates(spline: Spline) -> Array:
@@ -173,3 +174,10 @@ def peak_rates(spline: Spline) -> Array:
         vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
         peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=(0, 1)), (top + vertex).max(axis=(0, 1))))
     return np.array(peaks)
+
+
+def slowed(spline: Spline, limits: Limits) -> Spline:
+    """The motion in as much more time as holds the limits on speed, acceleration and jerk: none where it holds them."""
+    rates = peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max])
+    needed = float((rates.max(axis=1) ** (1 / np.arange(1, 4))).max())
+    return spline if needed <= 1 else replace(spline, knots=spline.knots * needed)

@@ -13,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import bspline, search
-from optimizer.baselines import baselines, guesses, nearest, time_optimal_spline
+from optimizer.baselines import baselines, guesses, nearest, quintic_spline, time_optimal_spline
 from optimizer.candidate import COARSE, EXACT, REFINED, Attempt, Guess, Solver
 from optimizer.exceptions import (
     DeadlineExceeded,
@@ -22,7 +22,7 @@ from optimizer.exceptions import (
     NoTrajectory,
 )
 from optimizer.kernel import kernel_for
-from optimizer.motion import Task
+from optimizer.motion import Task, slowed
 from optimizer.problem import Problem
 from optimizer.search import Entry
 from optimizer.solution import Baseline, BaselineName, Branch, Energy, Solution, SolverReport, Spline
@@ -33,6 +33,7 @@ RESERVE_SHARE, RESERVE = 0.2, 0.1
 # a baseline counts as better only beyond the quadrature's own error
 SLACK = 1e-6
 FIT_SAMPLES = 201
+UNCONFIRMED = "the certificate did not confirm it"
 
 
 def optimize(problem: Problem) -> Solution:
@@ -71,7 +72,7 @@ class _Run:
             raise InvalidProblem(
                 "payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg."
             )
-        search.explore(task, self.entries, lambda entry: self.count(self.solver(entry).solve()), self.deadline)
+        self.explore()
         if self.best() is None:
             self.race()
         while (best := self.best()) is not None:
@@ -81,10 +82,20 @@ class _Run:
             answer = self.answer(best, table)
             if answer is not None:
                 return answer
-            best.status, best.reason, best.energy = "failed", "the certificate did not confirm it", None
+            best.status, best.reason, best.energy = "failed", UNCONFIRMED, None
+            best.attempt = None
+            # what was ruled out by its energy may be the best now
+            for entry in self.entries:
+                if entry.status == "pruned":
+                    entry.status, entry.reason = "unvisited", search.UNVISITED
+            self.explore()
         if any(entry.status == "unvisited" for entry in self.entries):
             raise DeadlineExceeded([entry.report() for entry in self.entries])
         raise NoTrajectory([entry.report() for entry in self.entries])
+
+    def explore(self) -> None:
+        """Solve candidates until no bound is below the best."""
+        search.explore(self.task, self.entries, lambda entry: self.count(self.solver(entry).solve()), self.deadline)
 
     def best(self) -> Entry | None:
         """The solved entry of least energy."""
@@ -142,7 +153,7 @@ class _Run:
     def keep(self, entry: Entry, outcome: Attempt, energy: Energy) -> None:
         """Take an outcome as the entry's if it spends less."""
         objective = self.task.objective_of(energy)
-        if entry.energy is None or objective < entry.energy:
+        if entry.reason != UNCONFIRMED and (entry.energy is None or objective < entry.energy):
             entry.attempt, entry.energy, entry.status, entry.reason = outcome, objective, "solved", outcome.reason
 
     def refine(self, entry: Entry) -> None:
@@ -163,9 +174,10 @@ class _Run:
             if not better:
                 return table
             entry = next(e for e in self.entries if (e.q_start == best.q_start).all() and (e.q_goal == q_nearest).all())
+            if entry.reason == UNCONFIRMED:
+                return table
             if repeat is None:
-                if any(name.startswith("ruckig") for name in better):
-                    self.adopt(entry, better)
+                self.adopt(entry, better)
                 break
             motions = guesses(self.problem, best.q_start, q_nearest, best.duration)
             for name in better:
@@ -183,15 +195,25 @@ class _Run:
         return table, nearest(self.problem, best.q_start, q_goals)
 
     def adopt(self, entry: Entry, better: list[BaselineName]) -> None:
-        """A time-optimal motion that no spline tried comes up to is itself the answer."""
-        spline = time_optimal_spline(self.problem.active_limits, entry.q_start, entry.q_goal)
-        if "ruckig" not in better:
-            best = self.best()
-            assert best is not None
-            spline = replace(spline, knots=spline.knots * (best.duration / spline.duration))
-        energy = self.task.energy(spline)
-        if certify(self.problem, spline, entry.q_start, entry.q_goal, energy).valid:
-            self.keep(entry, Attempt("solved", "the time-optimal motion itself", spline=spline), energy)
+        """A baseline that no spline tried comes up to is itself the answer, where a spline can be just that."""
+        best = self.best()
+        assert best is not None
+        fastest = time_optimal_spline(self.problem.active_limits, entry.q_start, entry.q_goal)
+        motions = {
+            "ruckig": fastest,
+            "ruckig_slowed": replace(fastest, knots=fastest.knots * (best.duration / fastest.duration)),
+            "quintic": quintic_spline(entry.q_start, entry.q_goal, best.duration),
+        }
+        for name in better:
+            if name not in motions:
+                continue
+            spline = slowed(motions[name], self.problem.active_limits)
+            energy = self.task.energy(spline)
+            if (
+                self.allows(spline.duration)
+                and certify(self.problem, spline, entry.q_start, entry.q_goal, energy).valid
+            ):
+                self.keep(entry, Attempt("solved", f"the {name} motion itself", spline=spline), energy)
 
     def allows(self, duration: float) -> bool:
         """Whether the request lets a motion take that long."""

@@ -21,6 +21,7 @@ from optimizer.solution import Candidate, CandidateStatus
 FULL_TURN = 2 * np.pi
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
+UNVISITED = "not reached before the deadline"
 PRUNED = "its lower bound is not below the best energy found"
 
 
@@ -45,7 +46,7 @@ class Entry:
     lower_bound: float = 0.0
     shortest: float = 0.0
     status: CandidateStatus = "unvisited"
-    reason: str = "not reached before the deadline"
+    reason: str = UNVISITED
     energy: float | None = None
     attempt: Attempt | None = field(default=None, repr=False)
     holdable: bool = True
@@ -166,7 +167,7 @@ def explore(
     clock: Callable[[], float] = time.perf_counter,
 ) -> Entry | None:
     """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none."""
-    best: Entry | None = None
+    best = min((e for e in entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
     for entry in sorted(entries, key=lambda e: (e.lower_bound, e.shortest)):
         if entry.status != "unvisited":
             continue

@@ -169,12 +169,14 @@ class Certificate:
 
 @dataclass(frozen=True)
 class SolverReport:
-    """Cost of the answer: wall time [s], iterations and programmes solved over all candidates, final stationarity."""
+    """Cost of the answer: wall time [s], iterations and programmes solved over all candidates, and the
+    largest component of the Lagrangian's gradient, as a share of the cost per rad (None for a baseline's motion).
+    """
 
     wall_time: float
     iterations: int
     nlp_solves: int
-    stationarity: float
+    stationarity: float | None
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,8 @@ _ACTIVE, _SOFT = 1, 8
 class Result:
     """Where the SQP ended: free control points (m, r), duration [s], cost [J], torque multipliers (N, nq).
 
-    `violation` is the worst share by which a row exceeds its limit, `stationarity` the norm of the Lagrangian's
-    gradient over that of the cost, at the last step.
+    `violation` is the worst share by which a row exceeds its limit, `stationarity` the largest component of the
+    Lagrangian's gradient at the last step, as a share of the cost per radian (or per first duration).
     """
 
     status: Status
@@ -150,7 +150,7 @@ class _Solver:
             Hdx = H @ dx
             slope = float(g @ dx)
             promised = -slope - 0.5 * float(dx @ Hdx)
-            stationarity = float(np.abs(Hdx).max() / max(np.abs(g).max(), 1e-12))
+            stationarity = float(np.abs(Hdx).max())
             worst = float(violation.max())
             if worst < FEASIBILITY and promised < PROGRESS:
                 status = "solved"

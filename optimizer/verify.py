@@ -31,7 +31,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
     model = robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.gravity)
     data = model.createData()
 
-    t = _grid(spline.duration)
+    t = grid(spline.duration)
     curve = BSpline(spline.knots, spline.control_points, spline.degree, extrapolate=False)
     q, v, a, jerk = (np.ascontiguousarray(curve(t, order)) for order in range(4))
     tau = _inverse_dynamics(model, data, q, v, a)
@@ -79,7 +79,7 @@ def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_
     }
 
 
-def _grid(duration: float) -> Array:
+def grid(duration: float) -> Array:
     """Times (k,) [s]: an even number of equal intervals of at most GRID_PERIOD, both ends included."""
     pairs = math.ceil(max(duration / GRID_PERIOD, LEAST_INTERVALS) / 2)
     return np.linspace(0.0, duration, 2 * pairs + 1)

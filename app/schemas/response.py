@@ -169,7 +169,12 @@ class Solver(Response):
     wall_time: float = described("Wall time.", "s", 0.41)
     iterations: int = described("Iterations, over all candidates.", "1", 52)
     nlp_solves: int = described("Nonlinear programmes solved.", "1", 4)
-    stationarity: float = described("Final stationarity of the best candidate.", "1", 1e-8)
+    stationarity: float | None = described(
+        "Largest component of the Lagrangian's gradient at the answer, as a share of the cost. Null where that is "
+        "a baseline's motion.",
+        "1/rad",
+        2e-4,
+    )
 
 
 class OptimizeResponse(Response):
