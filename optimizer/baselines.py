@@ -28,7 +28,9 @@ from optimizer.verify import limit_ratios
 
 RATIO_TOLERANCE = 1e-6  # as the certificate's
 PANELS = 72  # least number of quadrature panels over a motion: error of the energy below 1e-5 of it
-CLOSEST_BREAKS = 1e-7  # share of a motion: jumps of jerk that are nearer to each other are one
+CLOSEST_BREAKS = (
+    1e-5  # share of a motion: nearer jumps of jerk are one, for rounding would make jerk of its own between them
+)
 
 # Gauss-Lobatto points and weights on [0, 1]: exact for polynomials of degree 9, and with a panel's ends among them,
 # where torque peaks when acceleration jumps or bends
