@@ -177,6 +177,8 @@ class Solver:
             cost *= 1 + float(np.maximum(np.abs(tau) / limits.tau_max - 1, 0).max())
             if cost < best:
                 best, chosen = cost, duration
+            elif best < np.inf and duration < programme.t_max:
+                break
         return chosen
 
     def _stretched(self, spline: Spline, excess: Limits) -> Spline:

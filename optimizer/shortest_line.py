@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,14 +22,14 @@ from optimizer.motion import Task
 
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
-GRID = np.linspace(0.0, 1.0, 41)
+GRID = np.linspace(0.0, 1.0, 31)
 # share of toppra's duration that counts as proven: its constraints hold at the grid points only
 TRUST = 0.98
 
 
 @dataclass(frozen=True)
 class ShortestLaw:
-    """Fractions of the line GRID (41,) reached at `times` (41,) [s], from rest to rest."""
+    """Fractions of the line GRID (31,) reached at `times` (31,) [s], from rest to rest."""
 
     times: Array
 
@@ -61,8 +63,7 @@ def shortest_law(task: Task, q_start: Array, q_goal: Array) -> ShortestLaw | Non
     none = np.zeros(len(travel))
     path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([travel, travel]))
     constraints = [
-        constraint.JointVelocityConstraint(np.stack([-limits.v_max, limits.v_max], axis=1)),
-        constraint.JointAccelerationConstraint(np.stack([-limits.a_max, limits.a_max], axis=1)),
+        *_rate_constraints(tuple(limits.v_max.tolist()), tuple(limits.a_max.tolist())),
         constraint.JointTorqueConstraint(torque, np.stack([-tau, tau], axis=1), none),
     ]
     _, speed, _ = algorithm.TOPPRA(constraints, path, gridpoints=GRID).compute_parameterization(0.0, 0.0)
@@ -70,3 +71,13 @@ def shortest_law(task: Task, q_start: Array, q_goal: Array) -> ShortestLaw | Non
         return None
     steps = 2 * np.diff(GRID) / (speed[1:] + speed[:-1])
     return ShortestLaw(np.concatenate([[0.0], np.cumsum(steps)]))
+
+
+@lru_cache(maxsize=32)
+def _rate_constraints(v_max: tuple[float, ...], a_max: tuple[float, ...]) -> tuple[Any, Any]:
+    """toppra's constraints on speed and acceleration: kept, since it prints their limits whenever it makes one."""
+    v, a = np.array(v_max), np.array(a_max)
+    return (
+        constraint.JointVelocityConstraint(np.stack([-v, v], axis=1)),
+        constraint.JointAccelerationConstraint(np.stack([-a, a], axis=1)),
+    )
