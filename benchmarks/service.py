@@ -115,6 +115,8 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
+    # so that a SIGTERM to the benchmark ends the service too, on the way out
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
     with tempfile.TemporaryFile() as log:
         began = time.perf_counter()
