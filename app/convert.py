@@ -14,9 +14,10 @@ from app.schemas.common import QuaternionPose, RpyPose
 from app.schemas.ik import IKRequest
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
+from optimizer.arm import LIMIT_NAMES, Payload, Pose
 from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
-from optimizer.problem import LIMIT_NAMES, BranchFilter, Payload, Pose, Problem
+from optimizer.problem import BranchFilter, Problem
 from optimizer.solution import Candidate, Energy, Solution
 
 
@@ -32,27 +33,34 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
 
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
-    robot = robot_named(request.robot)
     shortest, longest = _duration(request)
     branch = request.branch
     return Problem(
         start=_target(request.start),
         goal=_target(request.goal),
-        robot=robot,
-        T_flange_tcp=to_matrix(request.tcp),
-        payload=_payload(request.payload),
-        gravity=np.array(request.gravity),
+        **arm_fields(request),
         method=request.method,
         objective=request.objective,
         duration_min=shortest,
         duration_max=longest,
-        limits=_limits(request.limits, robot),
-        friction=request.friction,
         branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
         windings=request.windings,
         sample_period=request.sample_period,
         deadline=deadline,
     )
+
+
+def arm_fields(request: asked.ArmRequest) -> dict[str, Any]:
+    """Keyword arguments of an `Arm`. Raises UnknownRobot or InvalidProblem."""
+    robot = robot_named(request.robot)
+    return {
+        "robot": robot,
+        "T_flange_tcp": to_matrix(request.tcp),
+        "payload": _payload(request.payload),
+        "gravity": np.array(request.gravity),
+        "limits": _limits(request.limits, robot),
+        "friction": request.friction,
+    }
 
 
 def to_matrix(pose: PoseSchema) -> Array:

@@ -12,7 +12,8 @@ from benchmarks.motion import SplineMotion, limit_shares
 from benchmarks.tasks import flange
 from models.registry import load_robot
 from models.robot import Array, Limits
-from optimizer.problem import LIMIT_NAMES, Payload, Problem
+from optimizer.arm import LIMIT_NAMES, Payload
+from optimizer.problem import Problem
 
 # as the contract has them
 RATIO, REACH, BALANCE = 1 + 1e-6, 1e-6, 1e-3

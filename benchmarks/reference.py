@@ -128,7 +128,7 @@ def _ipopt(found: Search, moved: Array | None) -> float:
 
 def fingerprint(robot: Robot) -> str:
     """Hash of the figures that energies and limits depend on: references hold for these alone."""
-    task = Task(Problem(np.zeros(robot.nq), np.zeros(robot.nq), robot))
+    task = Task(Problem(np.zeros(robot.nq), np.zeros(robot.nq), robot=robot))
     limits = task.problem.active_limits
     # without the last two, which smooth what the solver sees and do not touch exact energies
     parts = [task.objective_parameters[:-2], limits.v_max, limits.a_max, limits.j_max, limits.tau_max]

@@ -16,13 +16,14 @@ from benchmarks.tasks import ask, move, moves
 from models.registry import load_robot
 from models.robot import Array, Robot
 from optimizer import bspline
+from optimizer.arm import Pose
 from optimizer.candidate import Guess, Solver
 from optimizer.exceptions import JoulepathError
 from optimizer.inverse_kinematics import inverse_kinematics_for
 from optimizer.kernel import compile_kernel
 from optimizer.motion import Task
 from optimizer.optimize import optimize, warm_up
-from optimizer.problem import BranchFilter, Pose, Problem
+from optimizer.problem import BranchFilter, Problem
 
 CONTROL_POINTS = (8, 10, 13, 16, 20, 24, 28, 32)
 JOINTS = (2, 3, 4, 5, 6, 7)
@@ -58,7 +59,7 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
         walls, iterations, solved = [], [], 0
         for task in (move(seed, 0, robot), *moves(seed, count, robot)):
             began = time.perf_counter()
-            problem = Problem(task.q_start, task.q_goal, robot)
+            problem = Problem(task.q_start, task.q_goal, robot=robot)
             outcome = Solver(Task(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
@@ -85,7 +86,7 @@ def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
             branch = _branch(robot, task.T_goal) if one_branch else None
             began = time.perf_counter()
             try:
-                solution = optimize(Problem(q_start, goal, robot, branch=branch, windings=windings))
+                solution = optimize(Problem(q_start, goal, robot=robot, branch=branch, windings=windings))
             except JoulepathError:
                 continue
             walls.append(time.perf_counter() - began)

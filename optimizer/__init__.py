@@ -3,6 +3,7 @@
 The names below are the public ones; robots and their figures are in `models`.
 """
 
+from optimizer.arm import Payload, Pose
 from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
@@ -16,7 +17,7 @@ from optimizer.exceptions import (
     UnreachablePose,
 )
 from optimizer.optimize import optimize
-from optimizer.problem import BranchFilter, Payload, Pose, Problem
+from optimizer.problem import BranchFilter, Problem
 from optimizer.solution import Solution
 
 __all__ = [

@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from models.robot import Array, FrictionLaw, Limits
 from optimizer import bspline
+from optimizer.arm import Arm
 from optimizer.energy import breakdown, drawn_power, power_flow
 from optimizer.kernel import Kernel, Parameters, kernel_for
 from optimizer.problem import Problem
@@ -30,21 +31,21 @@ RATE_POINTS = 33
 
 
 @dataclass(frozen=True)
-class Task:
-    """A problem with its kernel and Pinocchio model: shared by all candidates of one request."""
+class Plant:
+    """An arm with its kernel and Pinocchio model."""
 
-    problem: Problem
+    arm: Arm
 
     @cached_property
     def kernel(self) -> Kernel:
         """The robot's compiled functions."""
-        return kernel_for(self.problem.robot)
+        return kernel_for(self.arm.robot)
 
     @cached_property
     def model(self) -> pin.Model:
         """Pinocchio model with payload and gravity."""
-        payload = self.problem.payload
-        return self.problem.robot.loaded_model(payload.mass, payload.com, payload.inertia, self.problem.gravity)
+        payload = self.arm.payload
+        return self.arm.robot.loaded_model(payload.mass, payload.com, payload.inertia, self.arm.gravity)
 
     @cached_property
     def _data(self) -> pin.Data:
@@ -52,14 +53,13 @@ class Task:
 
     def parameters(self, electrical: float = 0.0, mechanical: float = 0.0, time: float = 0.0) -> Array:
         """Packed kernel parameters with the given weights on energies [1] and duration [W]."""
-        problem = self.problem
-        robot, payload, friction = problem.robot, problem.payload, problem.friction_law
+        robot, payload, friction = self.arm.robot, self.arm.payload, self.arm.friction_law
         drives, electronics = robot.drives, robot.electronics
         return Parameters(
             mass=payload.mass,
             com=payload.com,
             inertia=payload.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]],
-            gravity=problem.gravity,
+            gravity=self.arm.gravity,
             rotor_inertia=drives.rotor_inertia,
             coulomb=friction.coulomb,
             curved=friction.curved,
@@ -80,23 +80,18 @@ class Task:
         ).pack()
 
     @cached_property
-    def objective_parameters(self) -> Array:
-        """Parameters of the problem's objective."""
-        return self.parameters(**{self.problem.objective: 1.0})
-
-    @cached_property
-    def fastest_parameters(self) -> Array:
-        """Parameters that make the duration the cost; a little energy beside it conditions the programme."""
-        return self.parameters(electrical=1.0, time=HASTE)
+    def electrical_parameters(self) -> Array:
+        """Parameters with the electrical energy as the cost."""
+        return self.parameters(electrical=1.0)
 
     @property
     def friction(self) -> FrictionLaw:
         """The friction law in force."""
-        return self.problem.friction_law
+        return self.arm.friction_law
 
     def torques(self, q: Array, v: Array, a: Array) -> Array:
         """Rigid body and rotor torques (k, nq) [N·m]."""
-        return self.kernel.torque(q, v, a, self.objective_parameters)
+        return self.kernel.torque(q, v, a, self.electrical_parameters)
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""
@@ -111,27 +106,49 @@ class Task:
             v,
             self.torques(q, v, a),
             self.potential(ends[-1]) - self.potential(ends[0]),
-            self.problem.robot.drives,
+            self.arm.robot.drives,
             self.friction,
-            self.problem.robot.electronics,
+            self.arm.robot.electronics,
         )
 
-    def objective_of(self, energy: Energy) -> float:
-        """The part of an energy that is minimised [J]."""
-        return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total
-
-    def trajectory(self, spline: Spline) -> Trajectory:
-        """Samples at the problem's period; the last one lies on the end."""
-        duration, period = spline.duration, self.problem.sample_period
+    def trajectory(self, spline: Spline, period: float) -> Trajectory:
+        """Samples at a period [s]; the last one lies on the end."""
+        duration = spline.duration
         # a remainder below a millionth of a period is rounding, not a sample of its own
         t = np.append(np.arange(int(np.ceil(duration / period - 1e-6))) * period, duration)
         q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
-        robot = self.problem.robot
+        robot = self.arm.robot
         flow = power_flow(tau, v, robot.drives, self.friction)
         net = robot.electronics.idle_power + robot.electronics.controller_power + flow.joints.sum(axis=1)
         power = drawn_power(net, robot.electronics.regeneration)
         return Trajectory(t, q, v, a, tau, flow.tau_motor, power, spline)
+
+
+@dataclass(frozen=True)
+class Task(Plant):
+    """A problem ready to be worked on: shared by all candidates of one request."""
+
+    arm: Problem
+
+    @property
+    def problem(self) -> Problem:
+        """The problem."""
+        return self.arm
+
+    @cached_property
+    def objective_parameters(self) -> Array:
+        """Parameters of the problem's objective."""
+        return self.parameters(**{self.problem.objective: 1.0})
+
+    @cached_property
+    def fastest_parameters(self) -> Array:
+        """Parameters that make the duration the cost; a little energy beside it conditions the programme."""
+        return self.parameters(electrical=1.0, time=HASTE)
+
+    def objective_of(self, energy: Energy) -> float:
+        """The part of an energy that is minimised [J]."""
+        return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total
 
 
 def spline_of(basis: bspline.Basis, control_points: Array, duration: float) -> Spline:

@@ -236,7 +236,7 @@ class _Run:
             status="feasible" if any(e.status != "pruned" for e in open_ends) else "optimal",
             start=Branch(best.start.label, best.q_start),
             goal=Branch(best.goal.label, best.q_goal),
-            trajectory=self.task.trajectory(spline),
+            trajectory=self.task.trajectory(spline, self.problem.sample_period),
             energy=energy,
             lower_bound=min(e.lower_bound for e in self.entries),
             baselines=table,

@@ -10,12 +10,12 @@ from itertools import product
 import numpy as np
 
 from models.robot import Array
+from optimizer.arm import Pose
 from optimizer.bounds import lower_bounds
 from optimizer.candidate import Attempt
 from optimizer.exceptions import TorqueInfeasible, UnreachablePose
 from optimizer.inverse_kinematics import inverse_kinematics_for, turns
 from optimizer.motion import Task
-from optimizer.problem import Pose
 from optimizer.solution import Candidate, CandidateStatus
 
 FULL_TURN = 2 * np.pi

@@ -12,8 +12,9 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 
 from models.robot import Array, Limits
+from optimizer.arm import Pose
 from optimizer.energy import breakdown
-from optimizer.problem import Pose, Problem
+from optimizer.problem import Problem
 from optimizer.solution import Certificate, Energy, Spline
 
 GRID_PERIOD = 1e-3  # s, at most

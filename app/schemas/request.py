@@ -138,18 +138,10 @@ class Branch(Request):
     wrist: Literal["flip", "no_flip"] | None = described("Wrist flipped or not.", None, "no_flip", default=None)
 
 
-class OptimizeRequest(Request):
-    """A motion from rest at `start` to rest at `goal`."""
+class ArmRequest(Request):
+    """What every request about a motion says of the arm."""
 
     robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
-    start: Target = described(
-        "Where the motion starts: joints or a pose.", None, {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}
-    )
-    goal: Target = described(
-        "Where it ends: joints or a pose.",
-        None,
-        {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
-    )
     tcp: Pose = described(
         "Pose of the TCP in the flange frame.",
         None,
@@ -164,6 +156,31 @@ class OptimizeRequest(Request):
         "m/s²",
         [0.0, 0.0, -9.81],
         default=[0.0, 0.0, -9.81],
+    )
+    limits: Limits = described(
+        "Limits to keep besides the robot's own; they may only tighten these.",
+        None,
+        {"velocity": 2.0},
+        default=Limits(),
+    )
+    friction: Annotated[str, Field(min_length=1, max_length=64)] | None = described(
+        "Name of one of the robot's friction laws, from `GET /robots/{name}`. Null: its default.",
+        None,
+        "curved",
+        default=None,
+    )
+
+
+class OptimizeRequest(ArmRequest):
+    """A motion from rest at `start` to rest at `goal`."""
+
+    start: Target = described(
+        "Where the motion starts: joints or a pose.", None, {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}
+    )
+    goal: Target = described(
+        "Where it ends: joints or a pose.",
+        None,
+        {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
     )
     method: Literal["bspline", "time_scaling"] = described(
         "How the motion is parametrised: a free B-spline, or the straight joint-space line with an optimised time law.",
@@ -184,12 +201,6 @@ class OptimizeRequest(Request):
         {"max": 3.0},
         default=None,
     )
-    limits: Limits = described(
-        "Limits to keep besides the robot's own; they may only tighten these.",
-        None,
-        {"velocity": 2.0},
-        default=Limits(),
-    )
     branch: Branch | None = described(
         "Arm configurations to keep to. Null: try them all.",
         None,
@@ -198,12 +209,6 @@ class OptimizeRequest(Request):
     )
     windings: bool = described(
         "Whether to also try goals a full turn away, where the joint range allows.", None, True, default=True
-    )
-    friction: Annotated[str, Field(min_length=1, max_length=64)] | None = described(
-        "Name of one of the robot's friction laws, from `GET /robots/{name}`. Null: its default.",
-        None,
-        "curved",
-        default=None,
     )
     sample_period: float = described(
         "Time between the returned samples; the last sample lies on the end.", "s", 0.008, default=0.008, ge=1e-4, le=1

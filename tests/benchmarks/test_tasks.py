@@ -61,7 +61,7 @@ def test_chains_move_as_pinocchio_says(robot: Robot, joints: int) -> None:
     assert arm.nq == joints and arm.limits.v_max.shape == arm.friction.coulomb.shape == (joints,)
     kernel = Kernel(arm, build(arm), compiled=False)
     q, v, a = np.random.default_rng(joints).normal(size=(3, 5, joints))
-    task = Task(Problem(np.zeros(joints), np.zeros(joints), arm))
+    task = Task(Problem(np.zeros(joints), np.zeros(joints), robot=arm))
     tau = kernel.torque(q, v, a, task.objective_parameters)
     data = task.model.createData()
     for k in range(5):

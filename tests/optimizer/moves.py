@@ -11,7 +11,8 @@ import pinocchio as pin
 
 from models.registry import load_robot
 from models.robot import Array, Limits
-from optimizer.problem import Payload, Pose, Problem
+from optimizer.arm import Payload, Pose
+from optimizer.problem import Problem
 
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])

@@ -15,6 +15,7 @@ import ruckig
 import optimizer.baselines
 from models.registry import load_robot
 from models.robot import Array, Limits
+from optimizer.arm import Payload
 from optimizer.baselines import (
     SampledMotion,
     baselines,
@@ -28,7 +29,7 @@ from optimizer.baselines import (
     trapezoid,
     within_limits,
 )
-from optimizer.problem import Payload, Problem
+from optimizer.problem import Problem
 from optimizer.solution import Baseline
 
 EXACT = 1e-12  # relative; closed forms in double precision

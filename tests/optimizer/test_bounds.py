@@ -12,6 +12,7 @@ from scipy.interpolate import BSpline
 
 from models.robot import Array, Robot
 from optimizer import bspline
+from optimizer.arm import Payload
 from optimizer.baselines import guesses, motion_energy
 from optimizer.bounds import LEAST_DURATION, LONGEST_DURATION, lower_bounds
 from optimizer.bspline import DEGREE
@@ -19,7 +20,7 @@ from optimizer.energy import breakdown
 from optimizer.kernel import compile_kernel
 from optimizer.motion import Task, peak_rates, spline_of
 from optimizer.optimize import optimize
-from optimizer.problem import Payload, Problem
+from optimizer.problem import Problem
 from optimizer.profile import shortest_duration
 from optimizer.solution import Energy
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, fixed, limits, problem

@@ -18,6 +18,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from models.robot import Array
+from optimizer.arm import Payload, Pose
 from optimizer.baselines import saving
 from optimizer.exceptions import (
     DeadlineExceeded,
@@ -31,7 +32,7 @@ from optimizer.exceptions import (
 )
 from optimizer.kernel import compile_kernel
 from optimizer.optimize import optimize
-from optimizer.problem import BranchFilter, Payload, Pose, Problem
+from optimizer.problem import BranchFilter, Problem
 from optimizer.profile import shortest_duration
 from optimizer.solution import Certificate, Solution
 from optimizer.verify import certify

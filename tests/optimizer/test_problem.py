@@ -11,8 +11,9 @@ import pinocchio as pin
 import pytest
 
 from models.robot import Array
+from optimizer.arm import Payload, Pose
 from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem import Payload, Pose, Problem
+from optimizer.problem import Problem
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, tcp_pose
 
 ROTATED = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([0.4, 0.1, 0.5])).homogeneous

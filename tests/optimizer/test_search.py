@@ -11,13 +11,14 @@ import pytest
 
 from models.robot import Array
 from optimizer import search
+from optimizer.arm import Payload
 from optimizer.candidate import Attempt, Solver
 from optimizer.exceptions import TorqueInfeasible, UnreachablePose
 from optimizer.inverse_kinematics import inverse_kinematics_for
 from optimizer.kernel import compile_kernel
 from optimizer.motion import Task
 from optimizer.optimize import optimize
-from optimizer.problem import BranchFilter, Payload, Problem
+from optimizer.problem import BranchFilter, Problem
 from optimizer.search import Entry
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
 

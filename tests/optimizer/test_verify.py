@@ -11,8 +11,9 @@ import pytest
 
 from models.registry import load_robot
 from models.robot import Array
+from optimizer.arm import Payload, Pose
 from optimizer.energy import breakdown
-from optimizer.problem import Payload, Pose, Problem
+from optimizer.problem import Problem
 from optimizer.solution import Certificate, Energy, Spline
 from optimizer.verify import certify
 
