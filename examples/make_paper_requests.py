@@ -48,4 +48,4 @@ def text(request: dict[str, Any]) -> str:
 
 if __name__ == "__main__":
     for name, request in requests().items():
-        (FOLDER / name).write_text(text(request))
+        (FOLDER / "optimize" / name).write_text(text(request))

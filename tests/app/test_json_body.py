@@ -1,4 +1,4 @@
-"""`curl -d @examples/….json` declares its body a form: the service takes it for the JSON that it is."""
+"""`curl -d @examples/optimize/….json` declares its body a form: the service takes it for the JSON that it is."""
 
 from __future__ import annotations
 
