@@ -29,7 +29,8 @@ FROM ${BASE_IMAGE}
 RUN apt-get update \
     && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends libgomp1 python3 \
     && rm -rf /var/lib/apt/lists/* /var/cache/apt/* /var/log/* \
-    && useradd --system --uid 10001 --home-dir /opt/joulepath --no-create-home joulepath
+    && useradd --system --uid 10001 --home-dir /opt/joulepath --no-create-home joulepath \
+    && install --directory --owner=joulepath /var/lib/joulepath
 WORKDIR /opt/joulepath
 COPY --from=build /opt/joulepath .
 # matplotlib, which toppra imports, keeps its cache only where it may write
@@ -39,8 +40,11 @@ ENV PATH=/opt/joulepath/venv/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     JOULEPATH_CACHE_DIR=/opt/joulepath/kernels \
     MPLCONFIGDIR=/opt/matplotlib \
+    JOULEPATH_DATABASE_URL=sqlite:////var/lib/joulepath/joulepath.db \
     PORT=8000
 USER joulepath
+# studies outlast the container where a volume is mounted here
+VOLUME /var/lib/joulepath
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=3s --start-period=30s --retries=3 \
     CMD ["python", "-c", "import os, urllib.request; urllib.request.urlopen(f'http://127.0.0.1:{os.environ[\"PORT\"]}/healthz', timeout=2)"]

@@ -6,6 +6,8 @@ ServiceError
 ├── NotReady            no worker is warm
 ├── ShuttingDown        given up because the service stops
 ├── WorkerDied          its worker process ended under it
+├── StoreUnavailable    the database cannot be reached
+├── UnknownAnswer       no answer is kept under that id
 └── NotFound, MethodNotAllowed, BodyTooLarge
 """
 
@@ -62,6 +64,20 @@ class WorkerDied(ServiceError):
         super().__init__("The process that worked on this request died: report it with the id in `instance`.")
 
 
+class StoreUnavailable(ServiceError):
+    """The database cannot be reached, read or written; the log says why."""
+
+    def __init__(self) -> None:
+        super().__init__("The database does not answer: try again later, or ask whoever runs the service.")
+
+
+class UnknownAnswer(ServiceError):
+    """No answer is kept under that id."""
+
+    def __init__(self) -> None:
+        super().__init__("No answer is kept under this id: send the request that gave it again.")
+
+
 class NotFound(ServiceError):
     """Nothing is at that path."""
 
@@ -101,6 +117,8 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     Busy: problems.Busy,
     NotReady: problems.NotReady,
     ShuttingDown: problems.ShuttingDown,
+    StoreUnavailable: problems.StoreUnavailable,
+    UnknownAnswer: problems.UnknownAnswer,
     NotFound: problems.NotFound,
     MethodNotAllowed: problems.MethodNotAllowed,
     BodyTooLarge: problems.BodyTooLarge,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -14,8 +15,9 @@ from app.documentation import install_openapi
 from app.engine import Engine
 from app.handlers import install_handlers
 from app.json_body import JsonBody
-from app.routes import docs, health, ik, optimize, problems, robots
+from app.routes import answers, docs, health, ik, optimize, problems, robots
 from app.settings import Settings
+from app.store.store import Store
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -25,9 +27,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         app.state.engine = engine = Engine(settings, tasks.warm)
+        app.state.store = store = Store(settings.database_url)
         engine.start()
+        # aside: a database that does not answer holds nobody up who needs none
+        opening = asyncio.create_task(store.open())
         yield
         await engine.stop()
+        await opening
+        await store.close()
 
     app = FastAPI(
         title="joulepath",
@@ -47,6 +54,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(RequestContext)  # added last: the outermost
     install_handlers(app)
     install_openapi(app, settings)
-    for routes in (optimize, ik, robots, health, problems, docs):
+    for routes in (optimize, ik, robots, answers, health, problems, docs):
         app.include_router(routes.router)
     return app

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import Literal
 
 from pydantic import AliasChoices, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+def _default_database() -> str:
+    """A file where the user's programs keep what they remember (XDG base directory specification)."""
+    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
+    return f"sqlite:///{state / 'joulepath' / 'joulepath.db'}"
 
 
 class Settings(BaseSettings):
@@ -34,4 +41,17 @@ class Settings(BaseSettings):
         default=8.0,
         gt=0,
         description="Time that requests in flight have to finish on shutdown [s]; container engines allow 10 s in all.",
+    )
+    database_url: str = Field(
+        default_factory=_default_database,
+        description="Where studies and answers are kept: `sqlite:///<file>` or `postgresql://user:password@host/name`. "
+        "Default: an SQLite file in `$XDG_STATE_HOME/joulepath`, that is `~/.local/state/joulepath`.",
+    )
+    answers_max_bytes: int = Field(
+        default=1 << 29,
+        ge=0,
+        description="Most that the answers of no study may take in the database, compressed [byte]; the oldest go.",
+    )
+    answers_max_age: float = Field(
+        default=30.0, gt=0, le=36500, description="Age at which an answer of no study is dropped [days]."
     )

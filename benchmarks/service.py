@@ -118,7 +118,8 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
     # so that a SIGTERM to the benchmark ends the service too, on the way out
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
-    with tempfile.TemporaryFile() as log:
+    with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
+        given["JOULEPATH_DATABASE_URL"] = f"sqlite:///{folder}/joulepath.db"
         began = time.perf_counter()
         process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=given, stdout=log, stderr=log)
         service = Service(process, port, began, log)

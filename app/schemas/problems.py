@@ -178,6 +178,26 @@ class ShuttingDown(Problem):
     status: Literal[503] = _fixed(503, "status")
 
 
+class StoreUnavailable(Problem):
+    """The database that keeps studies and answers cannot be reached, read or written. What needs none, `/optimize`
+    among it, goes on. Try again after the seconds that the `Retry-After` header gives; the service's log says what is
+    wrong."""
+
+    retry_after: ClassVar[int | None] = 5
+    type: Literal["/problems/store-unavailable"] = _fixed("/problems/store-unavailable", "type")
+    title: Literal["Database unavailable"] = _fixed("Database unavailable", "title")
+    status: Literal[503] = _fixed(503, "status")
+
+
+class UnknownAnswer(Problem):
+    """No answer is kept under that id: it never was, its study was deleted, or it made room for newer ones. Send the
+    request that gave it again."""
+
+    type: Literal["/problems/unknown-answer"] = _fixed("/problems/unknown-answer", "type")
+    title: Literal["Unknown answer"] = _fixed("Unknown answer", "title")
+    status: Literal[404] = _fixed(404, "status")
+
+
 class NotFound(Problem):
     """There is nothing at that path. `GET /openapi.json` lists what there is."""
 
@@ -223,6 +243,8 @@ PROBLEMS: tuple[type[Problem], ...] = (
     Busy,
     NotReady,
     ShuttingDown,
+    StoreUnavailable,
+    UnknownAnswer,
     NotFound,
     MethodNotAllowed,
     BodyTooLarge,

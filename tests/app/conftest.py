@@ -16,6 +16,14 @@ from tests.app.live import Server, serving
 WARM_UP = 60.0
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """No test touches the user's own database."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("JOULEPATH_DATABASE_URL", f"sqlite:///{tmp_path_factory.mktemp('store')}/joulepath.db")
+        yield
+
+
 @pytest.fixture(scope="session")
 def client() -> Iterator[TestClient]:
     """The service in this process, its two workers warm."""

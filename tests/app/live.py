@@ -78,13 +78,14 @@ class Server:
 
 @contextmanager
 def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
-    """A server with these settings, by default waited for until it is warm."""
+    """A server with these settings, by default waited for until it is warm and with an empty database of its own."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
-    environment |= {"JOULEPATH_LOG_LEVEL": "debug", "JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
-    with tempfile.TemporaryFile() as log:
+    with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
+        settings = {"database_url": f"sqlite:///{folder}/joulepath.db", **settings}
+        environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
+        environment |= {"JOULEPATH_LOG_LEVEL": "debug", "JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
         process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=log)
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:

@@ -1,0 +1,113 @@
+"""The tables, as SQLAlchemy maps them. `migrations/` makes them; a test holds the two together."""
+
+from __future__ import annotations
+
+import re
+import uuid
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+# SQLite can alter a constraint only if it has a name
+_NAMES = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_N_name)s",
+    "pk": "pk_%(table_name)s",
+}
+ID_LENGTH = 36
+"""Of a UUID in writing."""
+KEY_LENGTH = 128
+"""Of an `Idempotency-Key`."""
+NAME_LENGTH = 200
+"""Of a study's name."""
+
+
+def now() -> datetime:
+    """The time, in UTC."""
+    return datetime.now(UTC)
+
+
+def new_id() -> str:
+    """A name for a row that no other has."""
+    return str(uuid.uuid4())
+
+
+def is_id(text: str) -> bool:
+    """Whether `new_id` could have made this. PostgreSQL cannot be asked for just any text."""
+    return re.fullmatch(r"[0-9a-f-]{36}", text) is not None
+
+
+class Instant(TypeDecorator[datetime]):
+    """A time in UTC. The database keeps it without its zone, which SQLite would lose anyway."""
+
+    impl = DateTime
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """To the database."""
+        return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """From the database."""
+        return None if value is None else value.replace(tzinfo=UTC)
+
+
+class Table(DeclarativeBase):
+    """Base of the tables."""
+
+    metadata = MetaData(naming_convention=_NAMES)
+
+
+class Study(Table):
+    """A motion that is improved step by step until its energy is at most `threshold` [J]."""
+
+    __tablename__ = "studies"
+    __table_args__ = (Index(None, "created", "id"),)
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    name: Mapped[str] = mapped_column(String(NAME_LENGTH))
+    robot: Mapped[str] = mapped_column(String(64))
+    objective: Mapped[str] = mapped_column(String(32))
+    threshold: Mapped[float]
+    created: Mapped[datetime] = mapped_column(Instant)
+    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
+
+
+class Answer(Table):
+    """An endpoint's whole answer: JSON, compressed. One that belongs to a study goes when its study goes; any other
+    when it is too old, or the oldest of too many."""
+
+    __tablename__ = "answers"
+    # to sum and drop the oldest without reading the bodies
+    __table_args__ = (Index(None, "created", "size"), Index(None, "study_id"))
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(32))
+    created: Mapped[datetime] = mapped_column(Instant)
+    study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
+    size: Mapped[int]
+    """Of the compressed body [byte]."""
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class Iteration(Table):
+    """One step of a study: what was asked and what it came to. The whole answer is in `answers`."""
+
+    __tablename__ = "iterations"
+    __table_args__ = (Index(None, "study_id", "idempotency_key", unique=True),)
+
+    study_id: Mapped[str] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    """1 for the study's first, then counted on without gaps."""
+    kind: Mapped[str] = mapped_column(String(32))
+    """The endpoint that answered: `optimize` or `evaluate`."""
+    created: Mapped[datetime] = mapped_column(Instant)
+    request: Mapped[dict[str, Any]] = mapped_column(JSON)
+    answer_id: Mapped[str] = mapped_column(ForeignKey("answers.id"), unique=True)
+    duration: Mapped[float]
+    electrical: Mapped[float]
+    mechanical: Mapped[float]
+    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH))
