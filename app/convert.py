@@ -18,7 +18,8 @@ from optimizer.arm import LIMIT_NAMES, Payload, Pose
 from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
 from optimizer.problem import BranchFilter, Problem
-from optimizer.solution import Candidate, Energy, Solution
+from optimizer.solution import Candidate, Energy, Solution, UnreachableTarget
+from optimizer.targets import AnyOf, Single, Target
 
 
 def robot_named(name: str) -> Robot:
@@ -36,8 +37,8 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     shortest, longest = _duration(request)
     branch = request.branch
     return Problem(
-        start=_target(request.start),
-        goal=_target(request.goal),
+        start=to_target(request.start),
+        goal=to_target(request.goal),
         **arm_fields(request),
         method=request.method,
         objective=request.objective,
@@ -95,7 +96,14 @@ def _from_rotvec(rotvec: Array) -> Array:
     return _from_quaternion(np.array([*half, math.cos(0.5 * angle)]))
 
 
-def _target(target: asked.Target) -> Array | Pose:
+def to_target(target: asked.Target) -> Target:
+    """The optimizer's target."""
+    if isinstance(target, asked.AnyOfTarget):
+        return AnyOf(tuple(_single(member) for member in target.any_of))
+    return _single(target)
+
+
+def _single(target: asked.JointTarget | asked.PoseTarget) -> Single:
     return np.array(target.q) if isinstance(target, asked.JointTarget) else Pose(to_matrix(target.pose))
 
 
@@ -147,7 +155,7 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "objective": request.objective,
         "duration": solution.duration,
         "status": solution.status,
-        "branch": {end: _fields(getattr(solution, end), "label", "q") for end in ("start", "goal")},
+        "branch": {end: _fields(getattr(solution, end), "label", "q", "target") for end in ("start", "goal")},
         "trajectory": {
             **_fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power"),
             "spline": _fields(trajectory.spline, "degree", "knots", "control_points"),
@@ -163,6 +171,7 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
             for baseline in solution.baselines
         ],
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
+        "unreachable": [unreachable_fields(target) for target in solution.unreachable],
         "certificate": {
             "worst_ratio": certificate.worst_ratio,
             "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
@@ -175,9 +184,13 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
 
 def candidate_fields(candidate: Candidate) -> dict[str, Any]:
     """One entry of `candidates`."""
-    return _fields(
-        candidate, "start", "goal", "q_start", "q_goal", "status", "reason", "lower_bound", "energy", "duration"
-    )
+    ends = ("start", "start_target", "goal", "goal_target", "q_start", "q_goal")
+    return _fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")
+
+
+def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
+    """One entry of `unreachable`."""
+    return _fields(target, "end", "target", "reason")
 
 
 def _energy(energy: Energy) -> dict[str, Any]:

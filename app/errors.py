@@ -19,7 +19,7 @@ from typing import Any
 
 import orjson
 
-from app.convert import candidate_fields
+from app.convert import candidate_fields, unreachable_fields
 from app.schemas import problems
 from optimizer import exceptions as optimizer_errors
 
@@ -110,6 +110,7 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,
+    optimizer_errors.NoReachableTarget: problems.UnreachableTargets,
     optimizer_errors.DurationTooShort: problems.DurationTooShort,
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
     optimizer_errors.NoTrajectory: problems.NoTrajectory,
@@ -160,6 +161,9 @@ def problem_reply(error: Exception, instance: str) -> Reply:
 
 def _own_field(error: Exception, name: str) -> Any:
     if name == "errors" and isinstance(error, optimizer_errors.InvalidProblem):
-        return [{"loc": ["body", *error.field.split(".")], "msg": str(error)}]
+        path = [int(part) if part.isdigit() else part for part in error.field.split(".")]
+        return [{"loc": ["body", *path], "msg": str(error)}]
     value = getattr(error, name)
+    if name == "unreachable":
+        return [unreachable_fields(target) for target in value]
     return [candidate_fields(candidate) for candidate in value] if name == "candidates" else value

@@ -1,4 +1,5 @@
-"""Writes paper_pose_1.json to paper_pose_15.json: from the home of the UR5e paper to each pose of its Table 1.
+"""Writes paper_pose_1.json to paper_pose_15.json: from the home of the UR5e paper to each pose of its Table 1; and
+paper_position_1.json to paper_position_3.json: to any of the five orientations of each position of that table.
 
     python examples/make_paper_requests.py
 
@@ -18,26 +19,29 @@ FOLDER = Path(__file__).parent
 POSES = FOLDER.parent / "tests" / "reference" / "paper_table1_poses.csv"
 # The paper's home, all zeros, in Universal Robots' joint convention [deg].
 HOME = (0, -90, 90, -90, 180, 0)
+# Rows of the table that share a position.
+ORIENTATIONS = 5
 
 
 def requests() -> dict[str, dict[str, Any]]:
     """Requests to `POST /optimize` by file name, in the order of the table."""
-    home = [radians(angle) for angle in HOME]
+    start = {"q": [radians(angle) for angle in HOME]}
     with POSES.open(newline="") as file:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    return {
-        f"paper_pose_{number}.json": {
-            "robot": "ur5e",
-            "start": {"q": home},
-            "goal": {
-                "pose": {
-                    "position": [row["x_m"], row["y_m"], row["z_m"]],
-                    "rpy": [row["roll_rad"], row["pitch_rad"], row["yaw_rad"]],
-                }
-            },
+    goals = [
+        {
+            "pose": {
+                "position": [row["x_m"], row["y_m"], row["z_m"]],
+                "rpy": [row["roll_rad"], row["pitch_rad"], row["yaw_rad"]],
+            }
         }
-        for number, row in enumerate(rows, start=1)
-    }
+        for row in rows
+    ]
+    by_name: dict[str, Any] = {f"paper_pose_{number}.json": goal for number, goal in enumerate(goals, start=1)}
+    positions = range(0, len(goals), ORIENTATIONS)
+    for number, first in enumerate(positions, start=1):
+        by_name[f"paper_position_{number}.json"] = {"any_of": goals[first : first + ORIENTATIONS]}
+    return {name: {"robot": "ur5e", "start": start, "goal": goal} for name, goal in by_name.items()}
 
 
 def text(request: dict[str, Any]) -> str:

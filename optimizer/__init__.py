@@ -9,6 +9,7 @@ from optimizer.exceptions import (
     DurationTooShort,
     InvalidProblem,
     JoulepathError,
+    NoReachableTarget,
     NoTrajectory,
     OutsideLimits,
     SingularPose,
@@ -19,13 +20,16 @@ from optimizer.exceptions import (
 from optimizer.optimize import optimize
 from optimizer.problem import BranchFilter, Problem
 from optimizer.solution import Solution
+from optimizer.targets import AnyOf
 
 __all__ = [
+    "AnyOf",
     "BranchFilter",
     "DeadlineExceeded",
     "DurationTooShort",
     "InvalidProblem",
     "JoulepathError",
+    "NoReachableTarget",
     "NoTrajectory",
     "OutsideLimits",
     "Payload",

@@ -6,6 +6,7 @@ JoulepathError
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
 ├── SingularPose            every solution is singular
+├── NoReachableTarget       none of several targets has a solution
 ├── DurationTooShort
 ├── TorqueInfeasible        the arm cannot hold or move the load
 ├── NoTrajectory            every candidate failed
@@ -18,7 +19,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from optimizer.solution import Candidate
+    from optimizer.solution import Candidate, UnreachableTarget
 
 
 class JoulepathError(Exception):
@@ -83,6 +84,17 @@ class SingularPose(JoulepathError):
             "tilt it by a degree, or give joint angles."
         )
         self.target, self.smallest_singular_value = target, smallest_singular_value
+
+
+class NoReachableTarget(JoulepathError):
+    """None of the start's or goal's targets can be reached; `unreachable` tells why of each."""
+
+    def __init__(self, target: str, unreachable: Sequence[UnreachableTarget]) -> None:
+        super().__init__(
+            f"The arm can go to none of the {target}'s {len(unreachable)} targets: "
+            "do for one of them what its entry in `unreachable` says."
+        )
+        self.target, self.unreachable = target, list(unreachable)
 
 
 class DurationTooShort(JoulepathError):

@@ -25,7 +25,18 @@ from optimizer.kernel import kernel_for
 from optimizer.motion import Task, slowed
 from optimizer.problem import Problem
 from optimizer.search import Entry
-from optimizer.solution import Baseline, BaselineName, Branch, Energy, Solution, SolverReport, Spline
+from optimizer.solution import (
+    Baseline,
+    BaselineName,
+    Branch,
+    Certificate,
+    Energy,
+    Solution,
+    SolverReport,
+    Spline,
+    UnreachableTarget,
+)
+from optimizer.targets import narrowed
 from optimizer.verify import certify
 
 # share of the deadline kept for checking and reporting the answer, at most [s]
@@ -39,8 +50,8 @@ UNCONFIRMED = "the certificate did not confirm it"
 def optimize(problem: Problem) -> Solution:
     """Find the motion of least energy between the problem's targets, certified against every limit.
 
-    Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, TorqueInfeasible, DurationTooShort,
-    NoTrajectory, DeadlineExceeded, or InvalidProblem for a payload beyond the robot's rating.
+    Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
+    DurationTooShort, NoTrajectory, DeadlineExceeded, or InvalidProblem for a payload beyond the robot's rating.
     """
     # matrices here are small: threads of a linear algebra library would cost more than they give
     with _blas().limit(limits=1, user_api="blas"):
@@ -61,11 +72,14 @@ class _Run:
         self.problem = problem
         self.task = Task(problem)
         self.entries: list[Entry] = []
+        self.unreachable: list[UnreachableTarget] = []
         self.iterations = self.solves = 0
 
     def solution(self) -> Solution:
         problem, task = self.problem, self.task
-        self.entries = search.pairs(task, search.ends(task, "start"), search.ends(task, "goal"))
+        (starts, no_starts), (goals, no_goals) = (search.ends(task, name) for name in ("start", "goal"))
+        self.unreachable = no_starts + no_goals
+        self.entries = search.pairs(task, starts, goals)
         search.bound(task, self.entries)
         if problem.payload.mass > problem.robot.rated_payload:
             rating = problem.robot.rated_payload
@@ -209,11 +223,13 @@ class _Run:
                 continue
             spline = slowed(motions[name], self.problem.active_limits)
             energy = self.task.energy(spline)
-            if (
-                self.allows(spline.duration)
-                and certify(self.problem, spline, entry.q_start, entry.q_goal, energy).valid
-            ):
+            if self.allows(spline.duration) and self.certified(entry, spline, energy).valid:
                 self.keep(entry, Attempt("solved", f"the {name} motion itself", spline=spline), energy)
+
+    def certified(self, entry: Entry, spline: Spline, energy: Energy) -> Certificate:
+        """The certificate of the entry's motion, against the very targets that the entry is of."""
+        asked = narrowed(self.problem, entry.start.target, entry.goal.target)
+        return certify(asked, spline, entry.q_start, entry.q_goal, energy)
 
     def allows(self, duration: float) -> bool:
         """Whether the request lets a motion take that long."""
@@ -225,7 +241,7 @@ class _Run:
         assert best.attempt is not None and best.attempt.spline is not None
         spline = best.attempt.spline
         energy = self.task.energy(spline)
-        certificate = certify(self.problem, spline, best.q_start, best.q_goal, energy)
+        certificate = self.certified(best, spline, energy)
         if not certificate.valid:
             return None
         open_ends = [e for e in self.entries if e.status in ("unvisited", "failed")]
@@ -234,13 +250,14 @@ class _Run:
                 entry.status, entry.reason = "pruned", search.PRUNED
         return Solution(
             status="feasible" if any(e.status != "pruned" for e in open_ends) else "optimal",
-            start=Branch(best.start.label, best.q_start),
-            goal=Branch(best.goal.label, best.q_goal),
+            start=Branch(best.start.label, best.q_start, best.start.target),
+            goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=self.task.trajectory(spline, self.problem.sample_period),
             energy=energy,
             lower_bound=min(e.lower_bound for e in self.entries),
             baselines=table,
             candidates=[e.report() for e in self.entries],
+            unreachable=self.unreachable,
             certificate=certificate,
             solver=SolverReport(
                 wall_time=time.perf_counter() - self.began,

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.arm import Arm, Pose, frozen
+from optimizer.arm import Arm
 from optimizer.exceptions import InvalidProblem
+from optimizer.targets import Target, validated
 
 Method = Literal["bspline", "time_scaling"]
 Objective = Literal["electrical", "mechanical"]
@@ -31,15 +31,15 @@ class BranchFilter:
 class Problem(Arm):
     """A request for the motion of least energy between `start` and `goal`.
 
-    `start` and `goal` are joint positions (nq,) [rad] or a `Pose`. `duration_min` and `duration_max` [s] bound the
-    duration; equal, they fix it; None leaves it to the optimiser. `deadline` [s] is the wall time after which the best
-    verified result so far is returned.
+    `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these. `duration_min` and
+    `duration_max` [s] bound the duration; equal, they fix it; None leaves it to the optimiser. `deadline` [s] is the
+    wall time after which the best verified result so far is returned.
 
     Raises InvalidProblem or OutsideLimits, with the field named, when the parts do not fit together.
     """
 
-    start: Array | Pose
-    goal: Array | Pose
+    start: Target
+    goal: Target
     method: Method = "bspline"
     objective: Objective = "electrical"
     duration_min: float | None = None
@@ -52,10 +52,7 @@ class Problem(Arm):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("start", "goal"):
-            target = getattr(self, name)
-            if not isinstance(target, Pose):
-                object.__setattr__(self, name, frozen(target, (self.robot.nq,), f"{name}.q"))
-                self.check_inside(name, getattr(self, name))
+            object.__setattr__(self, name, validated(self, name, getattr(self, name)))
         for name in ("duration_min", "duration_max"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -13,12 +14,22 @@ from models.robot import Array
 from optimizer.arm import Pose
 from optimizer.bounds import lower_bounds
 from optimizer.candidate import Attempt
-from optimizer.exceptions import TorqueInfeasible, UnreachablePose
+from optimizer.exceptions import (
+    InvalidProblem,
+    NoReachableTarget,
+    OutsideLimits,
+    SingularPose,
+    TorqueInfeasible,
+    UnreachablePose,
+)
 from optimizer.inverse_kinematics import inverse_kinematics_for, turns
 from optimizer.motion import Task
-from optimizer.solution import Candidate, CandidateStatus
+from optimizer.solution import Candidate, CandidateStatus, UnreachableTarget
+from optimizer.targets import AnyOf, Single
 
 FULL_TURN = 2 * np.pi
+# 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
+MOST_PAIRS = 32768
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 UNVISITED = "not reached before the deadline"
@@ -27,12 +38,16 @@ PRUNED = "its lower bound is not below the best energy found"
 
 @dataclass(frozen=True)
 class End:
-    """One branch at an end of the motion: its label, and for every joint the positions that the limits allow [rad]."""
+    """One branch at an end of the motion: its label, and for every joint the positions that the limits allow [rad].
+
+    `target` is the index, among the end's targets, of the one that it reaches.
+    """
 
     label: str
     q: Array
     choices: list[list[float]]
     fixed: bool
+    target: int = 0
 
 
 @dataclass
@@ -68,19 +83,39 @@ class Entry:
             lower_bound=self.lower_bound,
             energy=self.energy,
             duration=None if self.energy is None else self.duration,
+            start_target=self.start.target,
+            goal_target=self.goal.target,
         )
 
 
-def ends(task: Task, name: str) -> list[End]:
-    """The branches at `start` or `goal` that the problem allows, none of them singular.
+def ends(task: Task, name: str) -> tuple[list[End], list[UnreachableTarget]]:
+    """The branches at `start` or `goal` that the problem allows, none of them singular; and, of several targets, those
+    that have none.
 
-    Raises UnreachablePose or SingularPose; UnreachablePose also when the branch asked for does not reach the pose.
+    Raises NoReachableTarget when all of several have none, and of a single pose UnreachablePose or SingularPose;
+    UnreachablePose also when the branch asked for does not reach the pose.
     """
+    target = getattr(task.problem, name)
+    if not isinstance(target, AnyOf):
+        return _ends_of(task, name, target, 0), []
+    reached: list[End] = []
+    unreachable: list[UnreachableTarget] = []
+    for index, member in enumerate(target.targets):
+        try:
+            reached += _ends_of(task, name, member, index)
+        except (UnreachablePose, SingularPose, OutsideLimits) as error:
+            unreachable.append(UnreachableTarget(name, index, str(error)))
+    if not reached:
+        raise NoReachableTarget(name, unreachable)
+    return reached, unreachable
+
+
+def _ends_of(task: Task, name: str, target: Single, index: int) -> list[End]:
     problem = task.problem
-    target = getattr(problem, name)
     kinematics, limits = inverse_kinematics_for(problem.robot), problem.active_limits
     if not isinstance(target, Pose):
-        return [End(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True)]
+        problem.check_inside(name, target)
+        return [End(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True, index)]
     solutions = kinematics.solve(target.T, problem.T_flange_tcp, limits, windings=False, target=name)
     wanted = problem.branch
     if wanted is not None:
@@ -90,7 +125,7 @@ def ends(task: Task, name: str) -> list[End]:
             raise UnreachablePose(
                 name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
             )
-    return [End(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False) for s in solutions]
+    return [End(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False, index) for s in solutions]
 
 
 def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry]:
@@ -100,14 +135,22 @@ def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry
     and those that turn a joint by more than a full turn are left out, since the same pair of branches without that turn
     travels less in that joint and no further in the others, under a bound that is never higher.
     Without `windings`, the one of least travel.
+
+    Raises InvalidProblem when several targets make too many.
     """
-    result = []
+    result: list[Entry] = []
     for start in starts:
         for goal in goals:
             options = [
                 _joint_options(s, g, start.fixed or goal.fixed, task.problem.windings)
                 for s, g in zip(start.choices, goal.choices, strict=True)
             ]
+            if len(result) + math.prod(map(len, options)) > MOST_PAIRS:
+                raise InvalidProblem(
+                    "goal" if isinstance(task.problem.goal, AnyOf) else "start",
+                    f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give fewer of them, a "
+                    "`branch`, or `windings` false.",
+                )
             for combination in product(*options):
                 both = np.array(combination)
                 result.append(Entry(start, goal, both[:, 0], both[:, 1]))

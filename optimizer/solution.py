@@ -93,10 +93,23 @@ class Energy:
 
 @dataclass(frozen=True)
 class Branch:
-    """One arm configuration: its label, e.g. `left/up/no_flip`, and joints (nq,) [rad]."""
+    """One arm configuration: its label, e.g. `left/up/no_flip`, and joints (nq,) [rad].
+
+    `target` is the index of the target that it reaches among several, 0 where only one was given.
+    """
 
     label: str
     q: Array
+    target: int = 0
+
+
+@dataclass(frozen=True)
+class UnreachableTarget:
+    """One of several targets of the `end` (start or goal), by index, that has no candidates, and why."""
+
+    end: str
+    target: int
+    reason: str
 
 
 CandidateStatus = Literal["solved", "pruned", "infeasible", "failed", "unvisited"]
@@ -104,7 +117,10 @@ CandidateStatus = Literal["solved", "pruned", "infeasible", "failed", "unvisited
 
 @dataclass(frozen=True)
 class Candidate:
-    """A start and goal pair: what became of it, its proven bound and the energy found (of the objective) [J]."""
+    """A start and goal pair: what became of it, its proven bound and the energy found (of the objective) [J].
+
+    `start_target` and `goal_target` are indices as in `Branch.target`.
+    """
 
     start: str
     goal: str
@@ -115,6 +131,8 @@ class Candidate:
     lower_bound: float
     energy: float | None = None
     duration: float | None = None
+    start_target: int = 0
+    goal_target: int = 0
 
 
 BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
@@ -191,6 +209,7 @@ class Solution:
     lower_bound: float
     baselines: list[Baseline]
     candidates: list[Candidate]
+    unreachable: list[UnreachableTarget]
     certificate: Certificate
     solver: SolverReport
 

@@ -16,6 +16,7 @@ from optimizer.arm import Pose
 from optimizer.energy import breakdown
 from optimizer.problem import Problem
 from optimizer.solution import Certificate, Energy, Spline
+from optimizer.targets import Single, single
 
 GRID_PERIOD = 1e-3  # s, at most
 LEAST_INTERVALS = 100  # so that motions under 0.1 s are not judged by a handful of samples
@@ -25,8 +26,9 @@ ENERGY_FLOOR = 1e-6  # J; below it a relative error says nothing
 def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy) -> Certificate:
     """Replay `spline` and hold it against everything that was asked and reported.
 
-    q_start, q_goal (nq,) [rad] are the joint positions that the answer names as its ends. The grid is uniform, of at
-    most 1 ms, and includes both ends. Motions that leave the spline's own knots give NaN, which no tolerance passes.
+    Of several targets, the problem must be `narrowed` to those reached. q_start, q_goal (nq,) [rad] are the joint
+    positions that the answer names as its ends. The grid is uniform, of at most 1 ms, and includes both ends. Motions
+    that leave the spline's own knots give NaN, which no tolerance passes.
     """
     robot, payload = problem.robot, problem.payload
     model = robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.gravity)
@@ -51,8 +53,8 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
     limits = problem.active_limits
     return Certificate(
         worst_ratio=limit_ratios(limits, q, v, a, jerk, tau_motor),
-        start_error=_end_error(problem, problem.start, q_start, q[0], model, data),
-        goal_error=_end_error(problem, problem.goal, q_goal, q[-1], model, data),
+        start_error=_end_error(problem, single(problem.start), q_start, q[0], model, data),
+        goal_error=_end_error(problem, single(problem.goal), q_goal, q[-1], model, data),
         rest_error=float(np.max([np.abs(v[[0, -1]]) / limits.v_max, np.abs(a[[0, -1]]) / limits.a_max])),
         energy_error=_worst(
             _relative(energy.electrical.total, reported.electrical.total),
@@ -104,7 +106,7 @@ def _inverse_dynamics(model: pin.Model, data: pin.Data, q: Array, v: Array, a: A
 
 
 def _end_error(
-    problem: Problem, target: Array | Pose, named: Array, reached: Array, model: pin.Model, data: pin.Data
+    problem: Problem, target: Single, named: Array, reached: Array, model: pin.Model, data: pin.Data
 ) -> tuple[float, float]:
     """(position [m], rotation [rad]) between the TCP reached and the target.
 

@@ -11,11 +11,13 @@ import pytest
 import optimizer
 
 PUBLIC = {
+    "AnyOf",
     "BranchFilter",
     "DeadlineExceeded",
     "DurationTooShort",
     "InvalidProblem",
     "JoulepathError",
+    "NoReachableTarget",
     "NoTrajectory",
     "OutsideLimits",
     "Payload",
@@ -40,7 +42,7 @@ def test_the_public_names_are_a_promise() -> None:
 def test_one_except_clause_catches_every_error() -> None:
     exported = [getattr(optimizer, name) for name in PUBLIC]
     errors = [each for each in exported if isinstance(each, type) and issubclass(each, BaseException)]
-    assert len(errors) == 10
+    assert len(errors) == 11
     assert all(issubclass(error, optimizer.JoulepathError) for error in errors)
 
 

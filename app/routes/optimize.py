@@ -31,6 +31,7 @@ router = APIRouter(tags=["motion"])
         problems.Validation,
         problems.UnreachablePose,
         problems.SingularPose,
+        problems.UnreachableTargets,
         problems.OutsideLimits,
         problems.DurationTooShort,
         problems.TorqueInfeasible,

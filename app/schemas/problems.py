@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import ConfigDict, Field
 
 from app.schemas.common import Response, described, part
-from app.schemas.response import Candidate
+from app.schemas.response import Candidate, UnreachableTarget
 
 PREFIX = "/problems/"
 
@@ -91,6 +91,16 @@ class SingularPose(_TargetProblem):
     title: Literal["Singular pose"] = _fixed("Singular pose", "title")
     status: Literal[422] = _fixed(422, "status")
     smallest_singular_value: float = described("The largest among the configurations.", "1", 1e-9)
+
+
+class UnreachableTargets(_TargetProblem):
+    """The arm can go to none of the targets of an `any_of`; `unreachable` tells why of each: out of reach, singular, or
+    outside the joint range. Correct at least one of them."""
+
+    type: Literal["/problems/unreachable-targets"] = _fixed("/problems/unreachable-targets", "type")
+    title: Literal["No target within reach"] = _fixed("No target within reach", "title")
+    status: Literal[422] = _fixed(422, "status")
+    unreachable: list[UnreachableTarget] = part("Every target of the `any_of`, and why it cannot be reached.")
 
 
 class OutsideLimits(Problem):
@@ -235,6 +245,7 @@ PROBLEMS: tuple[type[Problem], ...] = (
     UnknownRobot,
     UnreachablePose,
     SingularPose,
+    UnreachableTargets,
     OutsideLimits,
     DurationTooShort,
     TorqueInfeasible,

@@ -55,7 +55,32 @@ class PoseTarget(Request):
     )
 
 
-Target = Annotated[Annotated[JointTarget, Tag("by q")] | Annotated[PoseTarget, Tag("by pose")], by_field("q", "pose")]
+SingleTarget = Annotated[
+    Annotated[JointTarget, Tag("by q")] | Annotated[PoseTarget, Tag("by pose")], by_field("q", "pose")
+]
+
+
+class AnyOfTarget(Request):
+    """Several targets: the one that costs least is taken."""
+
+    any_of: list[SingleTarget] = described(
+        "The targets, joints or poses, in any mixture. Those out of reach are listed in the answer's `unreachable`.",
+        None,
+        [
+            {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+            {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+        ],
+        min_length=1,
+        max_length=64,
+    )
+
+
+Target = Annotated[
+    Annotated[JointTarget, Tag("by q")]
+    | Annotated[PoseTarget, Tag("by pose")]
+    | Annotated[AnyOfTarget, Tag("by any_of")],
+    by_field("q", "pose", "any_of"),
+]
 
 
 class Payload(Request):
@@ -175,10 +200,12 @@ class OptimizeRequest(ArmRequest):
     """A motion from rest at `start` to rest at `goal`."""
 
     start: Target = described(
-        "Where the motion starts: joints or a pose.", None, {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}
+        "Where the motion starts: joints, a pose, or any of several.",
+        None,
+        {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     )
     goal: Target = described(
-        "Where it ends: joints or a pose.",
+        "Where it ends: joints, a pose, or any of several.",
         None,
         {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
     )

@@ -22,6 +22,7 @@ class Configuration(Response):
 
     label: Label = described("Branch: shoulder/elbow/wrist, and the windings where there are any.", None, _LABEL)
     q: Joints = described("Joint positions.", "rad", _Q)
+    target: int = described("Which target of `any_of` it reaches, counted from 0; 0 for a single target.", None, 0)
 
 
 class Branches(Response):
@@ -122,7 +123,9 @@ class Candidate(Response):
     """A start and goal pair and what became of it."""
 
     start: Label = described("Branch at the start.", None, _LABEL)
+    start_target: int = described("Target of the start's `any_of`, counted from 0.", None, 0)
     goal: Label = described("Branch at the goal.", None, "left/down/flip")
+    goal_target: int = described("Target of the goal's `any_of`, counted from 0.", None, 0)
     q_start: Joints = described("Joint positions at the start.", "rad", _Q)
     q_goal: Joints = described("Joint positions at the goal.", "rad", _Q)
     status: Literal["solved", "pruned", "infeasible", "failed", "unvisited"] = described(
@@ -134,6 +137,18 @@ class Candidate(Response):
     )
     energy: float | None = described("Energy found, of the objective; null if not solved.", "J", 180.5)
     duration: float | None = described("Duration found; null if not solved.", "s", 1.9)
+
+
+class UnreachableTarget(Response):
+    """One target of an `any_of` that the arm cannot go to, so that it has no candidates."""
+
+    end: Literal["start", "goal"] = described("Which end of the motion.", None, "goal")
+    target: int = described("Its place in `any_of`, counted from 0.", None, 2)
+    reason: str = described(
+        "Why, and what to do about it.",
+        None,
+        "The goal pose is 0.12 m out of reach in this orientation: move it closer to where the arm can go, or turn it.",
+    )
 
 
 class WorstRatio(Response):
@@ -198,5 +213,6 @@ class OptimizeResponse(Response):
     energy: Energy = part("Its energy.")
     baselines: Annotated[list[Baseline], Field(min_length=1)] = part("What other methods spend between the same ends.")
     candidates: Annotated[list[Candidate], Field(min_length=1)] = part("Every start and goal pair looked at.")
+    unreachable: list[UnreachableTarget] = part("Targets of an `any_of` that have no candidates, and why.")
     certificate: Certificate = part("Proof that the motion holds.")
     solver: Solver = part("What it cost to compute.")

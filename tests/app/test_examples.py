@@ -21,5 +21,5 @@ def test_example_is_answered(file: Path, client: TestClient) -> None:
 def test_paper_requests_are_up_to_date() -> None:
     script = runpy.run_path(str(EXAMPLES / "make_paper_requests.py"))
     made = script["requests"]()
-    assert len(made) == 15
+    assert len(made) == 15 + 3
     assert {name: json.loads((EXAMPLES / "optimize" / name).read_text()) for name in made} == made

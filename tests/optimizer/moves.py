@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,9 @@ from optimizer.problem import Problem
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
 GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
+# of the UR5e paper; tests/reference/README.md tells what is known of its joint convention
+HOME = np.radians([0, -90, 90, -90, 180, 0])
+PAPER = Path(__file__).parents[1] / "reference" / "paper_table1_poses.csv"
 PAYLOAD = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003]))
 TILTED = np.array([2.0, -4.0, -8.7])
 CEILING = np.array([0.0, 0.0, 9.81])
@@ -65,3 +70,12 @@ def potential(task: Problem, q: Array) -> float:
     load = task.payload
     model = task.robot.loaded_model(load.mass, load.com, load.inertia, task.gravity)
     return float(pin.computePotentialEnergy(model, model.createData(), q))
+
+
+def paper_poses() -> list[Pose]:
+    """Table 1: positions, and roll, pitch, yaw about fixed axes."""
+    with PAPER.open(newline="") as file:
+        rows = [[float(value) for value in row.values()] for row in csv.DictReader(file)]
+    return [
+        Pose(pin.SE3(pin.rpy.rpyToMatrix(*row[3:]), np.array(row[:3])).homogeneous) for row in rows
+    ]  # fmt: skip

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import sys
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,12 +37,14 @@ from optimizer.verify import certify
 from tests.optimizer.moves import (
     CEILING,
     GOAL,
+    HOME,
     PAYLOAD,
     ROBOT,
     START,
     TILTED,
     fixed,
     limits,
+    paper_poses,
     potential,
     problem,
     random_moves,
@@ -62,8 +62,6 @@ NOT_BEATEN = 5e-5
 ONE_PERCENT = 0.01  # by which a B-spline may exceed the time-scaled motion in the same duration
 SYMMETRY = 2e-3  # relative; two runs whose optima are mirror images, reached along ways that are not
 # the paper's home in Universal Robots' convention [deg] (see tests/reference/README.md)
-HOME = np.radians([0, -90, 90, -90, 180, 0])
-PAPER = Path(__file__).parents[1] / "reference" / "paper_table1_poses.csv"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -546,15 +544,6 @@ def test_the_optimum_is_an_optimum_of_the_duration() -> None:
 
 
 # --- the founding paper ---
-
-
-def paper_poses() -> list[Pose]:
-    """Table 1: positions, and roll, pitch, yaw about fixed axes."""
-    with PAPER.open(newline="") as file:
-        rows = [[float(value) for value in row.values()] for row in csv.DictReader(file)]
-    return [
-        Pose(pin.SE3(pin.rpy.rpyToMatrix(*row[3:]), np.array(row[:3])).homogeneous) for row in rows
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("number", range(1, 16))

@@ -29,7 +29,7 @@ NARROW = limits(q_min=[-3.6, -3.6, -np.pi, -3.6, -3.6, -3.6], q_max=[3.6, 3.6, n
 
 def entries(task: Problem) -> list[Entry]:
     made = Task(task)
-    return search.pairs(made, search.ends(made, "start"), search.ends(made, "goal"))
+    return search.pairs(made, search.ends(made, "start")[0], search.ends(made, "goal")[0])
 
 
 def every_configuration(q: Array, task: Problem) -> list[Array]:

@@ -1,0 +1,76 @@
+"""Where a motion may start or end: joint positions, a pose, or any one of several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from models.robot import Array
+from optimizer.arm import Arm, Pose, frozen
+from optimizer.exceptions import InvalidProblem
+
+if TYPE_CHECKING:
+    from optimizer.problem import Problem
+
+# of `AnyOf`
+MOST_TARGETS = 64
+
+Single = Array | Pose
+
+
+@dataclass(frozen=True)
+class AnyOf:
+    """Whichever of `targets` costs least: 1 to 64 joint positions (nq,) [rad] or poses, mixed as you like.
+
+    Raises InvalidProblem when there are none, too many, or one of them is itself an AnyOf.
+    """
+
+    targets: tuple[Single, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "targets", tuple(self.targets))
+        if not 1 <= len(self.targets) <= MOST_TARGETS:
+            raise InvalidProblem("any_of", f"any_of must hold 1 to {MOST_TARGETS} targets.")
+        if any(isinstance(target, AnyOf) for target in self.targets):
+            raise InvalidProblem("any_of", "any_of must not be nested: list all targets in one.")
+
+
+Target = Single | AnyOf
+
+
+def members(target: Target) -> tuple[Single, ...]:
+    """The targets that it stands for: itself, unless it is an AnyOf."""
+    return target.targets if isinstance(target, AnyOf) else (target,)
+
+
+def single(target: Target) -> Single:
+    """The target itself. Raises ValueError for an AnyOf."""
+    if isinstance(target, AnyOf):
+        raise ValueError("narrow the problem to one of its targets first")
+    return target
+
+
+def validated(arm: Arm, name: str, target: Target) -> Target:
+    """A problem's `start` or `goal` (which `name` says) with its joint positions read-only arrays.
+
+    Raises InvalidProblem, or OutsideLimits for joint positions out of range; those of an AnyOf are merely unreachable.
+    """
+    if isinstance(target, AnyOf):
+        nq = (arm.robot.nq,)
+        fields = [f"{name}.any_of.{k}.q" for k in range(len(target.targets))]
+        return AnyOf(
+            tuple(
+                member if isinstance(member, Pose) else frozen(member, nq, field)
+                for member, field in zip(target.targets, fields, strict=True)
+            )
+        )
+    if isinstance(target, Pose):
+        return target
+    q = frozen(target, (arm.robot.nq,), f"{name}.q")
+    arm.check_inside(name, q)
+    return q
+
+
+def narrowed(problem: Problem, start: int, goal: int) -> Problem:
+    """The same problem with one member of its start and one of its goal, by index."""
+    return replace(problem, start=members(problem.start)[start], goal=members(problem.goal)[goal])

@@ -1,0 +1,57 @@
+"""Targets of several kinds over HTTP."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.schemas.problems import UnreachableTargets
+from app.schemas.response import OptimizeResponse
+from tests.app.requests import HOME, NEAR, move
+from tests.app.test_validation import POSE, refused
+
+FAR = {"pose": {"position": [2.0, 0.0, 0.3], "rpy": [0.0, 0.0, 0.0]}}
+
+
+def test_says_which_target_it_took(client: TestClient) -> None:
+    goal = {"any_of": [FAR, {"pose": POSE}, {"q": NEAR}]}
+    answer = client.post("/optimize", json=move(goal=goal))
+    assert answer.status_code == 200, answer.text
+    OptimizeResponse.model_validate_json(answer.content)
+    content = answer.json()
+    assert (content["branch"]["start"]["target"], content["branch"]["goal"]["target"]) == (0, 2)
+    assert content["branch"]["goal"]["q"] == NEAR
+    assert {entry["goal_target"] for entry in content["candidates"]} == {1, 2}
+    assert {entry["start_target"] for entry in content["candidates"]} == {0}
+    (missing,) = content["unreachable"]
+    assert (missing["end"], missing["target"]) == ("goal", 0)
+
+
+def test_names_every_target_out_of_reach(client: TestClient) -> None:
+    beyond = {"q": [*HOME[:5], 7.0]}
+    answer = client.post("/optimize", json=move(start={"any_of": [FAR, beyond]}))
+    assert answer.status_code == 422
+    UnreachableTargets.model_validate_json(answer.content)
+    content = answer.json()
+    assert content["target"] == "start"
+    assert [entry["target"] for entry in content["unreachable"]] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("goal", "loc"),
+    [
+        ({"any_of": []}, ["body", "goal", "any_of"]),
+        ({"any_of": [{"q": NEAR}] * 65}, ["body", "goal", "any_of"]),
+        ({"any_of": {"q": NEAR}}, ["body", "goal", "any_of"]),
+        ({"any_of": [{"any_of": [{"q": NEAR}]}]}, ["body", "goal", "any_of", 0]),
+        ({"any_of": [{"q": NEAR}, {"q": NEAR, "pose": POSE}]}, ["body", "goal", "any_of", 1]),
+        ({"any_of": [{"q": NEAR}, {"q": NEAR[:5]}]}, ["body", "goal", "any_of", 1, "q"]),
+        ({"any_of": [{"q": [float("nan"), *NEAR[1:]]}]}, ["body", "goal", "any_of", 0, "q", 0]),
+        ({"any_of": [{"q": NEAR}], "q": NEAR}, ["body", "goal"]),
+        ({"any_of": [{"q": NEAR}], "all_of": []}, ["body", "goal"]),
+    ],
+)
+def test_names_what_is_wrong(client: TestClient, goal: dict[str, Any], loc: list[str | int]) -> None:
+    assert loc in [error["loc"] for error in refused(client, move(goal=goal))]
