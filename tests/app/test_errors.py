@@ -12,7 +12,7 @@ from app.errors import TABLE, problem_reply, problem_type
 from app.schemas.problems import Internal, NoTrajectory, OutsideLimits, UnreachablePose
 from optimizer import exceptions
 from optimizer.exceptions import JoulepathError
-from optimizer.solution import Candidate
+from optimizer.solution import Candidate, UnreachableTarget
 
 CANDIDATE = Candidate("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
 ERRORS: list[JoulepathError] = [
@@ -21,6 +21,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.UnknownRobot(["ur5e"]),
     exceptions.UnreachablePose("goal", 0.1, "The goal pose is out of reach."),
     exceptions.UnreachablePose("goal", None, "The goal pose is out of reach."),
+    exceptions.NoReachableTarget("start", [UnreachableTarget("start", 0, "The start pose is out of reach.")]),
     exceptions.SingularPose("goal", 1e-9),
     exceptions.DurationTooShort(0.8),
     exceptions.TorqueInfeasible("elbow_joint", 200.0, 150.0),
