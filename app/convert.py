@@ -14,11 +14,13 @@ from app.schemas.common import QuaternionPose, RpyPose
 from app.schemas.ik import IKRequest
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
-from optimizer.arm import LIMIT_NAMES, Payload, Pose
+from optimizer.arm import INVERTER_MOST, LIMIT_NAMES, Inverter, Payload, Pose
+from optimizer.bus import Bus
+from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
 from optimizer.problem import BranchFilter, Problem
-from optimizer.solution import Candidate, Energy, Solution, UnreachableTarget
+from optimizer.solution import Candidate, ElectricalEnergy, Energy, Solution, StorageUse, UnreachableTarget
 from optimizer.targets import AnyOf, Single, Target
 
 
@@ -44,6 +46,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         objective=request.objective,
         duration_min=shortest,
         duration_max=longest,
+        cycle=cycle(request.cycle),
         branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
         windings=request.windings,
         sample_period=request.sample_period,
@@ -61,7 +64,26 @@ def arm_fields(request: asked.ArmRequest) -> dict[str, Any]:
         "gravity": np.array(request.gravity),
         "limits": _limits(request.limits, robot),
         "friction": request.friction,
+        "inverter": Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_MOST}),
+        "bus": _bus(request.bus),
+        "link_mass_scale": request.link_mass_scale,
     }
+
+
+def _bus(bus: asked.Bus) -> Bus:
+    if isinstance(bus, asked.RecuperatingBus):
+        return Bus("recuperating", efficiency=bus.efficiency)
+    if isinstance(bus, asked.StorageBus):
+        power = math.inf if bus.power is None else bus.power
+        return Bus("storage", bus.efficiency, bus.capacity, power, bus.initial)
+    return Bus(bus.mode)
+
+
+def cycle(asked_for: asked.Cycle | None) -> Cycle | None:
+    """The optimizer's cycle. Raises InvalidProblem."""
+    if asked_for is None:
+        return None
+    return Cycle(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
 
 
 def to_matrix(pose: PoseSchema) -> Array:
@@ -157,7 +179,7 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "status": solution.status,
         "branch": {end: _fields(getattr(solution, end), "label", "q", "target") for end in ("start", "goal")},
         "trajectory": {
-            **_fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power"),
+            **_fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power", "charge"),
             "spline": _fields(trajectory.spline, "degree", "knots", "control_points"),
         },
         "energy": {
@@ -194,11 +216,11 @@ def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
 
 
 def _energy(energy: Energy) -> dict[str, Any]:
-    parts = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
     return {
-        "electrical": _fields(energy.electrical, "total", *parts),
+        "electrical": _fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
         "mechanical": _fields(energy.mechanical, "total", "per_joint"),
         "per_joint": _fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
+        "storage": None if energy.storage is None else _fields(energy.storage, *StorageUse.__dataclass_fields__),
         **_fields(energy, "peak_power", "mean_power"),
     }
 

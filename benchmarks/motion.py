@@ -76,15 +76,7 @@ def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> R
     tau = torques(problem, q, v, a)
     model, data = _model(problem)
     climb = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
-    energy = breakdown(
-        weights,
-        v,
-        tau,
-        climb[1] - climb[0],
-        problem.robot.drives,
-        problem.friction_law,
-        problem.robot.electronics,
-    )
+    energy = breakdown(weights, v, tau, climb[1] - climb[0], problem)
     ends = max(float(np.abs(q[0] - q_start).max()), float(np.abs(q[-1] - q_goal).max()))
     return Replay(motion.duration, energy, _shares(problem, q, v, a, jerk, tau), ends)
 

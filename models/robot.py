@@ -26,6 +26,14 @@ class Limits:
     j_max: Array
     tau_max: Array
 
+    def scaled(self, factors: Limits | float) -> Limits:
+        """Limits on speed, acceleration, jerk and torque times a factor, or factors per joint."""
+        rates = ("v_max", "a_max", "j_max", "tau_max")
+        return replace(
+            self,
+            **{n: getattr(self, n) * (getattr(factors, n) if isinstance(factors, Limits) else factors) for n in rates},
+        )
+
     def tightened(self, **given: Array | None) -> Limits:
         """These limits with the given ones in their place. Whether they are tighter is the caller's to check."""
         return replace(self, **{name: value for name, value in given.items() if value is not None})
@@ -129,13 +137,19 @@ class Robot:
         """The default friction law."""
         return next(iter(self.friction_laws.values()))
 
-    def loaded_model(self, mass: float, com: Array, inertia: Array, gravity: Array) -> pin.Model:
+    def loaded_model(
+        self, mass: float, com: Array, inertia: Array, gravity: Array, link_mass_scale: Array | None = None
+    ) -> pin.Model:
         """A copy of the model with a payload at the flange and another gravity, for the verifier and the tests.
 
         mass [kg], com [m] in the flange frame, inertia (3, 3) about the com in flange axes [kg·m²],
-        gravity (3,) in the base frame [m/s²].
+        gravity (3,) in the base frame [m/s²]. `link_mass_scale` (nq,) multiplies mass and inertia of the moving links,
+        not of the rotors.
         """
         model = self.model.copy()
+        for i, scale in enumerate([] if link_mass_scale is None else link_mass_scale.tolist(), start=1):
+            body = model.inertias[i]
+            model.inertias[i] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
         last = model.njoints - 1
         flange = model.frames[model.getFrameId("flange")].placement
         body = pin.Inertia(mass, np.asarray(com, dtype=float), np.asarray(inertia, dtype=float))

@@ -1,16 +1,23 @@
-"""The arm as it stands in its cell: robot, tool, payload, mounting, limits and friction, validated on construction."""
+"""The arm as it stands in its cell: robot, tool, payload, mounting, limits, friction, drives, bus; validated."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pinocchio as pin
 
 from models.registry import load_robot
-from models.robot import Array, FrictionLaw, Limits, Robot
+from models.robot import Array, Drives, FrictionLaw, Limits, Robot
+from optimizer.bus import Bus
 from optimizer.exceptions import InvalidProblem, OutsideLimits
 
 LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
+
+# factors on a link's mass and inertia that are still an arm like the robot
+LINK_MASS_SCALES = (0.1, 10.0)
+# greatest coefficients of the inverter's loss [W, W/A, W/A²]: far beyond any inverter's
+INVERTER_MOST = {"constant": 1e3, "linear": 1e2, "quadratic": 1e1}
 
 
 def frozen(values: object, shape: tuple[int, ...], name: str) -> Array:
@@ -24,6 +31,14 @@ def frozen(values: object, shape: tuple[int, ...], name: str) -> Array:
     if not np.isfinite(array).all():
         raise InvalidProblem(name, f"{name} must be finite.")
     array.setflags(write=False)
+    return array
+
+
+def per_joint(values: object, count: int, name: str, least: float, most: float) -> Array:
+    """Numbers (count,) within [least, most] from one number or one each. Raises InvalidProblem."""
+    array = frozen(np.full(count, values) if np.ndim(values) == 0 else values, (count,), name)  # type: ignore[arg-type]
+    if not ((array >= least) & (array <= most)).all():
+        raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
     return array
 
 
@@ -67,12 +82,26 @@ class Payload:
             )
 
 
+@dataclass(frozen=True)
+class Inverter:
+    """The inverters' loss constant + linear·|i| + quadratic·i² [W, W/A, W/A²], one number or one per joint each.
+
+    None keeps the robot's figure.
+    """
+
+    constant: float | Array | None = None
+    linear: float | Array | None = None
+    quadratic: float | Array | None = None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Arm:
     """A robot with what it carries, how it is mounted and which limits it keeps.
 
     `limits` replaces the robot's limits and may only tighten them. `gravity` (3,) [m/s²] is in the base frame.
-    `friction` names one of the robot's friction laws (None: its default).
+    `friction` names one of the robot's friction laws (None: its default). `inverter` replaces figures of the robot's
+    inverters, `bus` says where surplus power goes, `link_mass_scale` (nq,), or one number, multiplies mass and inertia
+    of every moving link, payload apart.
 
     Raises InvalidProblem, with the field named, when the parts do not fit together.
     """
@@ -83,6 +112,9 @@ class Arm:
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     limits: Limits | None = None
     friction: str | None = None
+    inverter: Inverter = field(default_factory=Inverter)
+    bus: Bus = field(default_factory=Bus)
+    link_mass_scale: Array = field(default_factory=lambda: np.array(1.0))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tcp", Pose(self.T_flange_tcp).T)
@@ -92,6 +124,16 @@ class Arm:
         if self.friction is not None and self.friction not in self.robot.friction_laws:
             known = ", ".join(self.robot.friction_laws)
             raise InvalidProblem("friction", f"There is no friction law of that name: use one of {known}.")
+        nq = self.robot.nq
+        scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *LINK_MASS_SCALES)
+        object.__setattr__(self, "link_mass_scale", scale)
+        given = {name: getattr(self.inverter, name) for name in INVERTER_MOST}
+        figures = {
+            name: per_joint(value, nq, f"drives.inverter.{name}", 0.0, INVERTER_MOST[name])
+            for name, value in given.items()
+            if value is not None
+        }
+        object.__setattr__(self, "inverter", Inverter(**figures))
 
     @property
     def active_limits(self) -> Limits:
@@ -103,6 +145,29 @@ class Arm:
     def friction_law(self) -> FrictionLaw:
         """The friction law in force."""
         return self.robot.friction if self.friction is None else self.robot.friction_laws[self.friction]
+
+    @property
+    def drives(self) -> Drives:
+        """The drives in force."""
+        names = [name for name in INVERTER_MOST if getattr(self.inverter, name) is not None]
+        return replace(self.robot.drives, **{f"inverter_{name}": getattr(self.inverter, name) for name in names})
+
+    @property
+    def base_power(self) -> float:
+        """What the electronics draw besides the motors and their inverters [W]."""
+        return self.robot.electronics.idle_power + self.robot.electronics.controller_power
+
+    @property
+    def regeneration(self) -> float:
+        """The share of surplus on the bus that the supply takes back."""
+        if self.bus.mode == "recuperating":
+            return self.bus.efficiency
+        return 0.0 if self.bus.mode == "isolated" else self.robot.electronics.regeneration
+
+    def loaded_model(self) -> pin.Model:
+        """Pinocchio model with payload, gravity and the links' masses scaled."""
+        payload = self.payload
+        return self.robot.loaded_model(payload.mass, payload.com, payload.inertia, self.gravity, self.link_mass_scale)
 
     def check_inside(self, target: str, q: Array) -> None:
         """Raises OutsideLimits when a joint of q (nq,) is out of range; `target` says whose joints they are."""

@@ -6,8 +6,8 @@
 - `ruckig_slowed`: the same path and law, scaled evenly to our duration
 - `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid
 
-All go from the start to the nearest goal. A trapezoid's acceleration jumps: its jerk is unbounded, so it is never
-within a jerk limit, and says so.
+All go from the start to the nearest goal, and wait there, each in the time that it leaves of a cycle. A trapezoid's
+acceleration jumps: its jerk is unbounded, so it is never within a jerk limit, and says so.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import ruckig
 
 from models.robot import Array, Limits
 from optimizer import bspline
+from optimizer.dwell import holding_power
 from optimizer.energy import breakdown
 from optimizer.problem import Problem
 from optimizer.solution import Baseline, BaselineName, Energy, Spline
@@ -97,9 +98,14 @@ def baselines(
     # one call for all: a compiled kernel works through samples in blocks
     q, v, a = (np.concatenate([getattr(motion, name) for motion in motions.values()]) for name in ("q", "v", "a"))
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
-    result = []
+    result, hold = [], 0.0
+    if problem.cycle is not None:
+        goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
+        hold = float(holding_power(problem, torques(goal, still, still))[0])
     for (name, motion), tau in zip(motions.items(), np.split(torques(q, v, a), ends), strict=True):
         energy = motion_energy(problem, motion, tau, potential)
+        if problem.cycle is not None:
+            energy = energy.with_dwell(problem.cycle.dwell(problem, hold, motion.duration))
         theirs = energy.electrical.total if problem.objective == "electrical" else energy.mechanical.total
         result.append(
             Baseline(
@@ -140,20 +146,17 @@ def saving(ours: float, theirs: float) -> float:
 
 
 def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential: Callable[[Array], float]) -> Energy:
-    """Breakdown of a motion that begins and ends at rest, from its torques (k, nq)."""
-    return breakdown(
-        motion.weights,
-        motion.v,
-        tau,
-        potential(motion.q[-1]) - potential(motion.q[0]),
-        problem.robot.drives,
-        problem.friction_law,
-        problem.robot.electronics,
-    )
+    """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k, nq)."""
+    return breakdown(motion.weights, motion.v, tau, potential(motion.q[-1]) - potential(motion.q[0]), problem)
 
 
 def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:
-    """Whether a motion holds every limit: its exact peaks of the rates, positions and motor torques at its samples."""
+    """Whether a motion holds every limit: its exact peaks of the rates, positions and motor torques at its samples.
+
+    A motion that takes longer than the cycle does not.
+    """
+    if problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE):
+        return False
     limits = problem.active_limits
     tau_motor = tau + problem.friction_law.torque(motion.v)
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine

@@ -21,19 +21,30 @@ _KNEE_DEFICIT = 0.3003
 _BISECTIONS = 24
 
 
-def lower_bounds(task: Task, travel: Array, climb: Array) -> tuple[Array, Array]:
+def lower_bounds(task: Task, travel: Array, climb: Array, hold: Array | None = None) -> tuple[Array, Array]:
     """Bounds (P,) on the problem's objective [J] and least durations (P,) [s] for candidates.
 
-    travel (P, nq) [rad] is goal - start, climb (P,) [J] the gain of potential energy. A candidate whose least duration
-    exceeds the longest allowed one has the bound inf.
+    travel (P, nq) [rad] is goal - start, climb (P,) [J] the gain of potential energy, `hold` (P,) [W] what holding the
+    goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds the longest allowed one has
+    the bound inf.
+
+    Waiting draws constant - power · T on each of its linear pieces (see `optimizer.dwell`): there it is a constant and
+    a power less for every second of the motion, and the least over the pieces is a bound for all durations.
     """
     problem = task.problem
     shortest = np.maximum(shortest_duration(travel, problem.active_limits), LEAST_DURATION)
     t_min = np.maximum(shortest, problem.duration_min or 0.0)
     t_max = np.full_like(t_min, LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
-    bound = electrical(task, travel, climb, t_min, t_max) if problem.objective == "electrical" else mechanical(climb)
-    if problem.objective == "mechanical" or problem.robot.electronics.regeneration == 0:
-        bound = np.maximum(bound, 0.0)  # nothing is given back
+    if problem.objective == "mechanical":
+        bound = mechanical(climb)
+    elif problem.cycle is None or hold is None:
+        bound = _least_drawn(task, travel, climb, t_min, t_max, np.zeros_like(climb))
+    else:
+        bound = np.full_like(climb, np.inf)
+        for piece in problem.cycle.pieces(problem, hold):
+            low, high = np.maximum(t_min, piece.t_min), np.minimum(t_max, piece.t_max)
+            value = piece.constant + _least_drawn(task, travel, climb, low, high, piece.power)
+            bound = np.where(low <= high, np.minimum(bound, value), bound)
     return np.where(t_min > t_max, np.inf, bound), shortest
 
 
@@ -42,11 +53,35 @@ def mechanical(climb: Array) -> Array:
     return np.abs(climb)
 
 
-def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array) -> Array:
+def _least_drawn(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array, waiting: Array) -> Array:
+    """`electrical`, and besides what is drawn even where all of the motion's work comes for nothing.
+
+    Where the supply takes nothing back and there is no store, drawn power is never negative; on an isolated bus it is
+    never less than the electronics', for which the joints' surplus does nothing.
+    """
+    arm = task.problem
+    bound = electrical(task, travel, climb, t_min, t_max, waiting)
+    if arm.regeneration > 0 or arm.bus.mode == "storage":
+        return bound
+    rate = (arm.base_power if arm.bus.mode == "isolated" else 0.0) - waiting
+    return np.maximum(bound, np.minimum(rate * t_min, rate * np.maximum(t_max, t_min)))
+
+
+def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array, waiting: Array) -> Array:
     """Bound on the electrical energy [J] of motions with the given joint travel (P, nq) and climb (P,) [J].
 
-    Drawn energy ≥ ∫ P_net dt = base · T + climb + friction + copper + inverter, for the surplus is at best given back.
-    With regeneration below 1 giving back is worth less, so the inequality stays. Copper and inverter ≥ their constants.
+    `waiting` (P,) [W] is what a motion saves by every second that it takes: nothing without a cycle.
+
+    Energy ≥ ∫ P_net dt = base · T + climb + friction + copper + inverter on every bus:
+
+    - shared: drawn = max(P_net, 0) ≥ P_net. With a share below 1 given back, max(P_net, 0) - share · max(-P_net, 0) =
+      P_net + (1 - share) max(-P_net, 0) ≥ P_net. So too for a recuperating bus, whose share is its efficiency.
+    - isolated: drawn = base + Σ max(P_j, 0) ≥ base + Σ P_j = P_net.
+    - storage: with c charged of the net surplus s, total = ∫ (max(P_net, 0) - efficiency · c - share · (s - c)) dt (see
+      `optimizer.bus`) ≥ ∫ P_net dt, as c ≤ s and neither factor exceeds 1. The charge's fall is in the total, so the
+      bound holds whatever the store begins with.
+
+    Copper and inverter ≥ their constants.
 
     friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
     The Coulomb part is at least coulomb · |travel|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
@@ -60,20 +95,21 @@ def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Arr
     g(c) - c g'(c). Bisection on the slope finds the least sum in [t_min, t_max].
     """
     problem = task.problem
-    friction, drives, electronics = problem.friction_law, problem.robot.drives, problem.robot.electronics
-    base = electronics.idle_power + electronics.controller_power + float(drives.inverter_constant.sum())
+    friction, drives = problem.friction_law, problem.drives
+    base = problem.base_power + float(drives.inverter_constant.sum())
     base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
+    rate = base - waiting
     distance = np.abs(travel)
     cruise = _Cruise(distance, friction, problem.active_limits)
 
     low, high = t_min.copy(), np.maximum(t_max, t_min)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
-        rising = base + cruise.slope(middle) > 0
+        rising = rate + cruise.slope(middle) > 0
         high, low = np.where(rising, middle, high), np.where(rising, low, middle)
     # convex: the tangent at the lower end stays below the curve up to the upper end
-    value = base * low + climb + distance @ friction.coulomb + cruise.loss(low)
-    return np.asarray(value + np.minimum(base + cruise.slope(low), 0.0) * (high - low))
+    value = rate * low + climb + distance @ friction.coulomb + cruise.loss(low)
+    return np.asarray(value + np.minimum(rate + cruise.slope(low), 0.0) * (high - low))
 
 
 class _Cruise:

@@ -12,10 +12,11 @@ from optimizer import bspline, profile, shortest_line, verify
 from optimizer.baselines import time_optimal, time_optimal_positions
 from optimizer.bounds import LEAST_DURATION, LONGEST_DURATION
 from optimizer.bspline import Basis
-from optimizer.motion import Task, fine_samples, peak_rates, sample, spline_of
+from optimizer.motion import Task, fine_samples, peak_rates, sample, slowed, spline_of, stretch
 from optimizer.nlp import Coordinates, Programme
 from optimizer.solution import Spline
 from optimizer.solve import FEASIBILITY, solve
+from optimizer.windows import Window, windows
 
 # control points of a first attempt with evenly spaced knots
 COARSE = 13
@@ -62,19 +63,19 @@ class Guess:
 class Solver:
     """Solves one candidate, from q_start to q_goal (nq,), as often as it is asked to before `deadline`.
 
-    `fastest` minimises the duration in place of the problem's objective, whatever duration the problem allows.
+    `window` says which durations are allowed and what is minimised; None: the problem's first.
     """
 
-    def __init__(self, task: Task, q_start: Array, q_goal: Array, deadline: float, fastest: bool = False) -> None:
+    def __init__(
+        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+    ) -> None:
         problem = task.problem
         self.task, self.deadline = task, deadline
         self.on_line = problem.method == "time_scaling"
         self.q_start, self.q_goal = q_start, q_goal
-        self.t_min = LEAST_DURATION if problem.duration_min is None or fastest else problem.duration_min
-        self.t_max = LONGEST_DURATION if problem.duration_max is None or fastest else problem.duration_max
-        self.p = task.fastest_parameters if fastest else task.objective_parameters
-        self.hurried = fastest
-        self.coordinates = self._coordinates(_scaled(problem.active_limits, 1 - MARGIN))
+        self.window = windows(task, q_goal)[0] if window is None else window
+        self.t_min, self.t_max = self.window.t_min, self.window.t_max
+        self.coordinates = self._coordinates(problem.active_limits.scaled(1 - MARGIN))
 
     def solve(self) -> Attempt:
         """From the ground up; over knots made for haste where time is short or evenly spaced ones find nothing."""
@@ -82,7 +83,7 @@ class Solver:
             return self._on_line()
         shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
         first = Attempt("failed", "not tried")
-        if not self.hurried and self.t_max >= TIGHT * shortest:
+        if not self.window.hurried and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
             first = self.improve(Guess(space, self._smoothed(space), 0.0))
             if first.status in ("solved", "out of time"):
@@ -119,8 +120,9 @@ class Solver:
 
     def improve(self, guess: Guess) -> Attempt:
         """Optimise from a guess, tightening the limits where the motion breaks them between the nodes."""
-        programme = Programme(self.task.kernel, guess.space, self.p, self.coordinates, self.t_min, self.t_max)
-        limits = _scaled(self.task.problem.active_limits, 1 - MARGIN)
+        window, kernel = self.window, self.task.kernel
+        programme = Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant)
+        limits = self.task.problem.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
         duration = self._first_duration(programme, free, guess.duration)
         iterations, multiplier = 0, None
@@ -139,7 +141,7 @@ class Solver:
                 excess = self._excess(spline)
             if excess is None:
                 return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)
-            limits = _divided(limits, excess)
+            limits = limits.scaled(excess)
             programme = replace(programme, coordinates=self._coordinates(limits))
             free, duration, multiplier = result.free, result.duration, result.multiplier
         return Attempt("failed", "limits stay broken between the nodes", iterations, REPAIRS)
@@ -162,8 +164,8 @@ class Solver:
         """The cheapest of a few durations at which the guess holds the limits on speed, acceleration and jerk."""
         limits = programme.limits
         rates = np.stack([limits.v_max, limits.a_max, limits.j_max])
-        peaks = (np.abs(programme.kinematics(free)).max(axis=1) / rates).max(axis=1)
-        shortest = max(float((peaks ** (1 / np.arange(1, 4))).max()), least, programme.t_min)
+        peaks = np.abs(programme.kinematics(free)).max(axis=1)
+        shortest = max(stretch(peaks / rates), least, programme.t_min)
         if shortest >= programme.t_max:
             return programme.t_max
         durations = [shortest * stretch for stretch in STRETCHES]
@@ -181,15 +183,13 @@ class Solver:
                 break
         return chosen
 
-    def _stretched(self, spline: Spline, excess: Limits) -> Spline:
+    def _stretched(self, spline: Spline, factors: Limits) -> Spline:
         """The motion slowed until speed, acceleration and jerk hold their limits, if that takes next to no time."""
-        needed = max(float((getattr(excess, f"{x}_max") ** (1 / d)).max()) for d, x in enumerate("vaj", start=1))
-        if needed > MOST_STRETCH or spline.duration * needed > self.t_max:
-            return spline
-        return replace(spline, knots=spline.knots * needed)
+        needed = stretch(1 / np.stack([factors.v_max, factors.a_max, factors.j_max]))
+        return spline if needed > MOST_STRETCH or spline.duration * needed > self.t_max else slowed(spline, needed)
 
     def _excess(self, spline: Spline) -> Limits | None:
-        """By which factors (≥ 1) each limit must be tightened, None when the motion holds them all."""
+        """The factors (≤ 1) by which each limit must be tightened, None when the motion holds them all."""
         limits = self.task.problem.active_limits
         # the certificate's own instants too: where a joint turns back, friction changes sign within a millisecond
         between, replayed = fine_samples(spline, TORQUE_POINTS)[1:], sample(spline, verify.grid(spline.duration))
@@ -207,16 +207,4 @@ class Solver:
             return None
         factors = {name: np.where(r > held, r + REPAIR_MARGIN, 1.0) for name, r in found.items()}
         factors["tau_max"] = 1 + TORQUE_REPAIR * (factors["tau_max"] - 1)
-        return Limits(q_min=limits.q_min, q_max=limits.q_max, **factors)
-
-
-def _scaled(limits: Limits, factor: float) -> Limits:
-    """Limits on speed, acceleration, jerk and torque times a factor."""
-    names = ("v_max", "a_max", "j_max", "tau_max")
-    return replace(limits, **{name: getattr(limits, name) * factor for name in names})
-
-
-def _divided(limits: Limits, factors: Limits) -> Limits:
-    """Limits on speed, acceleration, jerk and torque divided by factors per joint."""
-    names = ("v_max", "a_max", "j_max", "tau_max")
-    return replace(limits, **{name: getattr(limits, name) / getattr(factors, name) for name in names})
+        return Limits(q_min=limits.q_min, q_max=limits.q_max, **{name: 1 / factor for name, factor in factors.items()})

@@ -19,11 +19,6 @@ class SymbolicPayload:
     com: ca.SX
     inertia: ca.SX
 
-    @staticmethod
-    def create() -> SymbolicPayload:
-        """Fresh symbols."""
-        return SymbolicPayload(ca.SX.sym("m"), ca.SX.sym("c", 3), ca.SX.sym("I", 6))
-
 
 def _tidy(matrix: np.ndarray) -> ca.DM:
     """Drop the rounding of sines and cosines of right angles, so that CasADi drops the terms that they multiply."""
@@ -42,13 +37,21 @@ def _rotation_z(angle: ca.SX) -> ca.SX:
 
 
 def inverse_dynamics(
-    model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, payload: SymbolicPayload, gravity: ca.SX, rotor: ca.SX
+    model: pin.Model,
+    q: ca.SX,
+    v: ca.SX,
+    a: ca.SX,
+    payload: SymbolicPayload,
+    gravity: ca.SX,
+    rotor: ca.SX,
+    link_mass_scale: ca.SX | None = None,
 ) -> ca.SX:
     """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with the payload at the frame `flange`.
 
     Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5), every link described by
     mass, first moment and inertia about its joint frame, in which the torques are linear. `gravity` (3,) is in the
     base frame, `rotor` (nv,) the reflected rotor inertia [kg·m²]; the model's own armature and gravity are not read.
+    `link_mass_scale` (nv,) multiplies mass and inertia of the moving links, payload apart; None: as they are.
 
     Raises ValueError when a joint is not revolute about its z axis.
     """
@@ -68,7 +71,7 @@ def inverse_dynamics(
         omega_parent = R.T @ omega
         omega = omega_parent + spin
         alpha = R.T @ alpha + _Z * a[i - 1] + ca.cross(omega_parent, spin)
-        mass, moment, inertia = _link(model, i, payload)
+        mass, moment, inertia = _link(model, i, payload, 1 if link_mass_scale is None else link_mass_scale[i - 1])
         forces[i] = mass * acceleration + ca.cross(alpha, moment) + ca.cross(omega, ca.cross(omega, moment))
         moments[i] = inertia @ alpha + ca.cross(omega, inertia @ omega) + ca.cross(moment, acceleration)
 
@@ -83,12 +86,17 @@ def inverse_dynamics(
     return ca.vertcat(*tau)
 
 
-def _link(model: pin.Model, i: int, payload: SymbolicPayload) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Mass, first moment (3,) and inertia (3, 3) about the origin of joint i's frame; the last link bears the load."""
+def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Mass, first moment (3,) and inertia (3, 3) about the origin of joint i's frame; the last link bears the load.
+
+    `scale` multiplies what is the link's own.
+    """
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
-    mass = ca.SX(body.mass)
-    moment, inertia = mass * com, _about_origin(mass, com, ca.SX(_tidy(body.inertia)))
+    # figures first, then their factor: one product for each
+    own = ca.SX(body.mass)
+    mass, moment = scale * own, scale * (own * com)
+    inertia = scale * _about_origin(own, com, ca.SX(_tidy(body.inertia)))
     if i == model.njoints - 1:
         flange = model.frames[model.getFrameId("flange")].placement
         R = _tidy(flange.rotation)

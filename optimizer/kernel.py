@@ -46,7 +46,8 @@ class Parameters:
     """What a request may change, in the order in which the compiled functions take it.
 
     Shapes: com (3,), inertia (6,) ixx ixy ixz iyy iyz izz, gravity (3,), per joint (nq,). `knee` [rad/s] and `width`
-    [W] smooth friction's reversal and the cost's corners; `electrical`, `mechanical` [1] and `time` [W] weigh the cost.
+    [W] smooth friction's reversal and the cost's corners; `isolated` is 1 where every joint burns its own surplus, else
+    0; `electrical`, `mechanical` [1] and `time` [W] weigh the cost.
     """
 
     mass: Any
@@ -65,6 +66,8 @@ class Parameters:
     inverter_quadratic: Any
     base_power: Any
     regeneration: Any
+    isolated: Any
+    link_mass_scale: Any
     electrical: Any
     mechanical: Any
     time: Any
@@ -79,7 +82,9 @@ class Parameters:
     def symbols(nq: int) -> tuple[Parameters, ca.SX]:
         """Symbols of the same layout, and their vector."""
         sizes = {"com": 3, "inertia": 6, "gravity": 3}
-        scalars = {"mass", "base_power", "regeneration", "electrical", "mechanical", "time", "knee", "width"}
+        scalars = {"mass", "base_power", "regeneration", "isolated"}
+        scalars |= {"electrical", "mechanical", "time", "knee", "width"}
+        scalars |= {"electrical", "mechanical", "time", "knee", "width"}
         names = Parameters.__dataclass_fields__
         values = {n: ca.SX.sym(n, sizes.get(n, 1 if n in scalars else nq)) for n in names}
         return Parameters(**values), ca.vertcat(*values.values())
@@ -98,7 +103,7 @@ def build(robot: Robot) -> list[ca.Function]:
     q, v, a = y[:nq], y[nq : 2 * nq], y[2 * nq :]
     par, p = Parameters.symbols(nq)
     payload = SymbolicPayload(par.mass, par.com, par.inertia)
-    tau = inverse_dynamics(robot.model, q, v, a, payload, par.gravity, par.rotor_inertia)
+    tau = inverse_dynamics(robot.model, q, v, a, payload, par.gravity, par.rotor_inertia, par.link_mass_scale)
     friction = FrictionLaw("symbolic", par.coulomb, par.curved, par.speed, par.viscous, par.knee)
     drives = Drives(
         gear_ratio=None,  # type: ignore[arg-type]
@@ -113,7 +118,10 @@ def build(robot: Robot) -> list[ca.Function]:
     t, w = ca.SX.sym("t", nq), ca.SX.sym("w", nq)
     # the inverter's |i| is rounded off over a tenth of an ampere per watt of width
     flow = power_flow(t, w, drives, friction, 0.1 * par.width, ca)
-    drawn = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
+    shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
+    # six corners in place of one, each rounded off by a sixth
+    isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / nq, ca))
+    drawn = (1 - par.isolated) * shared + par.isolated * isolated
     mechanical = ca.sum1(smooth_abs(t * w, par.width, ca))
     cost = par.electrical * drawn + par.mechanical * mechanical + par.time
     multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")

@@ -10,10 +10,12 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import BSpline
 
-from models.robot import Array, FrictionLaw, Limits
+from models.robot import Array, FrictionLaw
 from optimizer import bspline
 from optimizer.arm import Arm
-from optimizer.energy import breakdown, drawn_power, power_flow
+from optimizer.bus import charges, drawn_at
+from optimizer.dwell import holding_power
+from optimizer.energy import breakdown, power_flow
 from optimizer.kernel import Kernel, Parameters, kernel_for
 from optimizer.problem import Problem
 from optimizer.solution import Energy, Spline, Trajectory
@@ -43,18 +45,25 @@ class Plant:
 
     @cached_property
     def model(self) -> pin.Model:
-        """Pinocchio model with payload and gravity."""
-        payload = self.arm.payload
-        return self.arm.robot.loaded_model(payload.mass, payload.com, payload.inertia, self.arm.gravity)
+        """Pinocchio model of the arm, payload and gravity included."""
+        return self.arm.loaded_model()
 
     @cached_property
     def _data(self) -> pin.Data:
         return self.model.createData()
 
-    def parameters(self, electrical: float = 0.0, mechanical: float = 0.0, time: float = 0.0) -> Array:
-        """Packed kernel parameters with the given weights on energies [1] and duration [W]."""
-        robot, payload, friction = self.arm.robot, self.arm.payload, self.arm.friction_law
-        drives, electronics = robot.drives, robot.electronics
+    def parameters(
+        self,
+        electrical: float = 0.0,
+        mechanical: float = 0.0,
+        time: float = 0.0,
+        regeneration: float | None = None,
+    ) -> Array:
+        """Packed kernel parameters with the given weights on energies [1] and duration [W].
+
+        A store has no cost per instant: `regeneration` then says what its charge is taken to be worth. None: the arm's.
+        """
+        payload, friction, drives = self.arm.payload, self.arm.friction_law, self.arm.drives
         return Parameters(
             mass=payload.mass,
             com=payload.com,
@@ -70,8 +79,10 @@ class Plant:
             inverter_constant=drives.inverter_constant,
             inverter_linear=drives.inverter_linear,
             inverter_quadratic=drives.inverter_quadratic,
-            base_power=electronics.idle_power + electronics.controller_power,
-            regeneration=electronics.regeneration,
+            base_power=self.arm.base_power,
+            regeneration=self.arm.regeneration if regeneration is None else regeneration,
+            isolated=float(self.arm.bus.mode == "isolated"),
+            link_mass_scale=self.arm.link_mass_scale,
             electrical=electrical,
             mechanical=mechanical,
             time=time,
@@ -101,15 +112,8 @@ class Plant:
         """Energy of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
         ends = spline.control_points
-        return breakdown(
-            weights,
-            v,
-            self.torques(q, v, a),
-            self.potential(ends[-1]) - self.potential(ends[0]),
-            self.arm.robot.drives,
-            self.friction,
-            self.arm.robot.electronics,
-        )
+        change = self.potential(ends[-1]) - self.potential(ends[0])
+        return breakdown(weights, v, self.torques(q, v, a), change, self.arm)
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples at a period [s]; the last one lies on the end."""
@@ -118,11 +122,20 @@ class Plant:
         t = np.append(np.arange(int(np.ceil(duration / period - 1e-6))) * period, duration)
         q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
-        robot = self.arm.robot
-        flow = power_flow(tau, v, robot.drives, self.friction)
-        net = robot.electronics.idle_power + robot.electronics.controller_power + flow.joints.sum(axis=1)
-        power = drawn_power(net, robot.electronics.regeneration)
-        return Trajectory(t, q, v, a, tau, flow.tau_motor, power, spline)
+        flow = power_flow(tau, v, self.arm.drives, self.friction)
+        charge = self._charge(spline, t)
+        power = drawn_at(self.arm.bus, self.arm.regeneration, self.arm.base_power, flow.joints, charge)
+        stored = charge if self.arm.bus.mode == "storage" else None
+        return Trajectory(t, q, v, a, tau, flow.tau_motor, power, spline, stored)
+
+    def _charge(self, spline: Spline, t: Array) -> Array:
+        """The store's charge [J] at times t (k,), on the reported energy's own quadrature; zero without a store."""
+        if self.arm.bus.mode != "storage":
+            return np.zeros_like(t)
+        weights, q, v, a = fine_samples(spline, REPORT_NODES)
+        joints = power_flow(self.torques(q, v, a), v, self.arm.drives, self.friction).joints
+        course = charges(self.arm.bus, weights * (self.arm.base_power + joints.sum(axis=1)), weights)
+        return np.interp(t, np.append(0.0, weights.cumsum()), course)
 
 
 @dataclass(frozen=True)
@@ -135,6 +148,20 @@ class Task(Plant):
     def problem(self) -> Problem:
         """The problem."""
         return self.arm
+
+    def holding_power(self, q: Array) -> Array:
+        """What the arm draws (...) [W] while its motors hold it still at q (..., nq)."""
+        at = q.reshape(-1, q.shape[-1])
+        still = np.zeros_like(at)
+        return holding_power(self.arm, self.torques(at, still, still)).reshape(q.shape[:-1])
+
+    def energy(self, spline: Spline) -> Energy:
+        """Energy of a spline motion and of waiting after it, exact but for quadrature."""
+        energy, cycle = super().energy(spline), self.problem.cycle
+        if cycle is None:
+            return energy
+        hold = float(self.holding_power(spline.control_points[-1]))
+        return energy.with_dwell(cycle.dwell(self.problem, hold, spline.duration))
 
     @cached_property
     def objective_parameters(self) -> Array:
@@ -193,8 +220,11 @@ def peak_rates(spline: Spline) -> Array:
     return np.array(peaks)
 
 
-def slowed(spline: Spline, limits: Limits) -> Spline:
-    """The motion in as much more time as holds the limits on speed, acceleration and jerk: none where it holds them."""
-    rates = peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max])
-    needed = float((rates.max(axis=1) ** (1 / np.arange(1, 4))).max())
-    return spline if needed <= 1 else replace(spline, knots=spline.knots * needed)
+def stretch(ratios: Array) -> float:
+    """The factor on the duration that brings speed, acceleration and jerk, ratios (3, nq) of their limits, to these."""
+    return float((ratios.max(axis=1) ** (1 / np.arange(1, 4))).max())
+
+
+def slowed(spline: Spline, factor: float) -> Spline:
+    """The same path and law in `factor` times the duration."""
+    return replace(spline, knots=spline.knots * factor)

@@ -91,7 +91,8 @@ class Coordinates:
 class Programme:
     """One candidate's programme.
 
-    `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it.
+    `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it. `constant`
+    [J] is a part of the cost that nothing changes: it keeps relative changes of the cost in proportion.
     """
 
     kernel: Kernel
@@ -100,6 +101,7 @@ class Programme:
     coordinates: Coordinates
     t_min: float
     t_max: float
+    constant: float = 0.0
 
     @property
     def r(self) -> int:
@@ -150,7 +152,7 @@ class Programme:
         """Cost [J] and motor torques (N, nq)."""
         _, y = self._states(free, T)
         cost, tau = self.kernel.value(y, self.p)
-        return T * float(self.basis.weights @ cost), tau
+        return self.constant + T * float(self.basis.weights @ cost), tau
 
     def derivatives(self, free: Array, T: float, multiplier: Array) -> Linearisation:
         """Everything of first and second order; `multiplier` (N, nq) weighs the torques in the Hessian."""
@@ -196,7 +198,7 @@ class Programme:
         hessian_x[:-1, -1] = hessian_x[-1, :-1] = H_sT.ravel()
         hessian_x[-1, -1] = H_TT
         return Linearisation(
-            cost=T * total,
+            cost=self.constant + T * total,
             gradient=np.append(gradient_s.ravel(), gradient_T),
             hessian=hessian_x,
             tau=tau,

@@ -14,6 +14,7 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer import bspline, search
 from optimizer.baselines import baselines, guesses, nearest, quintic_spline, time_optimal_spline
+from optimizer.bus import Bus
 from optimizer.candidate import COARSE, EXACT, REFINED, Attempt, Guess, Solver
 from optimizer.exceptions import (
     DeadlineExceeded,
@@ -22,7 +23,7 @@ from optimizer.exceptions import (
     NoTrajectory,
 )
 from optimizer.kernel import kernel_for
-from optimizer.motion import Task, slowed
+from optimizer.motion import Task, peak_rates, slowed, stretch
 from optimizer.problem import Problem
 from optimizer.search import Entry
 from optimizer.solution import (
@@ -38,12 +39,15 @@ from optimizer.solution import (
 )
 from optimizer.targets import narrowed
 from optimizer.verify import certify
+from optimizer.windows import Window, fastest, windows
 
 # share of the deadline kept for checking and reporting the answer, at most [s]
 RESERVE_SHARE, RESERVE = 0.2, 0.1
 # a baseline counts as better only beyond the quadrature's own error
 SLACK = 1e-6
 FIT_SAMPLES = 201
+# what a joule of surplus may be worth where a store has not room for all of it, between burning it and storing it
+CREDITS = (0.75, 0.5, 0.25)
 UNCONFIRMED = "the certificate did not confirm it"
 
 
@@ -74,6 +78,7 @@ class _Run:
         self.entries: list[Entry] = []
         self.unreachable: list[UnreachableTarget] = []
         self.iterations = self.solves = 0
+        self.cut_short = False
 
     def solution(self) -> Solution:
         problem, task = self.problem, self.task
@@ -86,7 +91,10 @@ class _Run:
             raise InvalidProblem(
                 "payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg."
             )
+        without = self.without_store() if self.has_store else None
         self.explore()
+        if without is not None:
+            self.keep(*without)
         if self.best() is None:
             self.race()
         while (best := self.best()) is not None:
@@ -107,17 +115,52 @@ class _Run:
             raise DeadlineExceeded([entry.report() for entry in self.entries])
         raise NoTrajectory([entry.report() for entry in self.entries])
 
+    @property
+    def has_store(self) -> bool:
+        """Whether the objective hangs on a store's charge."""
+        return self.problem.bus.mode == "storage" and self.problem.objective == "electrical"
+
     def explore(self) -> None:
         """Solve candidates until no bound is below the best."""
-        search.explore(self.task, self.entries, lambda entry: self.count(self.solver(entry).solve()), self.deadline)
+        search.explore(self.task, self.entries, self.attempt, self.deadline)
+
+    def attempt(self, entry: Entry) -> Attempt:
+        """Solve the entry in every window of durations; the outcome of least energy."""
+        open_to_it = [w for w in windows(self.task, entry.q_goal) if w.t_max >= entry.shortest]
+        outcomes = [self.count(self.solver(entry, window).solve()) for window in open_to_it]
+        solved = [outcome for outcome in outcomes if outcome.spline is not None]
+        if len(solved) > 1:
+            solved.sort(key=lambda o: self.task.objective_of(self.task.energy(o.spline)) if o.spline else np.inf)
+        late = [outcome for outcome in outcomes if outcome.status == "out of time"]
+        self.cut_short |= bool(late)
+        return (solved + late + outcomes)[0]
+
+    def without_store(self) -> tuple[Entry, Attempt, Energy] | None:
+        """The best motion on the same bus without its store, which the store only makes cheaper; None for want of time.
+
+        An answer is never worse than this motion with the store.
+        """
+        left = self.deadline - time.perf_counter()
+        if left <= 0:
+            return None
+        try:
+            found = _Run(replace(self.problem, bus=Bus(), deadline=left / 2)).solution()
+        except DeadlineExceeded:
+            return None
+        self.iterations += found.solver.iterations
+        self.solves += found.solver.nlp_solves
+        entry = next(e for e in self.entries if (e.q_start == found.start.q).all() and (e.q_goal == found.goal.q).all())
+        spline = found.trajectory.spline
+        outcome = Attempt("solved", "converged", spline=spline, stationarity=found.solver.stationarity)
+        return entry, outcome, self.task.energy(spline)
 
     def best(self) -> Entry | None:
         """The solved entry of least energy."""
         return min((e for e in self.entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
 
-    def solver(self, entry: Entry, fastest: bool = False) -> Solver:
-        """What solves the entry."""
-        return Solver(self.task, entry.q_start, entry.q_goal, self.deadline, fastest)
+    def solver(self, entry: Entry, window: Window) -> Solver:
+        """What solves the entry in a window of durations."""
+        return Solver(self.task, entry.q_start, entry.q_goal, self.deadline, window)
 
     def count(self, outcome: Attempt) -> Attempt:
         """Add up what an attempt took."""
@@ -137,7 +180,7 @@ class _Run:
         for entry in sorted((e for e in self.entries if e.holdable), key=lambda e: e.shortest):
             if (best is not None and entry.shortest >= best.duration) or time.perf_counter() > self.deadline:
                 break
-            spline = self.count(self.solver(entry, fastest=True).solve()).spline
+            spline = self.count(self.solver(entry, fastest(self.task)).solve()).spline
             if spline is not None and (best is None or spline.duration < best.duration):
                 winner, best = entry, spline
         if winner is None or best is None:
@@ -149,20 +192,25 @@ class _Run:
         else:
             self.learn(winner, best)
 
-    def learn(self, entry: Entry, spline: Spline, repeat: int = EXACT) -> None:
+    def learn(self, entry: Entry, spline: Spline, repeat: int = EXACT, credit: float | None = None) -> None:
         """Optimise the entry from a motion, over knots where jerk switches, and keep what spends less."""
         at = np.linspace(0.0, spline.duration, FIT_SAMPLES)
         q = BSpline(spline.knots, spline.control_points, spline.degree)(at)
-        self.improve(entry, q, at, repeat)
+        self.improve(entry, q, at, repeat, credit)
 
-    def improve(self, entry: Entry, q: Array, t: Array, repeat: int) -> None:
-        """Optimise the entry from samples q (k, nq) at times t (k,), and keep the outcome if it spends less."""
-        solver, duration = self.solver(entry), float(t[-1])
-        space = solver.graded(duration, repeat)
-        s = solver.coordinates.from_joints(q)
-        outcome = self.count(solver.improve(Guess(space, bspline.fit(s, t / duration, space.knots), duration)))
-        if outcome.spline is not None:
-            self.keep(entry, outcome, self.task.energy(outcome.spline))
+    def improve(self, entry: Entry, q: Array, t: Array, repeat: int, credit: float | None = None) -> None:
+        """Optimise the entry from samples q (k, nq) at times t (k,), and keep the outcome if it spends less.
+
+        `credit` [1] is what surplus is taken to be worth where there is a store.
+        """
+        duration = float(t[-1])
+        for window in windows(self.task, entry.q_goal, credit):
+            solver = self.solver(entry, window)
+            space = solver.graded(duration, repeat)
+            s = solver.coordinates.from_joints(q)
+            outcome = self.count(solver.improve(Guess(space, bspline.fit(s, t / duration, space.knots), duration)))
+            if outcome.spline is not None:
+                self.keep(entry, outcome, self.task.energy(outcome.spline))
 
     def keep(self, entry: Entry, outcome: Attempt, energy: Energy) -> None:
         """Take an outcome as the entry's if it spends less."""
@@ -176,6 +224,12 @@ class _Run:
         spline = entry.attempt.spline
         if len(spline.control_points) == COARSE and time.perf_counter() < self.deadline:
             self.learn(entry, spline, REFINED)
+        if self.has_store:
+            for share in CREDITS:
+                if time.perf_counter() < self.deadline:
+                    worth = self.problem.regeneration
+                    credit = worth + share * max(self.problem.bus.efficiency - worth, 0.0)
+                    self.learn(entry, entry.attempt.spline, REFINED, credit)
 
     def compared(self, best: Entry) -> list[Baseline]:
         """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
@@ -215,13 +269,15 @@ class _Run:
         fastest = time_optimal_spline(self.problem.active_limits, entry.q_start, entry.q_goal)
         motions = {
             "ruckig": fastest,
-            "ruckig_slowed": replace(fastest, knots=fastest.knots * (best.duration / fastest.duration)),
+            "ruckig_slowed": slowed(fastest, best.duration / fastest.duration),
             "quintic": quintic_spline(entry.q_start, entry.q_goal, best.duration),
         }
         for name in better:
             if name not in motions:
                 continue
-            spline = slowed(motions[name], self.problem.active_limits)
+            limits = self.problem.active_limits
+            needed = stretch(peak_rates(motions[name]) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+            spline = slowed(motions[name], max(needed, 1.0))
             energy = self.task.energy(spline)
             if self.allows(spline.duration) and self.certified(entry, spline, energy).valid:
                 self.keep(entry, Attempt("solved", f"the {name} motion itself", spline=spline), energy)
@@ -249,7 +305,7 @@ class _Run:
             if entry.lower_bound >= self.task.objective_of(energy):
                 entry.status, entry.reason = "pruned", search.PRUNED
         return Solution(
-            status="feasible" if any(e.status != "pruned" for e in open_ends) else "optimal",
+            status="feasible" if self.cut_short or any(e.status != "pruned" for e in open_ends) else "optimal",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=self.task.trajectory(spline, self.problem.sample_period),

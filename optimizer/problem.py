@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from optimizer.arm import Arm
+from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem
 from optimizer.targets import Target, validated
 
@@ -32,8 +33,9 @@ class Problem(Arm):
     """A request for the motion of least energy between `start` and `goal`.
 
     `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these. `duration_min` and
-    `duration_max` [s] bound the duration; equal, they fix it; None leaves it to the optimiser. `deadline` [s] is the
-    wall time after which the best verified result so far is returned.
+    `duration_max` [s] bound the duration; equal, they fix it; None leaves it to the optimiser. With a `cycle` the arm
+    waits at the goal until the cycle is over, which ends the longest duration allowed, too. `deadline` [s] is the wall
+    time after which the best verified result so far is returned.
 
     Raises InvalidProblem or OutsideLimits, with the field named, when the parts do not fit together.
     """
@@ -44,6 +46,7 @@ class Problem(Arm):
     objective: Objective = "electrical"
     duration_min: float | None = None
     duration_max: float | None = None
+    cycle: Cycle | None = None
     branch: BranchFilter | None = None
     windings: bool = True
     sample_period: float = 0.008
@@ -59,6 +62,11 @@ class Problem(Arm):
                 raise InvalidProblem("duration", "duration must be a positive number of seconds.")
         if self.duration_min is not None and self.duration_max is not None and self.duration_min > self.duration_max:
             raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
+        if self.cycle is not None:
+            if self.duration_min is not None and self.duration_min > self.cycle.time:
+                raise InvalidProblem("duration", "The shortest duration must not exceed cycle.time.")
+            longest = self.cycle.time if self.duration_max is None else min(self.duration_max, self.cycle.time)
+            object.__setattr__(self, "duration_max", longest)
         if self.objective == "mechanical" and self.duration_max is None:
             raise InvalidProblem(
                 "duration",

@@ -189,7 +189,8 @@ def bound(task: Task, entries: Sequence[Entry]) -> None:
             overload[id(end)] = TorqueInfeasible(joints[j], float(needed[j]), float(tau_max[j]))
     travel = np.array([entry.q_goal - entry.q_start for entry in entries])
     climb = np.array([potential[id(entry.goal)] - potential[id(entry.start)] for entry in entries])
-    bounds, shortest = lower_bounds(task, travel, climb)
+    hold = task.holding_power(np.array([entry.q_goal for entry in entries])) if task.problem.cycle else None
+    bounds, shortest = lower_bounds(task, travel, climb, hold)
     for entry, value, least in zip(entries, bounds.tolist(), shortest.tolist(), strict=True):
         entry.lower_bound, entry.shortest = value, least
         error = overload.get(id(entry.start)) or overload.get(id(entry.goal))

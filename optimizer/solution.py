@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from models.robot import Array
@@ -24,9 +24,9 @@ class Spline:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Samples of a motion: t (k,), q, v, a, tau, tau_motor (k, nq), power (k,) drawn from the bus [W].
+    """Samples of a motion: t (k,), q, v, a, tau, tau_motor (k, nq), power (k,) drawn from the supply [W].
 
-    `tau` is rigid body and rotor; `tau_motor` adds friction.
+    `tau` is rigid body and rotor; `tau_motor` adds friction. `charge` (k,) [J] is the store's, None without a store.
     """
 
     t: Array
@@ -37,11 +37,15 @@ class Trajectory:
     tau_motor: Array
     power: Array
     spline: Spline
+    charge: Array | None = None
 
 
 @dataclass(frozen=True)
 class ElectricalEnergy:
-    """Energy drawn from the bus [J] and the parts that add up to it; `recovered` is negative."""
+    """Energy drawn from the supply, what a store lost of its charge included [J], and the parts that add up to it.
+
+    `recovered` is negative; `storage_loss` is lost in the store, `dwell` drawn while the arm waits after its motion.
+    """
 
     total: float
     idle: float
@@ -52,13 +56,15 @@ class ElectricalEnergy:
     inverter: float
     braking: float
     recovered: float
+    storage_loss: float = 0.0
+    dwell: float = 0.0
 
     @property
     def parts_sum(self) -> float:
         """Sum of the parts [J]: equal to `total` up to quadrature."""
         return (
             self.idle + self.potential + self.kinetic + self.friction
-            + self.copper + self.inverter + self.braking + self.recovered
+            + self.copper + self.inverter + self.braking + self.recovered + self.storage_loss + self.dwell
         )  # fmt: skip
 
 
@@ -81,14 +87,33 @@ class JointEnergy:
 
 
 @dataclass(frozen=True)
+class StorageUse:
+    """The bus' store over a motion [J]: its charge at both ends, and what went in and out at the bus."""
+
+    initial: float
+    final: float
+    charged: float
+    discharged: float
+
+
+@dataclass(frozen=True)
 class Energy:
-    """Everything about a motion's energy [J, W]."""
+    """Everything about a motion's energy [J, W]; peak and mean power are of the motion itself, drawn from the supply.
+
+    `storage` is None on a bus without a store.
+    """
 
     electrical: ElectricalEnergy
     mechanical: MechanicalEnergy
     per_joint: JointEnergy
     peak_power: float
     mean_power: float
+    storage: StorageUse | None = None
+
+    def with_dwell(self, dwell: float) -> Energy:
+        """The same with energy [J] drawn while the arm waits afterwards."""
+        electrical = self.electrical
+        return replace(self, electrical=replace(electrical, total=electrical.total + dwell, dwell=dwell))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from scipy.interpolate import BSpline
 
 from models.robot import Array, Limits
 from optimizer.arm import Pose
+from optimizer.dwell import holding_power
 from optimizer.energy import breakdown
 from optimizer.problem import Problem
 from optimizer.solution import Certificate, Energy, Spline
@@ -30,8 +31,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
     positions that the answer names as its ends. The grid is uniform, of at most 1 ms, and includes both ends. Motions
     that leave the spline's own knots give NaN, which no tolerance passes.
     """
-    robot, payload = problem.robot, problem.payload
-    model = robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.gravity)
+    model = problem.loaded_model()
     data = model.createData()
 
     t = grid(spline.duration)
@@ -46,10 +46,12 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         tau,
         potential=_change([pin.computePotentialEnergy(model, data, q[i]) for i in (0, -1)]),
         kinetic=_change([pin.computeKineticEnergy(model, data, q[i], v[i]) for i in (0, -1)]),
-        drives=robot.drives,
-        friction=problem.friction_law,
-        electronics=robot.electronics,
+        arm=problem,
     )
+    if problem.cycle is not None:
+        still = np.zeros_like(q[-1:])
+        hold = float(holding_power(problem, _inverse_dynamics(model, data, q[-1:], still, still))[0])
+        energy = energy.with_dwell(problem.cycle.dwell(problem, hold, spline.duration))
     limits = problem.active_limits
     return Certificate(
         worst_ratio=limit_ratios(limits, q, v, a, jerk, tau_motor),

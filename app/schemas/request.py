@@ -163,6 +163,110 @@ class Branch(Request):
     wrist: Literal["flip", "no_flip"] | None = described("Wrist flipped or not.", None, "no_flip", default=None)
 
 
+Scale = Annotated[float, Field(ge=0.1, le=10)]
+_ScaleList = Annotated[list[Scale], Field(min_length=1, max_length=16)]
+ScalePerJoint = Annotated[Annotated[Scale, Tag("one")] | Annotated[_ScaleList, Tag("each")], _SHAPE]
+Loss = Annotated[float, Field(ge=0, le=1e3)]
+_LossList = Annotated[list[Loss], Field(min_length=1, max_length=16)]
+LossPerJoint = Annotated[Annotated[Loss, Tag("one")] | Annotated[_LossList, Tag("each")], _SHAPE]
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Inverter(Request):
+    """The inverters' loss constant + linear·|i| + quadratic·i². One number holds for every joint; null: the robot's."""
+
+    constant: LossPerJoint | None = described("Loss at no current, at most 1000.", "W", 1.5, default=None)
+    linear: LossPerJoint | None = described("Loss per current, at most 100.", "W/A", 0.6, default=None)
+    quadratic: LossPerJoint | None = described("Loss per current squared, at most 10.", "W/A²", 0.02, default=None)
+
+
+class Drives(Request):
+    """Figures of the drives in place of the robot's own."""
+
+    inverter: Inverter = described("Loss of the inverters.", None, {"constant": 1.5, "linear": 0.6}, default=Inverter())
+
+
+class SharedBus(Request):
+    """Joints exchange power; what is left over is burnt, but for the share that the robot's own supply takes back."""
+
+    mode: Literal["shared"] = described("Surplus feeds the other joints; the rest is burnt.", None, "shared")
+
+
+class IsolatedBus(Request):
+    """Every joint burns its own surplus."""
+
+    mode: Literal["isolated"] = described("No joint's surplus feeds another.", None, "isolated")
+
+
+class RecuperatingBus(Request):
+    """Joints exchange power; what is left over is fed back."""
+
+    mode: Literal["recuperating"] = described(
+        "Surplus feeds the other joints; the rest goes back.", None, "recuperating"
+    )
+    efficiency: Share = described("Share of the net surplus that is worth as much as what is drawn.", "1", 0.8)
+
+
+class StorageBus(Request):
+    """Joints exchange power; what is left over charges a capacitor or flywheel on the bus, which feeds later demand."""
+
+    mode: Literal["storage"] = described("Surplus feeds the other joints; the rest is stored.", None, "storage")
+    capacity: float = described("Charge that the full store can give back.", "J", 30.0, ge=0, le=1e9)
+    power: Annotated[float, Field(gt=0, le=1e9)] | None = described(
+        "Most that goes into or comes out of the store. Null: no limit.", "W", 500.0, default=None
+    )
+    efficiency: Share = described("Of a round trip; the loss is taken on the way in.", "1", 0.9, default=1.0)
+    initial: float = described(
+        "Charge at the start, at most `capacity`; what is used up of it counts as drawn.",
+        "J",
+        0.0,
+        default=0.0,
+        ge=0,
+        le=1e9,
+    )
+
+
+def _by_mode(value: Any) -> str | None:
+    mode = value.get("mode") if isinstance(value, dict) else getattr(value, "mode", None)
+    return mode if mode in ("shared", "isolated", "recuperating", "storage") else None
+
+
+Bus = Annotated[
+    Annotated[SharedBus, Tag("shared")]
+    | Annotated[IsolatedBus, Tag("isolated")]
+    | Annotated[RecuperatingBus, Tag("recuperating")]
+    | Annotated[StorageBus, Tag("storage")],
+    Discriminator(
+        _by_mode,
+        custom_error_type="bus_mode",
+        custom_error_message="Give an object whose `mode` is shared, isolated, recuperating or storage",
+    ),
+]
+
+
+class Cycle(Request):
+    """When the arm is needed again after the motion's start, and how it is held still until then."""
+
+    time: Seconds = described(
+        "From the start of the motion to the end of the wait: the motion takes no longer.", "s", 6.0
+    )
+    hold: Literal["motors", "brakes"] = described(
+        "Whether the motors hold the arm all the time, or the brakes after `brake_delay`.",
+        None,
+        "brakes",
+        default="motors",
+    )
+    brake_delay: float = described(
+        "Time from the motion's end until the brakes hold.", "s", 0.5, default=0.0, ge=0, le=MAX_DURATION
+    )
+    brake_power: Annotated[float, Field(ge=0, le=1e4)] | None = described(
+        "What the arm draws on its brakes, electronics included. Null: what the electronics draw.",
+        "W",
+        20.0,
+        default=None,
+    )
+
+
 class ArmRequest(Request):
     """What every request about a motion says of the arm."""
 
@@ -193,6 +297,22 @@ class ArmRequest(Request):
         None,
         "curved",
         default=None,
+    )
+    drives: Drives = described(
+        "Figures of the drives in place of the robot's own.", None, {"inverter": {"constant": 1.5}}, default=Drives()
+    )
+    bus: Bus = described(
+        "Where the joints' surplus power goes.",
+        None,
+        {"mode": "storage", "capacity": 30.0, "power": 500.0, "efficiency": 0.9},
+        default=SharedBus(mode="shared"),
+    )
+    link_mass_scale: ScalePerJoint = described(
+        "Factor on mass and inertia of the moving links, payload and rotors apart: one number, or one per joint for "
+        "the link that it moves.",
+        "1",
+        0.8,
+        default=1.0,
     )
 
 
@@ -226,6 +346,12 @@ class OptimizeRequest(ArmRequest):
         f"no best duration of its own). At most {MAX_DURATION:g} s, and {MAX_SAMPLES} times `sample_period`.",
         "s",
         {"max": 3.0},
+        default=None,
+    )
+    cycle: Cycle | None = described(
+        "Wait at the goal until the cycle is over; the energy then includes the wait. Null: the motion alone.",
+        None,
+        {"time": 6.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 20.0},
         default=None,
     )
     branch: Branch | None = described(

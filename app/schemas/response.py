@@ -53,14 +53,20 @@ class Trajectory(Response):
     tau_motor: JointSamples = described(
         "Motor torque at the joint, friction included.", "N·m", [[0.0, -38.1, -16.4, -1.2, 0.0, 0.0]]
     )
-    power: Samples = described("Power drawn from the bus.", "W", [42.5, 43.1, 45.0])
+    power: Samples = described("Power drawn from the supply.", "W", [42.5, 43.1, 45.0])
+    charge: Samples | None = described("Charge of the bus' store; null without one.", "J", [0.0, 2.1, 5.3])
     spline: Spline = part("The motion itself, from which all the rest follows.")
 
 
 class ElectricalEnergy(Response):
-    """Energy drawn from the bus and its parts, which add up to the total."""
+    """Energy drawn from the supply and its parts, which add up to the total."""
 
-    total: float = described("Energy drawn from the bus.", "J", 152.4)
+    total: float = described(
+        "Energy drawn from the supply, the wait until the cycle's end included, and what the bus' store, if there is "
+        "one, lost of its charge (less than nothing where it gained).",
+        "J",
+        152.4,
+    )
     idle: float = described("Electronics: idle and controller power times the duration.", "J", 66.1)
     potential: float = described("Rise in potential energy.", "J", 12.3)
     kinetic: float = described("Rise in kinetic energy: zero between two rests.", "J", 0.0)
@@ -69,6 +75,8 @@ class ElectricalEnergy(Response):
     inverter: float = described("Lost in the inverters.", "J", 0.0)
     braking: float = described("Surplus burnt in the brake resistor.", "J", 5.0)
     recovered: float = described("Surplus given back to the supply, zero or negative.", "J", 0.0)
+    storage_loss: float = described("Lost on the way through the bus' store.", "J", 0.0)
+    dwell: float = described("Drawn while waiting at the goal until the cycle is over.", "J", 0.0)
 
 
 class MechanicalEnergy(Response):
@@ -87,14 +95,24 @@ class JointEnergy(Response):
     shaft: Joints = described("∫ tau_motor · v dt.", "J", [20.1, 24.0, 13.0, 2.2, 0.8, 0.2])
 
 
+class Storage(Response):
+    """The bus' store over the motion."""
+
+    initial: float = described("Charge at the start.", "J", 0.0)
+    final: float = described("Charge at the end.", "J", 1.4)
+    charged: float = described("Put in, at the bus.", "J", 22.7)
+    discharged: float = described("Taken out, at the bus.", "J", 19.0)
+
+
 class Energy(Response):
     """Everything about the motion's energy."""
 
     electrical: ElectricalEnergy = part("Energy drawn from the bus.")
     mechanical: MechanicalEnergy = part("Absolute mechanical work.")
     per_joint: JointEnergy = part("The same, joint by joint.")
-    peak_power: float = described("Greatest power drawn from the bus.", "W", 236.0)
-    mean_power: float = described("Mean power drawn from the bus.", "W", 84.7)
+    storage: Storage | None = part("The bus' store; null without one.")
+    peak_power: float = described("Greatest power drawn from the supply during the motion.", "W", 236.0)
+    mean_power: float = described("Mean power drawn from the supply during the motion.", "W", 84.7)
     lower_bound: float = described(
         "Of the objective: no motion of any shape and any allowed duration between these targets needs less.",
         "J",

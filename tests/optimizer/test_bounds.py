@@ -104,8 +104,7 @@ def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: in
         v = curve(t, 1)
         change = torques.task.potential(goal) - torques.task.potential(start)
         tau = torques(curve(t), v, curve(t, 2))
-        made_of = task.robot.drives, task.friction_law, task.robot.electronics
-        yield duration, breakdown(weights, v, tau, change, *made_of)
+        yield duration, breakdown(weights, v, tau, change, task)
 
 
 def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Array, Array]:

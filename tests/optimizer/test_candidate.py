@@ -10,6 +10,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from models.robot import Array
+from optimizer import windows
 from optimizer.candidate import Attempt, Solver
 from optimizer.kernel import compile_kernel
 from optimizer.motion import Task
@@ -44,7 +45,9 @@ CONDITIONS: list[dict[str, Any]] = [
 
 def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any) -> Solver:
     compile_kernel(ROBOT)
-    return Solver(Task(problem(start, goal, **given)), start, goal, time.perf_counter() + wait, fastest)
+    task = Task(problem(start, goal, **given))
+    window = windows.fastest(task) if fastest else None
+    return Solver(task, start, goal, time.perf_counter() + wait, window)
 
 
 def spline(attempt: Attempt) -> Spline:

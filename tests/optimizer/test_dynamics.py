@@ -40,11 +40,15 @@ def random_gravity(rng: np.random.Generator) -> Array:
     return 9.81 * direction / np.linalg.norm(direction)
 
 
+def fresh_payload() -> SymbolicPayload:
+    return SymbolicPayload(ca.SX.sym("m"), ca.SX.sym("c", 3), ca.SX.sym("I", 6))
+
+
 def build(model: pin.Model) -> ca.Function:
     """(q, v, a, payload's mass, com, inertia, gravity, rotor) → torques and their Jacobians by q, v and a."""
     nq = model.nq
     q, v, a, rotor = (ca.SX.sym(name, nq) for name in ("q", "v", "a", "rotor"))
-    gravity, payload = ca.SX.sym("g", 3), SymbolicPayload.create()
+    gravity, payload = ca.SX.sym("g", 3), fresh_payload()
     tau = inverse_dynamics(model, q, v, a, payload, gravity, rotor)
     return ca.Function(
         "inverse_dynamics",
@@ -139,4 +143,4 @@ def test_refuses_a_joint_of_another_kind() -> None:
     model.addJoint(0, pin.JointModelRX(), pin.SE3.Identity(), "joint")
     one = ca.SX.sym("x")
     with pytest.raises(ValueError, match="z axes"):
-        inverse_dynamics(model, one, one, one, SymbolicPayload.create(), ca.SX.sym("g", 3), one)
+        inverse_dynamics(model, one, one, one, fresh_payload(), ca.SX.sym("g", 3), one)

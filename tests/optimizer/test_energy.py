@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 
 from models.registry import load_robot
-from models.robot import Array
+from models.robot import Array, Drives, Electronics
+from optimizer.arm import Arm
 from optimizer.energy import breakdown, drawn_power, power_flow, smooth_abs
 
 IDENTITY_TOLERANCE = 1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
@@ -24,6 +25,10 @@ LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, s
     inverter_linear=np.array([0.3, 0.3, 0.3, 0.5, 0.5, 0.5]),
     inverter_quadratic=np.full(6, 0.02),
 )
+
+
+def arm(drives: Drives, electronics: Electronics = ROBOT.electronics) -> Arm:
+    return Arm(robot=replace(ROBOT, drives=drives, electronics=electronics))
 
 
 def torques(q: Array, v: Array, a: Array) -> Array:
@@ -49,7 +54,7 @@ def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float
     """Back where it began, neither potential nor kinetic energy has changed: every joule is a loss."""
     weights, q, v, a = closed_motion(duration=2.0, amplitude=amplitude)
     electronics = replace(ROBOT.electronics, controller_power=11.0, regeneration=regeneration)
-    energy = breakdown(weights, v, torques(q, v, a), 0.0, LOSSY, ROBOT.friction, electronics)
+    energy = breakdown(weights, v, torques(q, v, a), 0.0, arm(LOSSY, electronics))
     electrical = energy.electrical
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=IDENTITY_TOLERANCE)
     assert electrical.idle == pytest.approx(2.0 * (36.7 + 11.0), rel=HAND_TOLERANCE)
@@ -76,7 +81,7 @@ def test_parts_add_up_when_energy_is_stored() -> None:
     potential = float(np.diff([pin.computePotentialEnergy(ROBOT.model, data, q[i]) for i in (-2, -1)])[0])
     kinetic = float(np.diff([pin.computeKineticEnergy(ROBOT.model, data, q[i], v[i]) for i in (-2, -1)])[0])
     tau = torques(q, v, a)[:-2]
-    energy = breakdown(weights, v[:-2], tau, potential, LOSSY, ROBOT.friction, ROBOT.electronics, kinetic=kinetic)
+    energy = breakdown(weights, v[:-2], tau, potential, arm(LOSSY), kinetic=kinetic)
     rotors = 0.5 * ROBOT.drives.rotor_inertia @ (v[-1] ** 2 - v[-2] ** 2)
     assert abs(rotors) > 0.1  # J: the identity would not hold without the rotors' share of the kinetic energy
     assert energy.electrical.parts_sum == pytest.approx(energy.electrical.total, rel=IDENTITY_TOLERANCE)
@@ -86,7 +91,7 @@ def test_constant_power_by_hand() -> None:
     """One second at constant speed and torque: each term from its own formula, UR5e figures written out."""
     v, tau = np.zeros((2, 6)), np.zeros((2, 6))
     v[:, 0], tau[:, 0] = 1.5, 20.0
-    energy = breakdown(np.array([0.25, 0.75]), v, tau, 0.0, LOSSY, ROBOT.friction, ROBOT.electronics)
+    energy = breakdown(np.array([0.25, 0.75]), v, tau, 0.0, arm(LOSSY))
     friction = float(ROBOT.friction.torque(np.full(6, 1.5))[0])
     i = (20.0 + friction) / 10.15
     inverter = 6 * 0.7 + 0.3 * i + 0.02 * i**2  # the constant is paid by every joint
@@ -118,7 +123,7 @@ def test_braking_costs_nothing_but_its_losses() -> None:
     assert surplus > 50.0  # W
     for regeneration in (0.0, 0.5):
         electronics = replace(ROBOT.electronics, regeneration=regeneration)
-        electrical = breakdown(np.ones(1), v, tau, 0.0, ROBOT.drives, ROBOT.friction, electronics).electrical
+        electrical = breakdown(np.ones(1), v, tau, 0.0, arm(ROBOT.drives, electronics)).electrical
         assert electrical.braking == pytest.approx(surplus, rel=HAND_TOLERANCE)
         assert electrical.total == pytest.approx(-regeneration * surplus, rel=HAND_TOLERANCE, abs=1e-12)
 
