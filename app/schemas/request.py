@@ -181,7 +181,7 @@ class Inverter(Request):
 
 
 class Drives(Request):
-    """Figures of the drives in place of the robot's own."""
+    """Motors, gears and inverters: what may differ from the robot's figures."""
 
     inverter: Inverter = described("Loss of the inverters.", None, {"constant": 1.5, "linear": 0.6}, default=Inverter())
 
