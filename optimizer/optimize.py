@@ -14,6 +14,7 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer import bspline, search
 from optimizer.baselines import baselines, guesses, nearest, quintic_spline, time_optimal_spline
+from optimizer.bounds import LEAST_DURATION
 from optimizer.bus import Bus
 from optimizer.candidate import COARSE, EXACT, REFINED, Attempt, Guess, Solver
 from optimizer.exceptions import (
@@ -149,7 +150,15 @@ class _Run:
             return None
         self.iterations += found.solver.iterations
         self.solves += found.solver.nlp_solves
-        entry = next(e for e in self.entries if (e.q_start == found.start.q).all() and (e.q_goal == found.goal.q).all())
+        ends = found.start, found.goal
+        entry = next(
+            e
+            for e in self.entries
+            if all(
+                end.target == own.target and (q == own.q).all()
+                for end, q, own in zip((e.start, e.goal), (e.q_start, e.q_goal), ends, strict=True)
+            )
+        )
         spline = found.trajectory.spline
         outcome = Attempt("solved", "converged", spline=spline, stationarity=found.solver.stationarity)
         return entry, outcome, self.task.energy(spline)
@@ -288,8 +297,8 @@ class _Run:
         return certify(asked, spline, entry.q_start, entry.q_goal, energy)
 
     def allows(self, duration: float) -> bool:
-        """Whether the request lets a motion take that long."""
-        least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
+        """Whether the request lets a motion take that long; a baseline between equal ends takes no time at all."""
+        least, most = self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
         return bool(least * (1 - SLACK) <= duration <= most * (1 + SLACK))
 
     def answer(self, best: Entry, table: list[Baseline]) -> Solution | None:
