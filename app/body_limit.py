@@ -5,34 +5,38 @@ Starlette's own middleware for this answers in plain text, and puts that in the 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class BodyLimit:
-    """ASGI middleware: reading a body of more than `most` bytes raises a 413."""
+    """ASGI middleware: reading a body of more than `most` bytes, or what `uploads` says of its path, raises a 413."""
 
-    def __init__(self, app: ASGIApp, most: int) -> None:
+    def __init__(self, app: ASGIApp, most: int, uploads: Mapping[str, int]) -> None:
         self._app = app
         self._most = most
+        self._uploads = uploads
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes the request on, counting its bytes."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
+        most = self._uploads.get(scope["path"], self._most)
         declared = Headers(scope=scope).get("content-length", "")
         size = int(declared) if declared.isdecimal() else 0
 
         async def limited() -> Message:
             nonlocal size
-            if size > self._most:  # as declared: there is no need to read it
+            if size > most:  # as declared: there is no need to read it
                 raise HTTPException(413)
             message = await receive()
             if not declared:
                 size += len(message.get("body", b""))
-            if size > self._most:
+            if size > most:
                 raise HTTPException(413)
             return message
 

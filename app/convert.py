@@ -177,19 +177,19 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "objective": request.objective,
         "duration": solution.duration,
         "status": solution.status,
-        "branch": {end: _fields(getattr(solution, end), "label", "q", "target") for end in ("start", "goal")},
+        "branch": {end: fields(getattr(solution, end), "label", "q", "target") for end in ("start", "goal")},
         "trajectory": {
-            **_fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power", "charge"),
-            "spline": _fields(trajectory.spline, "degree", "knots", "control_points"),
+            **fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power", "charge"),
+            "spline": fields(trajectory.spline, "degree", "knots", "control_points"),
         },
         "energy": {
-            **_energy(solution.energy),
+            **energy_fields(solution.energy),
             "lower_bound": solution.lower_bound,
             # a motion that costs nothing is as good as can be
             "optimality_gap": 1 - solution.lower_bound / objective if objective > 0 else 0.0,
         },
         "baselines": [
-            _fields(baseline, "name", "duration", "electrical", "mechanical", "within_limits", "saving")
+            fields(baseline, "name", "duration", "electrical", "mechanical", "within_limits", "saving")
             for baseline in solution.baselines
         ],
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
@@ -198,34 +198,35 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
             "worst_ratio": certificate.worst_ratio,
             "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
             "goal_error": dict(zip(("position", "rotation"), certificate.goal_error, strict=True)),
-            **_fields(certificate, "energy_error", "balance_error"),
+            **fields(certificate, "energy_error", "balance_error"),
         },
-        "solver": _fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
+        "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
     }
 
 
 def candidate_fields(candidate: Candidate) -> dict[str, Any]:
     """One entry of `candidates`."""
     ends = ("start", "start_target", "goal", "goal_target", "q_start", "q_goal")
-    return _fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")
+    return fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")
 
 
 def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
     """One entry of `unreachable`."""
-    return _fields(target, "end", "target", "reason")
+    return fields(target, "end", "target", "reason")
 
 
-def _energy(energy: Energy) -> dict[str, Any]:
+def energy_fields(energy: Energy) -> dict[str, Any]:
+    """Energy as every answer lays it out."""
     return {
-        "electrical": _fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
-        "mechanical": _fields(energy.mechanical, "total", "per_joint"),
-        "per_joint": _fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
-        "storage": None if energy.storage is None else _fields(energy.storage, *StorageUse.__dataclass_fields__),
-        **_fields(energy, "peak_power", "mean_power"),
+        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+        "mechanical": fields(energy.mechanical, "total", "per_joint"),
+        "per_joint": fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
+        "storage": None if energy.storage is None else fields(energy.storage, *StorageUse.__dataclass_fields__),
+        **fields(energy, "peak_power", "mean_power"),
     }
 
 
-def _fields(source: object, *names: str) -> dict[str, Any]:
+def fields(source: object, *names: str) -> dict[str, Any]:
     """Attributes by name. The JSON encoder takes arrays in C order only, and writes what is not finite as null."""
     values = {name: getattr(source, name) for name in names}
     return {
@@ -239,7 +240,7 @@ def to_ik_response(request: IKRequest, request_id: str, solutions: Sequence[IKSo
         "id": request_id,
         "robot": request.robot,
         "solutions": [
-            {"label": str(solution.label), **_fields(solution, "q", "limit_distance", "smallest_singular_value")}
+            {"label": str(solution.label), **fields(solution, "q", "limit_distance", "smallest_singular_value")}
             for solution in solutions
         ],
     }

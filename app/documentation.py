@@ -9,6 +9,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
+from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from app.schemas.problems import PROBLEMS, Internal, Problem
 from app.settings import Settings
 
@@ -67,8 +68,13 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
         routes=app.routes,
     )
     schemas = document["components"]["schemas"]
-    _, problems = models_json_schema([(problem, "serialization") for problem in PROBLEMS], ref_template=_REF)
-    schemas.update(problems["$defs"])
+    _, others = models_json_schema(
+        [(problem, "serialization") for problem in PROBLEMS]
+        # a body that its route does not let FastAPI read
+        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings)],
+        ref_template=_REF,
+    )
+    schemas.update(others["$defs"])
     # FastAPI's own error model: no route answers with it
     for name in ("HTTPValidationError", "ValidationError"):
         schemas.pop(name, None)

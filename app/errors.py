@@ -8,20 +8,25 @@ ServiceError
 ├── WorkerDied          its worker process ended under it
 ├── StoreUnavailable    the database cannot be reached
 ├── UnknownAnswer       no answer is kept under that id
-└── NotFound, MethodNotAllowed, BodyTooLarge
+└── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import orjson
 
 from app.convert import candidate_fields, unreachable_fields
 from app.schemas import problems
+from app.schemas.common import Request as RequestModel
 from optimizer import exceptions as optimizer_errors
+
+MOST_ERRORS = 20
+"""A body can be wrong in thousands of places; the first few tell enough."""
 
 
 class ServiceError(Exception):
@@ -34,6 +39,31 @@ class InvalidRequest(ServiceError):
     def __init__(self, errors: Sequence[Mapping[str, Any]]) -> None:
         super().__init__("Correct the fields listed under `errors`.")
         self.errors = list(errors)
+
+    @classmethod
+    def by_pydantic(cls, errors: Sequence[Any], *where: str) -> InvalidRequest:
+        """From pydantic's errors; `where` goes before their locations.
+
+        Location and message only: pydantic's `input` repeats what was sent, and so may a location that is no field.
+        """
+        known = _field_names()
+        return cls(
+            [
+                {
+                    "loc": [*where, *(part for part in error["loc"] if isinstance(part, int) or part in known)],
+                    "msg": error["msg"],
+                }
+                for error in errors[:MOST_ERRORS]
+            ]
+        )
+
+
+@cache
+def _field_names() -> set[str]:
+    def names(model: type[RequestModel]) -> set[str]:
+        return set(model.model_fields).union(*(names(child) for child in model.__subclasses__()))
+
+    return names(RequestModel) | {"body", "path", "query", "header"}
 
 
 class Busy(ServiceError):
@@ -99,6 +129,13 @@ class BodyTooLarge(ServiceError):
         super().__init__("The body is larger than the service accepts: send a smaller one.")
 
 
+class UnsupportedMediaType(ServiceError):
+    """The body is of a kind that the path does not take."""
+
+    def __init__(self) -> None:
+        super().__init__("This path takes JSON or CSV: declare the body as application/json or text/csv.")
+
+
 class ClientDisconnected(Exception):
     """The caller hung up: nobody is left to answer."""
 
@@ -107,6 +144,7 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     InvalidRequest: problems.Validation,
     optimizer_errors.InvalidProblem: problems.Validation,
     optimizer_errors.OutsideLimits: problems.OutsideLimits,
+    optimizer_errors.InvalidTable: problems.InvalidTable,
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,
@@ -123,6 +161,7 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     NotFound: problems.NotFound,
     MethodNotAllowed: problems.MethodNotAllowed,
     BodyTooLarge: problems.BodyTooLarge,
+    UnsupportedMediaType: problems.UnsupportedMediaType,
     WorkerDied: problems.Internal,
 }
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -18,20 +17,15 @@ from app.errors import (
     ServiceError,
     problem_reply,
 )
-from app.schemas.common import Request as RequestModel
 from optimizer.exceptions import JoulepathError
-
-MOST_ERRORS = 20
-"""A body can be wrong in thousands of places; the first few tell enough."""
 
 
 def install_handlers(app: FastAPI) -> None:
     """Answers every exception of the routes as a problem; `RequestContext` passes on what no route caught."""
-    known = _field_names(RequestModel) | {"body", "path", "query", "header"}
 
     async def handle(request: Request, error: Exception) -> Response:
         if isinstance(error, RequestValidationError):
-            return respond(request, InvalidRequest(_readable(error.errors(), known)))
+            return respond(request, InvalidRequest.by_pydantic(error.errors()))
         return respond(request, error)
 
     for kind in (JoulepathError, ServiceError, RequestValidationError, HTTPException):
@@ -60,19 +54,3 @@ def _from_framework(error: HTTPException) -> Exception:
     refusals: dict[int, type[ServiceError]] = {404: NotFound, 405: MethodNotAllowed, 413: BodyTooLarge}
     refusal = refusals.get(error.status_code)
     return error if refusal is None else refusal()
-
-
-def _readable(errors: Sequence[Any], known: set[str]) -> list[dict[str, Any]]:
-    """Location and message only: pydantic's `input` repeats what was sent, and so may a location that is no field."""
-    return [
-        {
-            "loc": [part for part in error["loc"] if isinstance(part, int) or part in known],
-            "msg": error["msg"],
-        }
-        for error in errors[:MOST_ERRORS]
-    ]
-
-
-def _field_names(model: type[RequestModel]) -> set[str]:
-    names = set(model.model_fields)
-    return names.union(*(_field_names(child) for child in model.__subclasses__()))

@@ -33,6 +33,9 @@ class Settings(BaseSettings):
     )
     queue_size: int = Field(default=16, ge=0, description="Requests that may wait for a worker; more are refused.")
     max_body_bytes: int = Field(default=65_536, ge=1024, description="Largest request body [byte].")
+    max_upload_bytes: int = Field(
+        default=67_108_864, ge=1024, description="Largest body of `POST /evaluate`, which goes to a file [byte]."
+    )
     max_deadline: float = Field(default=120.0, gt=0, le=600, description="Longest deadline a caller may ask for [s].")
     deadline_grace: float = Field(
         default=5.0, gt=0, description="Time past the deadline after which a worker is killed [s]."

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import orjson
 
 from app.convert import to_problem, to_response
-from app.errors import Reply, problem_reply
+from app.errors import Reply, ServiceError, problem_reply
 from app.schemas.request import OptimizeRequest
 from models.registry import robot_names
 from optimizer.exceptions import JoulepathError
@@ -26,17 +28,29 @@ class OptimizeTask:
 
     def run(self, deadline: float) -> Reply:
         """The answer, or the problem, within about `deadline` seconds."""
-        try:
-            solution = optimize(to_problem(self.request, deadline))
-            if not solution.certificate.valid:
-                raise AssertionError(f"The optimizer returned a motion that does not hold: {solution.certificate}")
-            content = to_response(self.request, self.request_id, solution)
-            return Reply(200, orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
-        except JoulepathError as error:
-            return problem_reply(error, self.request_id)
-        except Exception as error:
-            logger.exception("unforeseen error", extra={"request_id": self.request_id})
-            return problem_reply(error, self.request_id)
+        return answer(self.request_id, lambda: self._solve(deadline))
+
+    def _solve(self, deadline: float) -> Reply:
+        solution = optimize(to_problem(self.request, deadline))
+        if not solution.certificate.valid:
+            raise AssertionError(f"The optimizer returned a motion that does not hold: {solution.certificate}")
+        return json_reply(to_response(self.request, self.request_id, solution))
+
+
+def answer(request_id: str, work: Callable[[], Reply]) -> Reply:
+    """What the work returns, or the problem that it raises."""
+    try:
+        return work()
+    except (JoulepathError, ServiceError) as error:
+        return problem_reply(error, request_id)
+    except Exception as error:
+        logger.exception("unforeseen error", extra={"request_id": request_id})
+        return problem_reply(error, request_id)
+
+
+def json_reply(content: dict[str, Any]) -> Reply:
+    """An answer as JSON; what is not finite is null."""
+    return Reply(200, orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
 
 
 def warm() -> None:

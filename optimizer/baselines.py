@@ -36,8 +36,8 @@ CLOSEST_BREAKS = (
 # Gauss-Lobatto points and weights on [0, 1]: exact for polynomials of degree 9, and with a panel's ends among them,
 # where torque peaks when acceleration jumps or bends
 _INNER = np.sqrt((7 + 2 * math.sqrt(7) * np.array([1, -1])) / 21)
-_LOBATTO = (1 + np.array([-1.0, -_INNER[0], -_INNER[1], _INNER[1], _INNER[0], 1.0])) / 2
-_LOBATTO_WEIGHTS = np.array([2, 14 - math.sqrt(7), 14 + math.sqrt(7), 14 + math.sqrt(7), 14 - math.sqrt(7), 2]) / 60
+LOBATTO = (1 + np.array([-1.0, -_INNER[0], -_INNER[1], _INNER[1], _INNER[0], 1.0])) / 2
+LOBATTO_WEIGHTS = np.array([2, 14 - math.sqrt(7), 14 + math.sqrt(7), 14 + math.sqrt(7), 14 - math.sqrt(7), 2]) / 60
 
 Torques = Callable[[Array, Array, Array], Array]
 
@@ -190,20 +190,23 @@ def quintic(q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
 
 
 def trapezoid(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
-    """A trapezoid of speed in a given duration T, all joints in step.
-
-    Speeding up and slowing down take T/3 each: of all trapezoids that one has the least ∫ a² dt. Where T/3 breaks the
-    speed limit they take less, where it breaks the acceleration limit more; where nothing holds both, T/3 stays.
-    """
-    limits, travel = problem.active_limits, np.abs(q_goal - q_start)
-    # speed Δ / (T - b) ≤ v_max, and acceleration Δ / (b (T - b)) ≤ a_max
-    longest = min(duration / 2, duration - (travel / limits.v_max).max())
-    discriminant = duration**2 - 4 * (travel / limits.a_max).max()
-    shortest = (duration - math.sqrt(discriminant)) / 2 if discriminant >= 0 else math.inf
-    blend = duration / 3
-    if shortest <= longest:
-        blend = min(max(blend, shortest), longest)
+    """A trapezoid of speed in a given duration, all joints in step, speeding up and slowing down for `blend_time`."""
+    blend = float(blend_time(problem.active_limits, q_goal - q_start, np.asarray(duration)))
     return _trapezoid(q_start, q_goal, duration, blend)
+
+
+def blend_time(limits: Limits, travel: Array, duration: Array) -> Array:
+    """How long (...,) [s] trapezoids of speed over `travel` (..., nq) speed up, and slow down, in durations T (...,).
+
+    T/3 each: of all trapezoids that one has the least ∫ a² dt. Where T/3 breaks the speed limit it is less, where it
+    breaks the acceleration limit more; where nothing holds both, T/3 stays.
+    """
+    # speed Δ / (T - b) ≤ v_max, and acceleration Δ / (b (T - b)) ≤ a_max
+    longest = np.minimum(duration / 2, duration - (np.abs(travel) / limits.v_max).max(axis=-1))
+    discriminant = duration**2 - 4 * (np.abs(travel) / limits.a_max).max(axis=-1)
+    shortest = np.where(discriminant >= 0, (duration - np.sqrt(np.maximum(discriminant, 0))) / 2, np.inf)
+    blend = duration / 3
+    return np.asarray(np.where(shortest <= longest, np.clip(blend, np.minimum(shortest, longest), longest), blend))
 
 
 def controller_default(problem: Problem, q_start: Array, q_goal: Array) -> SampledMotion:
@@ -306,7 +309,7 @@ def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> 
     speed = 1 / (duration - blend)
     acceleration = speed / blend
     # by panel, not by node: at a jump the nodes of either side keep to their own side
-    middle = np.repeat(t.reshape(-1, len(_LOBATTO)).mean(axis=1), len(_LOBATTO))
+    middle = np.repeat(t.reshape(-1, len(LOBATTO)).mean(axis=1), len(LOBATTO))
     left = duration - t
     phases = [middle < blend, middle > duration - blend]
     law = np.stack(
@@ -335,4 +338,4 @@ def _nodes(breaks: Array) -> tuple[Array, Array]:
         + [breaks[-1:]]
     )
     lengths = np.diff(edges)[:, None]
-    return (edges[:-1, None] + lengths * _LOBATTO).ravel(), (lengths * _LOBATTO_WEIGHTS).ravel()
+    return (edges[:-1, None] + lengths * LOBATTO).ravel(), (lengths * LOBATTO_WEIGHTS).ravel()

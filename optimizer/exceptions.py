@@ -2,7 +2,8 @@
 
 JoulepathError
 ├── InvalidProblem          malformed or contradictory request
-│   └── OutsideLimits       given joints beyond a limit
+│   ├── OutsideLimits       given joints beyond a limit
+│   └── InvalidTable        a row of a given motion, or its table as a whole
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
 ├── SingularPose            every solution is singular
@@ -54,6 +55,17 @@ class OutsideLimits(InvalidProblem):
             f"The {target}'s {joint} is at {value:.6g} rad: give a value between {lower:.6g} and {upper:.6g} rad.",
         )
         self.target, self.joint, self.value, self.lower, self.upper = target, joint, value, lower, upper
+
+
+class InvalidTable(InvalidProblem):
+    """A given motion's rows are wrong: at `row` and `column`, where one is to blame, else as a whole.
+
+    Rows count as in what was sent: lines of a CSV file, its header being the first, or indices of a list, from 0.
+    """
+
+    def __init__(self, message: str, row: int | None = None, column: str | None = None) -> None:
+        super().__init__("motion", message)
+        self.row, self.column = row, column
 
 
 class UnknownRobot(JoulepathError):

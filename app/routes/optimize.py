@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Coroutine
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
 from app.documentation import problem_responses
 from app.engine import Engine
-from app.errors import ClientDisconnected, Reply
 from app.handlers import to_http
+from app.routes.disconnect import unless_disconnected
 from app.schemas import problems
 from app.schemas.examples import OPTIMIZE_EXAMPLES
 from app.schemas.request import OptimizeRequest
@@ -52,7 +50,7 @@ async def optimize(
     engine: Engine = request.app.state.engine
     task = OptimizeTask(body, request.state.id)
     work = engine.run(task, _deadline(body, settings.max_deadline))
-    return to_http(await _unless_disconnected(request, work))
+    return to_http(await unless_disconnected(request, work))
 
 
 def _deadline(body: OptimizeRequest, most: float) -> float:
@@ -62,23 +60,3 @@ def _deadline(body: OptimizeRequest, most: float) -> float:
     if body.deadline > most:
         raise InvalidProblem("deadline", f"deadline must be at most {most:g} s.")
     return body.deadline
-
-
-async def _unless_disconnected(request: Request, work: Coroutine[None, None, Reply]) -> Reply:
-    """The work's result; the work is cancelled when the caller hangs up. Raises ClientDisconnected."""
-    working, listening = asyncio.create_task(work), asyncio.create_task(_disconnected(request))
-    try:
-        await asyncio.wait({working, listening}, return_when=asyncio.FIRST_COMPLETED)
-        if working.done():
-            return working.result()
-        raise ClientDisconnected
-    finally:
-        working.cancel()
-        listening.cancel()
-        await asyncio.gather(working, listening, return_exceptions=True)
-
-
-async def _disconnected(request: Request) -> None:
-    # the body has been read: nothing else comes
-    while (await request.receive())["type"] != "http.disconnect":
-        pass

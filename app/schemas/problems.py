@@ -116,6 +116,23 @@ class OutsideLimits(Problem):
     upper: float = described("Greatest position allowed.", "rad", 3.1416)
 
 
+class InvalidTable(Problem):
+    """A given motion cannot be read: a value is no number, not finite or no radians, times do not increase, a line has
+    too few or too many columns, the header is missing or unknown, or the file is no CSV at all. `row` and `column` say
+    where; correct it and send it again."""
+
+    type: Literal["/problems/invalid-table"] = _fixed("/problems/invalid-table", "type")
+    title: Literal["Invalid motion table"] = _fixed("Invalid motion table", "title")
+    status: Literal[422] = _fixed(422, "status")
+    row: int | None = described(
+        "Line of the CSV file, the header being the first, or index into the list that was sent, from 0; null where no "
+        "single row is to blame.",
+        "1",
+        17,
+    )
+    column: str | None = described("Column, as a CSV's header names it; null where no single one is.", None, "q3")
+
+
 class DurationTooShort(Problem):
     """No motion within the limits is as fast as `duration` demands. Allow at least `shortest`, or leave the duration to
     the optimiser."""
@@ -225,11 +242,21 @@ class MethodNotAllowed(Problem):
 
 
 class BodyTooLarge(Problem):
-    """The request's body is larger than the service accepts. Every honest request fits in a few kilobytes."""
+    """The request's body is larger than the service accepts. Every honest request fits in a
+    few kilobytes, but for motions sent to `POST /evaluate`, which may be a thousand times larger: thin them out."""
 
     type: Literal["/problems/body-too-large"] = _fixed("/problems/body-too-large", "type")
     title: Literal["Body too large"] = _fixed("Body too large", "title")
     status: Literal[413] = _fixed(413, "status")
+
+
+class UnsupportedMediaType(Problem):
+    """The body is of a kind that the path does not take. Declare it by its `Content-Type`: `application/json` or
+    `text/csv`."""
+
+    type: Literal["/problems/unsupported-media-type"] = _fixed("/problems/unsupported-media-type", "type")
+    title: Literal["Unsupported media type"] = _fixed("Unsupported media type", "title")
+    status: Literal[415] = _fixed(415, "status")
 
 
 class Internal(Problem):
@@ -247,6 +274,7 @@ PROBLEMS: tuple[type[Problem], ...] = (
     SingularPose,
     UnreachableTargets,
     OutsideLimits,
+    InvalidTable,
     DurationTooShort,
     TorqueInfeasible,
     NoTrajectory,
@@ -259,5 +287,6 @@ PROBLEMS: tuple[type[Problem], ...] = (
     NotFound,
     MethodNotAllowed,
     BodyTooLarge,
+    UnsupportedMediaType,
     Internal,
 )

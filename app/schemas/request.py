@@ -20,7 +20,8 @@ Seconds = Annotated[float, Field(ge=1e-3, le=MAX_DURATION)]
 Angle = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
-def _by_shape(value: Any) -> str | None:
+def by_shape(value: Any) -> str | None:
+    """The tag of a number or a list."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):
@@ -29,7 +30,7 @@ def _by_shape(value: Any) -> str | None:
 
 
 _SHAPE = Discriminator(
-    _by_shape, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
+    by_shape, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
 )
 RatePerJoint = Annotated[
     Annotated[Rate, Tag("one")] | Annotated[Annotated[list[Rate], Field(min_length=1, max_length=16)], Tag("each")],
