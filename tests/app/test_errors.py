@@ -18,7 +18,6 @@ CANDIDATE = Candidate("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "
 ERRORS: list[JoulepathError] = [
     exceptions.InvalidProblem("limits.velocity", "limits.velocity must be positive."),
     exceptions.OutsideLimits("start", "elbow_joint", 4.0, -3.1, 3.1),
-    exceptions.InvalidTable("Times must increase.", 17, "t"),
     exceptions.UnknownRobot(["ur5e"]),
     exceptions.UnreachablePose("goal", 0.1, "The goal pose is out of reach."),
     exceptions.UnreachablePose("goal", None, "The goal pose is out of reach."),
@@ -28,6 +27,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.TorqueInfeasible("elbow_joint", 200.0, 150.0),
     exceptions.NoTrajectory([CANDIDATE]),
     exceptions.DeadlineExceeded([CANDIDATE]),
+    exceptions.InvalidTable("Times must increase.", 17, "t"),
 ]
 
 
