@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import cache
 
@@ -58,9 +60,14 @@ def optimize(problem: Problem) -> Solution:
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
     DurationTooShort, NoTrajectory, DeadlineExceeded, or InvalidProblem for a payload beyond the robot's rating.
     """
-    # matrices here are small: threads of a linear algebra library would cost more than they give
-    with _blas().limit(limits=1, user_api="blas"):
-        return _Run(problem).solution()
+    with one_thread():
+        return Run(problem).solution()
+
+
+def one_thread() -> AbstractContextManager[object]:
+    """A context in which linear algebra keeps to one thread: matrices here are small, more would cost than give."""
+    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
+    return limit
 
 
 @cache
@@ -68,20 +75,25 @@ def _blas() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-class _Run:
-    """One request being worked on: its candidates and what was spent on them."""
+class Run:
+    """One problem being worked on: its candidates and what was spent on them.
 
-    def __init__(self, problem: Problem) -> None:
+    `known` are motions between its ends, of any duration, to begin with.
+    """
+
+    def __init__(self, problem: Problem, known: Sequence[Spline] = ()) -> None:
         self.began = time.perf_counter()
         self.deadline = self.began + problem.deadline - min(RESERVE_SHARE * problem.deadline, RESERVE)
         self.problem = problem
         self.task = Task(problem)
+        self.known = known
         self.entries: list[Entry] = []
         self.unreachable: list[UnreachableTarget] = []
         self.iterations = self.solves = 0
         self.cut_short = False
 
-    def solution(self) -> Solution:
+    def prepare(self) -> None:
+        """Find the candidates, and bound them."""
         problem, task = self.problem, self.task
         (starts, no_starts), (goals, no_goals) = (search.ends(task, name) for name in ("start", "goal"))
         self.unreachable = no_starts + no_goals
@@ -92,6 +104,12 @@ class _Run:
             raise InvalidProblem(
                 "payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg."
             )
+
+    def solution(self) -> Solution:
+        """The answer. Raises the errors of `optimize`."""
+        self.prepare()
+        for spline in self.known:
+            self.begin(spline)
         without = self.without_store() if self.has_store else None
         self.explore()
         if without is not None:
@@ -145,7 +163,7 @@ class _Run:
         if left <= 0:
             return None
         try:
-            found = _Run(replace(self.problem, bus=Bus(), deadline=left / 2)).solution()
+            found = Run(replace(self.problem, bus=Bus(), deadline=left / 2)).solution()
         except DeadlineExceeded:
             return None
         self.iterations += found.solver.iterations
@@ -162,6 +180,23 @@ class _Run:
         spline = found.trajectory.spline
         outcome = Attempt("solved", "converged", spline=spline, stationarity=found.solver.stationarity)
         return entry, outcome, self.task.energy(spline)
+
+    def begin(self, spline: Spline) -> None:
+        """Begin with a known motion, slowed or hastened to fit: as it is if it holds, improved, and beside it what is
+        found from the ground up between its ends."""
+        q = spline.control_points
+        entry = min(self.entries, key=lambda e: float(np.abs(q[0] - e.q_start).max() + np.abs(q[-1] - e.q_goal).max()))
+        if entry.status == "infeasible" or time.perf_counter() > self.deadline:
+            return
+        least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
+        retimed = replace(spline, knots=spline.knots * (np.clip(spline.duration, least, most) / spline.duration))
+        energy = self.task.energy(retimed)
+        if certify(self.problem, retimed, entry.q_start, entry.q_goal, energy).valid:
+            self.keep(entry, Attempt("solved", "a known motion, retimed", spline=retimed), energy)
+        self.learn(entry, retimed, EXACT if self.problem.method == "time_scaling" else REFINED)
+        outcome = self.attempt(entry)
+        if outcome.spline is not None:
+            self.keep(entry, outcome, self.task.energy(outcome.spline))
 
     def best(self) -> Entry | None:
         """The solved entry of least energy."""
@@ -185,21 +220,31 @@ class _Run:
         longest = self.problem.duration_max
         if longest is None:
             return
+        fastest = self.fastest()
+        if fastest is None:
+            least = min(entry.shortest for entry in self.entries)
+            if least > longest:
+                raise DurationTooShort(least)
+        elif fastest[1].duration > longest:
+            raise DurationTooShort(fastest[1].duration)
+        else:
+            self.learn(*fastest)
+
+    def fastest(self) -> tuple[Entry, Spline] | None:
+        """The fastest motion over all candidates, whatever the problem allows, and whose it is; None if none is found
+        before the deadline."""
         winner, best = None, None
         for entry in sorted((e for e in self.entries if e.holdable), key=lambda e: e.shortest):
             if (best is not None and entry.shortest >= best.duration) or time.perf_counter() > self.deadline:
                 break
-            spline = self.count(self.solver(entry, fastest(self.task)).solve()).spline
+            spline = self.fastest_of(entry)
             if spline is not None and (best is None or spline.duration < best.duration):
                 winner, best = entry, spline
-        if winner is None or best is None:
-            least = min(entry.shortest for entry in self.entries)
-            if least > longest:
-                raise DurationTooShort(least)
-        elif best.duration > longest:
-            raise DurationTooShort(best.duration)
-        else:
-            self.learn(winner, best)
+        return None if winner is None or best is None else (winner, best)
+
+    def fastest_of(self, entry: Entry) -> Spline | None:
+        """The fastest motion of one candidate, whatever the problem allows."""
+        return self.count(self.solver(entry, fastest(self.task)).solve()).spline
 
     def learn(self, entry: Entry, spline: Spline, repeat: int = EXACT, credit: float | None = None) -> None:
         """Optimise the entry from a motion, over knots where jerk switches, and keep what spends less."""

@@ -1,0 +1,262 @@
+"""pareto(problem, n) → Front: energy against time, over every candidate, each point certified.
+
+The front begins with the fastest motion there is and ends with the one of least energy. Between these, whatever its
+shape, it passes within the rectangles that neighbouring points span: a motion that takes longer than the left one and
+is worth having needs less, and none needs less than the right one. Durations are therefore chosen one by one, each the
+geometric mean of the two whose rectangle has the longest sides, in shares of the whole front's in log T and in energy.
+
+Where neighbours go by different candidates, the front may jump: the right one's candidate has a fastest motion of its
+own, and if that is slower than the left point, it is there that it takes over. That duration is tried next, and one
+just below it, since halving would only creep up to it.
+
+Each duration is solved from the motions on both sides of it and from the ground up, and every other candidate whose
+bound for that very duration is below the best found is tried, too.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
+from typing import Literal
+
+import numpy as np
+
+from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
+from optimizer.optimize import Run, one_thread
+from optimizer.problem import Problem
+from optimizer.solution import Solution, Spline
+
+LEAST_POINTS, MOST_POINTS = 2, 100
+# share of the time left that the search for the fastest motion, and each end of the front, may take
+SHARE_OF_AN_END = 1 / 3
+# two durations nearer than the first share are one; nearer than the second and of different candidates: a known jump
+SAME_DURATION, SAME_JUMP = 2e-4, 2e-3
+# shares below a candidate's own fastest duration at which it is looked for what the front is before that
+BEFORE_JUMP = (1e-4, 1e-3)
+# a run's deadline is never set below this [s]
+LEAST_TIME = 1e-3
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """A duration [s] that is no point of the front, why, and the energy [J] (of the objective) of what was found."""
+
+    duration: float
+    energy: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Front:
+    """Motions none of which is beaten in both duration and energy, fastest first.
+
+    `shortest` [s] is the least feasible duration over all candidates. `status` is `optimal` when every duration chosen
+    was solved and every motion is optimal, `feasible` when time ran out before that. `wall_time` [s] and `nlp_solves`
+    are for the whole front.
+    """
+
+    status: Literal["optimal", "feasible"]
+    shortest: float
+    points: list[Solution]
+    dropped: list[Dropped]
+    wall_time: float
+    nlp_solves: int
+
+
+@dataclass(frozen=True)
+class _Node:
+    """A duration [s] that was tried: its answer, or why there is none; the energy of the objective [J], or inf."""
+
+    duration: float
+    answer: Solution | None
+    energy: float = math.inf
+    reason: str = ""
+
+    @property
+    def spline(self) -> Spline | None:
+        """The motion, if there is one."""
+        return None if self.answer is None else self.answer.trajectory.spline
+
+
+def pareto(problem: Problem, n: int) -> Front:
+    """The front of the objective's energy over duration, from at most `n` durations (2 … 100).
+
+    `problem` bounds the duration or leaves it free; the front ends where the objective is least. The mechanical
+    objective needs `duration_max`. `problem.deadline` [s] holds for the whole front.
+
+    Raises what `optimize` does; InvalidProblem for a fixed duration or a number of points out of range.
+    """
+    if not LEAST_POINTS <= n <= MOST_POINTS:
+        raise InvalidProblem("points", f"points must lie between {LEAST_POINTS} and {MOST_POINTS}.")
+    if problem.duration_min is not None and problem.duration_min == problem.duration_max:
+        raise InvalidProblem("duration", "A front runs over durations: leave duration out or give a range.")
+    with one_thread():
+        return _Search(problem, n).front()
+
+
+class _Search:
+    """A front being worked on."""
+
+    def __init__(self, problem: Problem, n: int) -> None:
+        self.began = time.perf_counter()
+        self.problem, self.n = problem, n
+        self.nodes: list[_Node] = []
+        self.solves = 0
+        self.race = self.run([])
+        self.entered: set[bytes] = set()
+
+    def front(self) -> Front:
+        """The front. Raises the errors of `pareto`."""
+        self.race.prepare()
+        fastest = self.race.fastest()
+        if fastest is None:
+            candidates = [entry.report() for entry in self.race.entries]
+            raise DeadlineExceeded(candidates) if self.left() <= 0 else NoTrajectory(candidates)
+        spline, problem = fastest[1], self.problem
+        if problem.duration_max is not None and spline.duration > problem.duration_max:
+            raise DurationTooShort(spline.duration)
+        first = max(spline.duration, problem.duration_min or 0.0)
+        # the fastest motion is at hand even where time runs out over the cheapest
+        self.solve(first, [spline])
+        self.add(self.run([], least=first), problem.duration_max or math.inf)
+        while len(self.nodes) < self.n and self.left() > 0 and (k := self.widest()) is not None:
+            left, right = self.nodes[k : k + 2]
+            if len(self.nodes) == self.n - 1 and self.end_again():
+                break
+            if switches(left, right) and self.enter(left, right):
+                continue
+            known = [node.spline for node in (left, right) if node.spline is not None]
+            self.solve(math.sqrt(left.duration * right.duration), known)
+        return self.result(spline.duration, complete=self.left() > 0)
+
+    def left(self) -> float:
+        """Time left [s]."""
+        return self.began + self.problem.deadline - time.perf_counter()
+
+    def run(self, known: list[Spline], least: float | None = None, most: float | None = None) -> Run:
+        """A run between two durations, with its share of the time that is left."""
+        problem = self.problem
+        share = 1 / max(self.n - len(self.nodes), 1)
+        if len(self.nodes) < LEAST_POINTS:
+            share = max(share, SHARE_OF_AN_END)
+        return Run(
+            replace(
+                problem,
+                deadline=max(share * self.left(), LEAST_TIME),
+                duration_min=problem.duration_min if least is None else least,
+                duration_max=problem.duration_max if most is None else most,
+            ),
+            known,
+        )
+
+    def solve(self, duration: float, known: list[Spline]) -> _Node:
+        """Solve for one duration [s]."""
+        return self.add(self.run(known, duration, duration), duration)
+
+    def add(self, run: Run, duration: float) -> _Node:
+        """Work on a run, and note what comes of it; `duration` [s] is where it belongs if nothing does."""
+        try:
+            answer = run.solution()
+            node = _Node(answer.duration, answer, run.task.objective_of(answer.energy))
+        except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
+            node = _Node(duration, None, reason=str(error))
+        self.solves += run.solves
+        self.nodes.append(node)
+        self.nodes.sort(key=lambda node: (node.duration, node.energy))
+        return node
+
+    def enter(self, left: _Node, right: _Node) -> bool:
+        """Try the duration at which the right node's candidate becomes possible, if that lies between the two."""
+        assert right.answer is not None
+        q_start, q_goal = right.answer.start.q, right.answer.goal.q
+        key = q_start.tobytes() + q_goal.tobytes()
+        if key in self.entered:
+            return False
+        self.entered.add(key)
+        run = self.run([])
+        run.prepare()
+        entry = next(e for e in run.entries if (e.q_start == q_start).all() and (e.q_goal == q_goal).all())
+        spline = run.count(run.solver(entry, fastest=True).solve()).spline
+        self.solves += run.solves
+        if spline is None or not distinct(left.duration, spline.duration):
+            return False
+        durations = [spline.duration * (1 - share) for share in BEFORE_JUMP]
+        if distinct(spline.duration, right.duration):
+            self.solve(spline.duration, [spline])
+        for duration in durations:
+            if len(self.nodes) == self.n or not distinct(left.duration, duration):
+                break
+            if switches(self.solve(duration, [] if left.spline is None else [left.spline]), right):
+                break
+        return True
+
+    def end_again(self) -> bool:
+        """Look for the cheapest motion once more, from the cheapest known, if that is not the one found at first."""
+        cheapest = min(self.nodes, key=lambda node: node.energy)
+        if cheapest is self.nodes[-1] or cheapest.spline is None:
+            return False
+        most = self.problem.duration_max or math.inf
+        self.add(self.run([cheapest.spline], least=self.nodes[0].duration), most)
+        return True
+
+    def widest(self) -> int | None:
+        """Behind which node another motion says most about the front; None where there is no room for one."""
+        found = [node.energy for node in self.nodes if node.answer is not None]
+        if not found:
+            return None
+        # what can be had within each duration: dominated points and those without a motion do not lower it
+        least = list(accumulate((min(node.energy, max(found)) for node in self.nodes), min))
+        last = next(k for k, energy in enumerate(least) if energy == least[-1])
+        rise = math.log(self.nodes[last].duration / self.nodes[0].duration)
+        fall = least[0] - least[-1]
+        longest, chosen = 0.0, None
+        for k, (left, right) in enumerate(pairwise(self.nodes[: last + 1])):
+            if not distinct(left.duration, right.duration, SAME_JUMP if switches(left, right) else SAME_DURATION):
+                continue
+            falls = least[k] - least[k + 1]
+            if falls == 0 and not switches(left, right):
+                continue  # one candidate, whose motions here take longer and need no less
+            sides = math.log(right.duration / left.duration) / rise + falls / fall
+            if sides > longest:
+                longest, chosen = sides, k
+        return chosen
+
+    def result(self, shortest: float, complete: bool) -> Front:
+        """What was found, the dominated put aside."""
+        points: list[Solution] = []
+        dropped: list[Dropped] = []
+        least = math.inf
+        for node in self.nodes:
+            if node.answer is None:
+                dropped.append(Dropped(node.duration, None, node.reason))
+            elif node.energy >= least:
+                reason = f"the motion of {points[-1].duration:.4f} s is no slower and needs no more"
+                dropped.append(Dropped(node.duration, node.energy, reason))
+            else:
+                points.append(node.answer)
+                least = node.energy
+        if not points:
+            raise DeadlineExceeded([entry.report() for entry in self.race.entries])
+        return Front(
+            status="optimal" if complete and all(point.status == "optimal" for point in points) else "feasible",
+            shortest=shortest,
+            points=points,
+            dropped=[each for each in dropped if math.isfinite(each.duration)],
+            wall_time=time.perf_counter() - self.began,
+            nlp_solves=self.solves + self.race.solves,
+        )
+
+
+def distinct(earlier: float, later: float, share: float = SAME_DURATION) -> bool:
+    """Whether a duration [s] is longer than another by more than a share."""
+    return later > earlier * (1 + share)
+
+
+def switches(left: _Node, right: _Node) -> bool:
+    """Whether two nodes go by different candidates."""
+    a, b = left.answer, right.answer
+    if a is None or b is None:
+        return False
+    return not (np.array_equal(a.start.q, b.start.q) and np.array_equal(a.goal.q, b.goal.q))
