@@ -18,6 +18,7 @@ from optimizer.exceptions import (
     UnreachablePose,
 )
 from optimizer.optimize import optimize
+from optimizer.pareto import Front, pareto
 from optimizer.problem import BranchFilter, Problem
 from optimizer.solution import Solution
 from optimizer.targets import AnyOf
@@ -27,6 +28,7 @@ __all__ = [
     "BranchFilter",
     "DeadlineExceeded",
     "DurationTooShort",
+    "Front",
     "InvalidProblem",
     "JoulepathError",
     "NoReachableTarget",
@@ -41,4 +43,5 @@ __all__ = [
     "UnknownRobot",
     "UnreachablePose",
     "optimize",
+    "pareto",
 ]

@@ -191,12 +191,16 @@ class Run:
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
         retimed = replace(spline, knots=spline.knots * (np.clip(spline.duration, least, most) / spline.duration))
         energy = self.task.energy(retimed)
-        if certify(self.problem, retimed, entry.q_start, entry.q_goal, energy).valid:
+        if self.certified(entry, retimed, energy).valid:
             self.keep(entry, Attempt("solved", "a known motion, retimed", spline=retimed), energy)
         self.learn(entry, retimed, EXACT if self.problem.method == "time_scaling" else REFINED)
         outcome = self.attempt(entry)
-        if outcome.spline is not None:
-            self.keep(entry, outcome, self.task.energy(outcome.spline))
+        if outcome.spline is None:
+            return
+        self.keep(entry, outcome, self.task.energy(outcome.spline))
+        if len(outcome.spline.control_points) == COARSE and entry.attempt is not outcome:
+            # few control points are no match for the many of a known motion, but may lead to a better place
+            self.learn(entry, outcome.spline, REFINED)
 
     def best(self) -> Entry | None:
         """The solved entry of least energy."""

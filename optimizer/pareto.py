@@ -113,7 +113,8 @@ class _Search:
         fastest = self.race.fastest()
         if fastest is None:
             candidates = [entry.report() for entry in self.race.entries]
-            raise DeadlineExceeded(candidates) if self.left() <= 0 else NoTrajectory(candidates)
+            late = time.perf_counter() > self.race.deadline
+            raise DeadlineExceeded(candidates) if late else NoTrajectory(candidates)
         spline, problem = fastest[1], self.problem
         if problem.duration_max is not None and spline.duration > problem.duration_max:
             raise DurationTooShort(spline.duration)
@@ -178,7 +179,7 @@ class _Search:
         run = self.run([])
         run.prepare()
         entry = next(e for e in run.entries if (e.q_start == q_start).all() and (e.q_goal == q_goal).all())
-        spline = run.count(run.solver(entry, fastest=True).solve()).spline
+        spline = run.fastest_of(entry)
         self.solves += run.solves
         if spline is None or not distinct(left.duration, spline.duration):
             return False

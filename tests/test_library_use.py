@@ -15,6 +15,7 @@ PUBLIC = {
     "BranchFilter",
     "DeadlineExceeded",
     "DurationTooShort",
+    "Front",
     "InvalidProblem",
     "JoulepathError",
     "NoReachableTarget",
@@ -29,6 +30,7 @@ PUBLIC = {
     "UnknownRobot",
     "UnreachablePose",
     "optimize",
+    "pareto",
 }
 
 
@@ -37,6 +39,7 @@ def test_the_public_names_are_a_promise() -> None:
     assert optimizer.__all__ == sorted(optimizer.__all__)
     # `optimizer.optimize` is also a module: the name must stay the function's however the package was imported
     assert callable(optimizer.optimize)
+    assert callable(optimizer.pareto)
 
 
 def test_one_except_clause_catches_every_error() -> None:

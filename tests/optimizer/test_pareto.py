@@ -1,0 +1,160 @@
+"""The front of energy over duration: not beaten by fresh answers, by itself, or by what lies between its points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from optimizer.arm import Pose
+from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, JoulepathError
+from optimizer.optimize import optimize
+from optimizer.pareto import Front, pareto
+from optimizer.problem import Problem
+from optimizer.solution import Solution
+from tests.optimizer.moves import PAYLOAD, START, fixed, problem
+
+HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+
+# both are local optima, found from several guesses: of neighbouring durations' answers, about 2e-4 is scatter
+LOCAL = 1e-3
+# of the least duration: two runs stop at the same motion or at one that differs by the solver's tolerance
+SAME = 1e-6
+# of the energy: what a jump lowers it to at most; of the duration: how near it is looked at from below
+JUMP, NEAR = 0.9, 2e-3
+POINTS = 8
+# enough for every duration to be solved on a busy machine
+TIME = 60.0
+
+
+def joints() -> Problem:
+    """A lift with a payload, which haste makes dearer."""
+    return problem(HOME, HOME + np.array([0.5, -1.0, 1.0, 0.5, 0.5, 0.5]), payload=PAYLOAD, deadline=TIME)
+
+
+def straight_line() -> Problem:
+    return problem(HOME, np.array([1.2, -1.1, 1.9, -2.2, -1.3, 0.4]), method="time_scaling", deadline=TIME)
+
+
+def jumping() -> Problem:
+    """Pose 1 of the founding paper: the fastest candidate needs half as much again as a slightly slower one."""
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("xyz", [-3.14, 0.001432, -1.5704]).as_matrix()
+    T[:3, 3] = [-0.7, -0.0124, 0.1]
+    return problem(np.array([0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, np.pi, 0.0]), Pose(T), deadline=TIME)
+
+
+def mechanical() -> Problem:
+    return problem(deadline=TIME, objective="mechanical", duration_max=3.0)
+
+
+def objective(asked: Problem, answer: Solution) -> float:
+    energy = answer.energy
+    return energy.electrical.total if asked.objective == "electrical" else energy.mechanical.total
+
+
+@pytest.fixture(scope="module", params=[joints, straight_line, jumping, mechanical], ids=lambda make: make.__name__)
+def asked_and_found(request: pytest.FixtureRequest) -> tuple[Problem, Front]:
+    asked = request.param()
+    return asked, pareto(asked, POINTS)
+
+
+def test_no_point_is_beaten(asked_and_found: tuple[Problem, Front]) -> None:
+    asked, front = asked_and_found
+    assert len(front.points) >= 2
+    for earlier, later in pairwise(front.points):
+        assert earlier.duration < later.duration
+        assert objective(asked, earlier) > objective(asked, later)
+
+
+def test_dropped_ones_are_beaten_or_not_found(asked_and_found: tuple[Problem, Front]) -> None:
+    asked, front = asked_and_found
+    assert len(front.points) + len(front.dropped) <= POINTS
+    for each in front.dropped:
+        assert each.reason
+        if each.energy is not None:
+            better = [p for p in front.points if p.duration <= each.duration and objective(asked, p) <= each.energy]
+            assert better
+
+
+def test_every_point_is_certified(asked_and_found: tuple[Problem, Front]) -> None:
+    asked, front = asked_and_found
+    for point in front.points:
+        assert point.certificate.valid
+        assert 0 < point.lower_bound <= objective(asked, point)
+
+
+def test_every_point_is_at_least_as_good_as_a_fresh_answer(asked_and_found: tuple[Problem, Front]) -> None:
+    asked, front = asked_and_found
+    for point in front.points:
+        try:
+            fresh = optimize(replace(asked, **fixed(point.duration)))
+        except JoulepathError:
+            continue  # the front has a motion where there was none from the ground up
+        assert objective(asked, point) <= objective(asked, fresh) * (1 + LOCAL)
+
+
+def test_begins_with_the_shortest_and_ends_with_the_cheapest(asked_and_found: tuple[Problem, Front]) -> None:
+    asked, front = asked_and_found
+    assert front.points[0].duration == pytest.approx(front.shortest, rel=SAME)
+    with pytest.raises(DurationTooShort) as refused:
+        optimize(replace(asked, **fixed(0.5 * front.shortest)))
+    assert front.shortest == pytest.approx(refused.value.shortest, rel=SAME)
+    assert objective(asked, front.points[-1]) <= objective(asked, optimize(asked)) * (1 + LOCAL)
+
+
+def test_what_lies_between_passes_within_the_rectangles(asked_and_found: tuple[Problem, Front]) -> None:
+    """The premise of the spacing, asked of motions that the front does not know."""
+    asked, front = asked_and_found
+    for left, right in list(pairwise(front.points))[:3]:
+        between = optimize(replace(asked, **fixed((left.duration * right.duration) ** 0.5)))
+        assert objective(asked, between) >= objective(asked, right) * (1 - LOCAL)
+
+
+def test_jumps_are_found_where_they_are() -> None:
+    """A candidate that is slower to reach and far cheaper takes over at its own fastest motion."""
+    front = pareto(jumping(), 12)
+    jumps = [(a, b) for a, b in pairwise(front.points) if not np.array_equal(a.goal.q, b.goal.q)]
+    assert jumps
+    tried = [point.duration for point in front.points] + [each.duration for each in front.dropped]
+    for left, right in jumps:
+        assert right.energy.electrical.total < JUMP * left.energy.electrical.total
+        # some duration just before it was tried and still went by the old candidate
+        assert any(right.duration * (1 - NEAR) <= duration < right.duration for duration in tried)
+
+
+def test_keeps_to_the_range_asked_for() -> None:
+    front = pareto(replace(joints(), duration_min=0.72, duration_max=0.75), 3)
+    assert front.points[0].duration == pytest.approx(0.72)
+    assert all(0.72 * (1 - SAME) <= p.duration <= 0.75 * (1 + SAME) for p in front.points)
+    assert front.shortest < 0.72
+
+
+def test_no_front_where_every_motion_takes_longer() -> None:
+    with pytest.raises(DurationTooShort):
+        pareto(replace(joints(), duration_max=0.1), 3)
+
+
+@pytest.mark.parametrize(("fields", "n"), [({}, 1), ({}, 101), (fixed(2.0), 5)])
+def test_refuses_what_is_no_front(fields: dict[str, float], n: int) -> None:
+    with pytest.raises(InvalidProblem):
+        pareto(replace(joints(), **fields), n)
+
+
+def test_standing_still_is_one_point() -> None:
+    front = pareto(problem(START, START), 5)
+    assert len(front.points) == 1
+
+
+@pytest.mark.parametrize("deadline", [0.01, 0.1, 0.5])
+def test_a_deadline_gives_what_was_found(deadline: float) -> None:
+    try:
+        front = pareto(replace(mechanical(), deadline=deadline), 50)
+    except DeadlineExceeded:
+        return
+    assert front.points and all(point.certificate.valid for point in front.points)
+    if len(front.points) + len(front.dropped) < 50:
+        assert front.wall_time < deadline + 1.0
