@@ -8,6 +8,10 @@ ServiceError
 ├── WorkerDied          its worker process ended under it
 ├── StoreUnavailable    the database cannot be reached
 ├── UnknownAnswer       no answer is kept under that id
+├── UnknownStudy        no study has that id
+│   └── UnknownIteration
+├── EmptyStudy          the study has no iteration yet
+├── KeyReused           the Idempotency-Key came with another request before
 └── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType
 """
 
@@ -22,6 +26,7 @@ import orjson
 
 from app.convert import candidate_fields, unreachable_fields
 from app.schemas import problems
+from app.schemas.common import KEY_HEADER
 from app.schemas.common import Request as RequestModel
 from optimizer import exceptions as optimizer_errors
 
@@ -63,7 +68,7 @@ def _field_names() -> set[str]:
     def names(model: type[RequestModel]) -> set[str]:
         return set(model.model_fields).union(*(names(child) for child in model.__subclasses__()))
 
-    return names(RequestModel) | {"body", "path", "query", "header"}
+    return names(RequestModel) | {"body", "path", "query", "header", KEY_HEADER}
 
 
 class Busy(ServiceError):
@@ -106,6 +111,34 @@ class UnknownAnswer(ServiceError):
 
     def __init__(self) -> None:
         super().__init__("No answer is kept under this id: send the request that gave it again.")
+
+
+class UnknownStudy(ServiceError):
+    """No study has that id."""
+
+    def __init__(self, detail: str = "No study has this id: see GET /studies for those there are.") -> None:
+        super().__init__(detail)
+
+
+class UnknownIteration(UnknownStudy):
+    """The study has no iteration of that number."""
+
+    def __init__(self) -> None:
+        super().__init__("The study has no iteration of this number: see its history for those there are.")
+
+
+class EmptyStudy(ServiceError):
+    """The study has no iteration that a next one could start from."""
+
+    def __init__(self) -> None:
+        super().__init__("The study has no iteration yet: add a first one, then ask for the next.")
+
+
+class KeyReused(ServiceError):
+    """The Idempotency-Key came with another request before."""
+
+    def __init__(self) -> None:
+        super().__init__("This Idempotency-Key came with another request before: take a new key for a new request.")
 
 
 class NotFound(ServiceError):
@@ -158,6 +191,9 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     ShuttingDown: problems.ShuttingDown,
     StoreUnavailable: problems.StoreUnavailable,
     UnknownAnswer: problems.UnknownAnswer,
+    UnknownStudy: problems.UnknownStudy,
+    EmptyStudy: problems.EmptyStudy,
+    KeyReused: problems.KeyReused,
     NotFound: problems.NotFound,
     MethodNotAllowed: problems.MethodNotAllowed,
     BodyTooLarge: problems.BodyTooLarge,

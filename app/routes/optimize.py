@@ -49,11 +49,11 @@ async def optimize(
     settings: Settings = request.app.state.settings
     engine: Engine = request.app.state.engine
     task = OptimizeTask(body, request.state.id)
-    work = engine.run(task, _deadline(body, settings.max_deadline))
+    work = engine.run(task, allowed_deadline(body, settings.max_deadline))
     return to_http(await unless_disconnected(request, work))
 
 
-def _deadline(body: OptimizeRequest, most: float) -> float:
+def allowed_deadline(body: OptimizeRequest, most: float) -> float:
     """The request's deadline [s]. Raises InvalidProblem when the caller asks for too much."""
     if "deadline" not in body.model_fields_set:
         return min(body.deadline, most)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+KEY_HEADER = "Idempotency-Key"
 QUATERNION_TOLERANCE = 1e-3
 """How far a quaternion's norm may be from 1 before it is refused."""
 

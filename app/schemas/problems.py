@@ -225,6 +225,33 @@ class UnknownAnswer(Problem):
     status: Literal[404] = _fixed(404, "status")
 
 
+class UnknownStudy(Problem):
+    """No study has that id, or the study has no iteration of that number: it never was, or the study was deleted.
+    `GET /studies` lists what there is."""
+
+    type: Literal["/problems/unknown-study"] = _fixed("/problems/unknown-study", "type")
+    title: Literal["Unknown study"] = _fixed("Unknown study", "title")
+    status: Literal[404] = _fixed(404, "status")
+
+
+class EmptyStudy(Problem):
+    """What is asked for starts from an iteration of the study, and there is none yet. Add a first one with
+    `POST /studies/{id}/iterations`."""
+
+    type: Literal["/problems/empty-study"] = _fixed("/problems/empty-study", "type")
+    title: Literal["Empty study"] = _fixed("Empty study", "title")
+    status: Literal[409] = _fixed(409, "status")
+
+
+class KeyReused(Problem):
+    """The `Idempotency-Key` came before, with a different request. A key belongs to one request and its repetitions:
+    take a new one."""
+
+    type: Literal["/problems/key-reused"] = _fixed("/problems/key-reused", "type")
+    title: Literal["Idempotency-Key reused"] = _fixed("Idempotency-Key reused", "title")
+    status: Literal[422] = _fixed(422, "status")
+
+
 class NotFound(Problem):
     """There is nothing at that path. `GET /openapi.json` lists what there is."""
 
@@ -284,6 +311,9 @@ PROBLEMS: tuple[type[Problem], ...] = (
     ShuttingDown,
     StoreUnavailable,
     UnknownAnswer,
+    UnknownStudy,
+    EmptyStudy,
+    KeyReused,
     NotFound,
     MethodNotAllowed,
     BodyTooLarge,

@@ -1,0 +1,122 @@
+"""POST /studies/{id}/iterations and GET /studies/{id}/iterations/{number}."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Body, Path, Request, Response
+
+from app.documentation import problem_responses
+from app.engine import Engine
+from app.handlers import to_http
+from app.routes.disconnect import unless_disconnected
+from app.routes.optimize import allowed_deadline
+from app.routes.studies import CREATED_HEADERS, Key, StudyId, set_location
+from app.schemas import problems
+from app.schemas.request import OptimizeRequest
+from app.schemas.studies import IterationDetail, OptimizeStep
+from app.schemas.study_examples import ITERATION_EXAMPLES
+from app.settings import Settings
+from app.store import studies
+from app.store.store import Store
+from app.store.tables import Study
+from app.study_answers import detail
+from app.tasks import OptimizeTask
+from optimizer.exceptions import InvalidProblem
+
+router = APIRouter(prefix="/studies", tags=["studies"])
+
+MOST_ITERATIONS = 2**31 - 1
+"""The largest number that the database counts to."""
+
+
+@router.post(
+    "/{id}/iterations",
+    summary="Add an iteration",
+    status_code=201,
+    response_model=IterationDetail,
+    responses={
+        201: {"headers": CREATED_HEADERS},
+        **problem_responses(
+            problems.Validation,
+            problems.KeyReused,
+            problems.UnreachablePose,
+            problems.SingularPose,
+            problems.OutsideLimits,
+            problems.DurationTooShort,
+            problems.TorqueInfeasible,
+            problems.NoTrajectory,
+            problems.UnknownRobot,
+            problems.UnknownStudy,
+            problems.BodyTooLarge,
+            problems.Busy,
+            problems.ShuttingDown,
+            problems.StoreUnavailable,
+            problems.DeadlineExceeded,
+        ),
+    },
+)
+async def add(
+    request: Request,
+    response: Response,
+    id: StudyId,
+    body: Annotated[OptimizeStep, Body(openapi_examples=ITERATION_EXAMPLES)],
+    key: Key = None,
+) -> Any:
+    """Computes the next step and keeps it: what was asked, the whole answer, and its energy against the step before,
+    the best and the threshold. A request that fails is answered with its problem and leaves no trace in the study."""
+    store: Store = request.app.state.store
+    settings: Settings = request.app.state.settings
+    engine: Engine = request.app.state.engine
+    study = (await store.read(partial(studies.history, study_id=id))).study
+    asked = _completed(body.optimize, study)
+    deadline = allowed_deadline(asked, settings.max_deadline)
+    sent = asked.model_dump(mode="json", exclude_unset=True)
+    known = await store.read(partial(studies.known_step, study_id=id, kind="optimize", request=sent, key=key))
+    if known is None:
+        reply = await unless_disconnected(request, engine.run(OptimizeTask(asked, request.state.id), deadline))
+        if reply.status != 200:
+            return to_http(reply)
+        number, again = await store.write(
+            partial(studies.add, study_id=id, step=_step("optimize", sent, reply.body), key=key)
+        )
+    else:
+        number, again = known, True
+    set_location(request, response, f"{id}/iterations/{number}", again)
+    return detail(await store.read(partial(studies.up_to, study_id=id, number=number)))
+
+
+@router.get(
+    "/{id}/iterations/{number}",
+    summary="One iteration of a study",
+    response_model=IterationDetail,
+    responses=problem_responses(problems.Validation, problems.UnknownStudy, problems.StoreUnavailable),
+)
+async def show(
+    request: Request,
+    id: StudyId,
+    number: Annotated[int, Path(description="The iteration's number.", examples=[1], ge=1, le=MOST_ITERATIONS)],
+) -> IterationDetail:
+    """What was asked, what it came to, and where the study then stood."""
+    store: Store = request.app.state.store
+    return detail(await store.read(partial(studies.up_to, study_id=id, number=number)))
+
+
+def _step(kind: str, sent: dict[str, Any], body: bytes) -> studies.Step:
+    answer = orjson.loads(body)
+    energy = answer["energy"]
+    return studies.Step(
+        kind, sent, body, answer["duration"], energy["electrical"]["total"], energy["mechanical"]["total"]
+    )
+
+
+def _completed(asked: OptimizeRequest, study: Study) -> OptimizeRequest:
+    """The request, about the study's robot and objective. Raises InvalidProblem where it is about another."""
+    for name in ("robot", "objective"):
+        if name in asked.model_fields_set and getattr(asked, name) != getattr(study, name):
+            raise InvalidProblem(
+                f"optimize.{name}", f"The study is about another {name}: leave {name} out, or begin another study."
+            )
+    return asked.model_copy(update={"robot": study.robot, "objective": study.objective})

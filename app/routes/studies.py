@@ -1,0 +1,123 @@
+"""POST /studies, GET /studies, GET and DELETE /studies/{id}."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Header, Path, Query, Request, Response
+from sqlalchemy.exc import IntegrityError
+
+from app.convert import robot_named
+from app.documentation import problem_responses
+from app.schemas import problems
+from app.schemas.common import KEY_HEADER
+from app.schemas.studies import IdempotencyKey, Study, StudyList, StudyPage, StudyRequest, StudySummary
+from app.schemas.study_examples import STUDY_CSV, STUDY_EXAMPLES
+from app.store import studies
+from app.store.store import Store
+from app.study_answers import as_csv, full, summary
+
+router = APIRouter(prefix="/studies", tags=["studies"])
+
+StudyId = Annotated[str, Path(description="The study's id.", examples=[StudySummary.EXAMPLE_ID])]
+Key = Annotated[
+    IdempotencyKey | None,
+    Header(
+        alias=KEY_HEADER,
+        description="Any text that names this request and no other: sent again under the same key, after a lost "
+        "connection for one, it is answered from what it made the first time.",
+        examples=["2f6f3d0c-try-1"],
+    ),
+]
+REPLAYED = "Idempotency-Replayed"
+"""Header of an answer to a request that was sent before."""
+CREATED_HEADERS = {
+    "Location": {"description": "Path of what was made.", "schema": {"type": "string"}},
+    REPLAYED: {"description": "`true` if it was made before, under the same key.", "schema": {"type": "string"}},
+}
+
+
+@router.post(
+    "",
+    summary="Begin a study",
+    status_code=201,
+    response_model=StudySummary,
+    responses={
+        201: {"headers": CREATED_HEADERS},
+        **problem_responses(
+            problems.Validation,
+            problems.KeyReused,
+            problems.UnknownRobot,
+            problems.BodyTooLarge,
+            problems.StoreUnavailable,
+        ),
+    },
+)
+async def create(
+    request: Request,
+    response: Response,
+    body: Annotated[StudyRequest, Body(openapi_examples=STUDY_EXAMPLES)],
+    key: Key = None,
+) -> StudySummary:
+    """Begins a study: a motion to be improved step by step until its energy is at most `threshold`."""
+    robot_named(body.robot)
+    store: Store = request.app.state.store
+    study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key)
+    try:
+        made, again = await store.write(partial(studies.create, study=study))
+    except IntegrityError:  # the same request, elsewhere at the same time, was first
+        made, again = await store.write(partial(studies.create, study=study))
+    set_location(request, response, made.id, again)
+    return StudySummary(**summary(await store.read(partial(studies.history, study_id=made.id))))
+
+
+@router.get(
+    "",
+    summary="List studies",
+    response_model=StudyList,
+    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+)
+async def list_studies(request: Request, page: Annotated[StudyPage, Query()]) -> StudyList:
+    """Studies and how far each has come, newest first, page by page."""
+    store: Store = request.app.state.store
+    found, following = await store.read(partial(studies.page, limit=page.limit, after=page.after))
+    return StudyList(studies=[StudySummary(**summary(history)) for history in found], next=following)
+
+
+@router.get(
+    "/{id}",
+    summary="A study and its history",
+    response_model=Study,
+    responses={
+        200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": STUDY_CSV}}},
+        **problem_responses(problems.UnknownStudy, problems.StoreUnavailable),
+    },
+)
+async def show(request: Request, id: StudyId) -> Response:
+    """Its iterations, each against the one before and the best, and whether the threshold is met. `Accept: text/csv`
+    gives the history as a table."""
+    store: Store = request.app.state.store
+    history = await store.read(partial(studies.history, study_id=id))
+    if "text/csv" in request.headers.get("accept", "").lower():
+        return Response(as_csv(history), media_type="text/csv")
+    return Response(Study(**full(history)).model_dump_json(), media_type="application/json")
+
+
+@router.delete(
+    "/{id}",
+    summary="Delete a study",
+    status_code=204,
+    responses=problem_responses(problems.UnknownStudy, problems.StoreUnavailable),
+)
+async def delete(request: Request, id: StudyId) -> None:
+    """Deletes it with its iterations and their answers."""
+    store: Store = request.app.state.store
+    await store.write(partial(studies.delete, study_id=id))
+
+
+def set_location(request: Request, response: Response, path: str, again: bool) -> None:
+    """Headers of an answer that says what was made, now or under the same key before."""
+    response.headers["Location"] = f"{request.scope.get('root_path', '')}/studies/{path}"
+    if again:
+        response.headers[REPLAYED] = "true"

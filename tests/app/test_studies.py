@@ -1,0 +1,317 @@
+"""Studies over HTTP: their life, their figures, what is refused, and what is left when the service is killed."""
+
+from __future__ import annotations
+
+import csv
+import io
+import signal
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.schemas import problems
+from app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
+from tests.app.databases import postgres, why_no_postgres
+from tests.app.live import Server, serving
+from tests.app.requests import move
+
+ABSENT = "5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
+LINE = {"optimize": move(method="time_scaling")}
+SLOW = {"optimize": move(duration=3.0)}
+FREE = {"optimize": move()}
+SECRET = "caller-secret-7f3a"
+
+
+def begin(client: Any, **fields: Any) -> str:
+    """The path of a new study."""
+    answer = client.post("/studies", json={"name": "A study", "threshold": 50.0, **fields})
+    assert answer.status_code == 201, answer.text
+    StudySummary.model_validate_json(answer.content)
+    path: str = answer.headers["location"]
+    assert path == f"/studies/{answer.json()['id']}"
+    return path
+
+
+def added(client: Any, path: str, body: Any, **options: Any) -> dict[str, Any]:
+    """A new iteration."""
+    answer = client.post(f"{path}/iterations", json=body, **options)
+    assert answer.status_code == 201, answer.text
+    IterationDetail.model_validate_json(answer.content)
+    content: dict[str, Any] = answer.json()
+    assert answer.headers["location"] == f"{path}/iterations/{content['number']}"
+    return content
+
+
+def shown(client: Any, path: str) -> dict[str, Any]:
+    """A study as it stands."""
+    answer = client.get(path)
+    assert answer.status_code == 200, answer.text
+    Study.model_validate_json(answer.content)
+    content: dict[str, Any] = answer.json()
+    return content
+
+
+@pytest.fixture(scope="module")
+def three(client: TestClient) -> tuple[str, list[dict[str, Any]]]:
+    """A study of three iterations: a slow motion, the best, the best on a straight line."""
+    path = begin(client, threshold=62.0)
+    return path, [added(client, path, body) for body in (SLOW, FREE, LINE)]
+
+
+def test_a_new_study_is_empty(client: TestClient) -> None:
+    path = begin(client, name="Größe 1 ✓", objective="mechanical")
+    study = shown(client, path)
+    assert (study["name"], study["objective"], study["robot"]) == ("Größe 1 ✓", "mechanical", "ur5e")
+    assert (study["iterations"], study["history"], study["threshold_met"]) == (0, [], False)
+    assert (study["last"], study["best"], study["threshold_met_by"]) == (None, None, None)
+
+
+def test_each_iteration_is_held_against_those_before(client: TestClient, three: Any) -> None:
+    path, steps = three
+    slow, free, line = (step["energy"] for step in steps)
+    # idle power alone: 3 s at 37 W
+    assert free < line < slow
+    assert [step["number"] for step in steps] == [1, 2, 3]
+    assert [step["change_from_last"] for step in steps] == [None, free - slow, line - free]
+    assert [step["change_from_best"] for step in steps] == [None, free - slow, line - free]
+    assert [step["best"]["number"] for step in steps] == [1, 2, 2]
+    assert [step["threshold_met"] for step in steps] == [slow <= 62, free <= 62, line <= 62] == [False, True, True]
+    assert [step["threshold_met_by"] for step in steps] == [None, 2, 2]
+    study = shown(client, path)
+    assert study["history"] == [
+        {name: value for name, value in step.items() if name in study["history"][0]} for step in steps
+    ]
+    assert study["best"] == {"number": 2, "energy": free}
+    assert study["last"] == {"number": 3, "energy": line}
+    assert (study["threshold_met"], study["threshold_met_by"], study["iterations"]) == (True, 2, 3)
+
+
+def test_an_iteration_keeps_its_request_and_its_whole_answer(client: TestClient, three: Any) -> None:
+    path, steps = three
+    assert client.get(f"{path}/iterations/2").json() == steps[1]
+    kept = client.get(f"/answers/{steps[1]['answer']}").json()
+    assert kept["kind"] == "optimize"
+    alone = client.post("/optimize", json=FREE["optimize"]).json()
+    assert kept["answer"]["energy"] == alone["energy"]
+    assert kept["answer"]["trajectory"] == alone["trajectory"]
+    assert steps[1]["energy"] == kept["answer"]["energy"]["electrical"]["total"]
+    assert steps[1]["mechanical"] == kept["answer"]["energy"]["mechanical"]["total"]
+    sent_again = added(client, path, steps[1]["request"])
+    assert sent_again["energy"] == steps[1]["energy"]
+
+
+def test_the_studys_objective_is_the_iterations(client: TestClient) -> None:
+    path = begin(client, objective="mechanical")
+    step = added(client, path, {"optimize": move(duration=2.0)})
+    assert step["request"]["optimize"]["objective"] == "mechanical"
+    assert step["energy"] == step["mechanical"] < step["electrical"]
+    answer = client.post(f"{path}/iterations", json={"optimize": move(duration=2.0, objective="electrical")})
+    assert problems.Validation.model_validate_json(answer.content).errors[0].loc == ["body", "optimize", "objective"]
+
+
+def test_the_history_as_a_table(client: TestClient, three: Any) -> None:
+    path, _ = three
+    study = shown(client, path)
+    answer = client.get(path, headers={"accept": "text/csv"})
+    assert answer.headers["content-type"].startswith("text/csv")
+    rows = list(csv.DictReader(io.StringIO(answer.text)))
+    assert [int(row["iteration"]) for row in rows] == [entry["number"] for entry in study["history"]]
+    for row, entry in zip(rows, study["history"], strict=True):
+        assert float(row["energy_J"]) == entry["energy"]
+        assert float(row["duration_s"]) == entry["duration"]
+        assert (float(row["change_from_last_J"]) if row["change_from_last_J"] else None) == entry["change_from_last"]
+        assert row["threshold_met"] == str(entry["threshold_met"]).lower()
+
+
+def test_a_failed_request_leaves_no_trace(client: TestClient) -> None:
+    path = begin(client)
+    answer = client.post(f"{path}/iterations", json={"optimize": move(duration=0.05)})
+    problems.DurationTooShort.model_validate_json(answer.content)
+    answer = client.post(f"{path}/iterations", json={"optimize": move(deadline=1e-3)})
+    problems.DeadlineExceeded.model_validate_json(answer.content)
+    assert shown(client, path)["iterations"] == 0
+    assert added(client, path, FREE)["number"] == 1
+
+
+def test_deleted_with_all_that_belongs_to_it(client: TestClient) -> None:
+    path = begin(client)
+    step = added(client, path, FREE)
+    assert client.delete(path).status_code == 204
+    for gone in (client.get(path), client.delete(path), client.get(f"{path}/iterations/1")):
+        problems.UnknownStudy.model_validate_json(gone.content)
+    problems.UnknownStudy.model_validate_json(client.post(f"{path}/iterations", json=FREE).content)
+    problems.UnknownAnswer.model_validate_json(client.get(f"/answers/{step['answer']}").content)
+
+
+def test_pages_hold_every_study_once(client: TestClient) -> None:
+    made = [begin(client, name=f"Page {k}").rpartition("/")[2] for k in range(7)]
+    found: list[str] = []
+    after = None
+    while True:
+        answer = client.get("/studies", params={"limit": 3} | ({"after": after} if after else {}))
+        page = StudyList.model_validate_json(answer.content)
+        found += [study.id for study in page.studies]
+        after = page.next
+        if after is None:
+            break
+        assert len(page.studies) == 3
+    assert found[:7] == made[::-1]
+    assert len(found) == len(set(found))
+    created = [client.get(f"/studies/{id}").json()["created"] for id in found]
+    assert created == sorted(created, reverse=True)
+
+
+def test_a_repeated_request_makes_nothing_new(client: TestClient) -> None:
+    key = {"Idempotency-Key": "begin-once"}
+    body = {"name": "Once", "threshold": 50.0}
+    first, second = (client.post("/studies", json=body, headers=key) for _ in range(2))
+    assert first.json() == second.json()
+    assert (first.status_code, second.status_code) == (201, 201)
+    assert "idempotency-replayed" not in first.headers
+    assert second.headers["idempotency-replayed"] == "true"
+    reused = client.post("/studies", json=body | {"threshold": 51.0}, headers=key)
+    problems.KeyReused.model_validate_json(reused.content)
+
+    path = first.headers["location"]
+    steps = [added(client, path, FREE, headers=key) for _ in range(2)]
+    assert steps[0] == steps[1]
+    problems.KeyReused.model_validate_json(client.post(f"{path}/iterations", json=LINE, headers=key).content)
+    assert added(client, begin(client), LINE, headers=key)["number"] == 1, "a key belongs to one study"
+    assert shown(client, path)["iterations"] == 1
+
+
+def test_a_request_repeated_while_it_runs_makes_one_iteration(client: TestClient) -> None:
+    path = begin(client)
+    with ThreadPoolExecutor(4) as pool:
+        headers = {"Idempotency-Key": "at-once"}
+        steps = list(pool.map(lambda _: added(client, path, FREE, headers=headers), range(4)))
+    assert all(step == steps[0] for step in steps)
+    assert shown(client, path)["iterations"] == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "loc"),
+    [
+        ({}, ["body", "name"]),
+        ({"name": ""}, ["body", "name"]),
+        ({"name": "  "}, ["body", "name"]),
+        ({"name": "x" * 201}, ["body", "name"]),
+        ({"name": "a\0b"}, ["body", "name"]),
+        ({"name": "a\nb"}, ["body", "name"]),
+        ({"name": 5}, ["body", "name"]),
+        ({"threshold": None}, ["body", "threshold"]),
+        ({"threshold": "50"}, ["body", "threshold"]),
+        ({"threshold": 0}, ["body", "threshold"]),
+        ({"threshold": -1.0}, ["body", "threshold"]),
+        ({"threshold": 1e300}, ["body", "threshold"]),
+        ({"threshold": True}, ["body", "threshold"]),
+        ({"objective": SECRET}, ["body", "objective"]),
+        ({SECRET: 1}, ["body"]),
+    ],
+)
+def test_a_malformed_study_is_refused(client: TestClient, body: dict[str, Any], loc: list[str]) -> None:
+    sent = body if not body else {"name": "A study", "threshold": 50.0, **body}
+    answer = client.post("/studies", json=sent)
+    assert answer.status_code == 422
+    errors = problems.Validation.model_validate_json(answer.content).errors
+    assert loc in [error.loc for error in errors]
+    assert SECRET not in answer.text
+
+
+def test_a_threshold_that_is_no_number_is_refused(client: TestClient) -> None:
+    answer = client.post("/studies", content=b'{"name": "A", "threshold": NaN}')
+    problems.Validation.model_validate_json(answer.content)
+
+
+def test_an_unknown_robot_is_refused(client: TestClient) -> None:
+    answer = client.post("/studies", json={"name": "A study", "threshold": 50.0, "robot": "r2d2"})
+    problems.UnknownRobot.model_validate_json(answer.content)
+
+
+@pytest.mark.parametrize(
+    "body", [{}, {"optimise": {}}, {"optimize": {}}, {"optimize": move(**{SECRET: 1})}, {**FREE, SECRET: {}}, [], None]
+)
+def test_a_malformed_iteration_is_refused(client: TestClient, body: Any) -> None:
+    answer = client.post(f"{begin(client)}/iterations", json=body)
+    assert problems.Validation.model_validate_json(answer.content).errors
+    assert SECRET not in answer.text
+
+
+@pytest.mark.parametrize("key", ["", "x" * 129, "two words"])
+def test_a_malformed_key_is_refused(client: TestClient, key: str) -> None:
+    answer = client.post("/studies", json={"name": "A", "threshold": 1.0}, headers={"Idempotency-Key": key})
+    (error,) = problems.Validation.model_validate_json(answer.content).errors
+    assert error.loc == ["header", "Idempotency-Key"]
+
+
+@pytest.mark.parametrize("query", ["limit=0", "limit=201", "limit=x", "after=x", f"after=1_{'x' * 36}", f"{SECRET}=1"])
+def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
+    answer = client.get(f"/studies?{query}")
+    assert problems.Validation.model_validate_json(answer.content).errors
+    assert SECRET not in answer.text
+
+
+@pytest.mark.parametrize("id", ["none", ABSENT, "x" * 5000, "%00", "%ff", "ü"])
+def test_unknown_study(client: TestClient, id: str) -> None:
+    answers = [client.get(f"/studies/{id}"), client.delete(f"/studies/{id}"), client.get(f"/studies/{id}/iterations/1")]
+    for answer in [*answers, client.post(f"/studies/{id}/iterations", json=FREE)]:
+        assert answer.status_code == 404
+        problems.UnknownStudy.model_validate_json(answer.content)
+
+
+@pytest.mark.parametrize(("number", "kind"), [("2", "UnknownStudy"), ("0", "Validation"), ("9" * 30, "Validation")])
+def test_unknown_iteration(client: TestClient, number: str, kind: str) -> None:
+    path = begin(client)
+    answer = client.get(f"{path}/iterations/{number}")
+    getattr(problems, kind).model_validate_json(answer.content)
+
+
+def databases() -> list[Any]:
+    missing = why_no_postgres()
+    return ["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(missing is not None, reason=str(missing)))]
+
+
+class Over:
+    """A live server, called as a test client is."""
+
+    def __init__(self, server: Server) -> None:
+        self.get = server.get
+        self._server = server
+
+    def post(self, path: str, json: Any, **options: Any) -> Any:
+        return self._server.post(path, json, **options)
+
+
+@pytest.mark.parametrize("kind", databases())
+def test_what_was_acknowledged_outlives_a_kill(kind: str, tmp_path: Path) -> None:
+    if kind == "sqlite":
+        check_kill(f"sqlite:///{tmp_path}/joulepath.db")
+    else:
+        with postgres() as database:
+            check_kill(database.url)
+
+
+def check_kill(url: str) -> None:
+    """Kills one of two servers on one database right after its answers, and asks the others."""
+    with serving(workers=1, database_url=url) as other:
+        with serving(workers=1, database_url=url) as killed:
+            path = begin(Over(killed))
+            step = added(Over(killed), path, LINE)
+            killed.process.send_signal(signal.SIGKILL)
+            killed.process.wait()
+        with serving(workers=1, database_url=url) as restarted:
+            for server in (other, restarted):
+                study = shown(Over(server), path)
+                assert [entry["answer"] for entry in study["history"]] == [step["answer"]]
+                kept = server.get(f"/answers/{step['answer']}").json()["answer"]
+                assert kept["energy"]["electrical"]["total"] == step["energy"]
+            # both servers, at once: numbers are counted without gaps and none is given twice
+            with ThreadPoolExecutor(6) as pool:
+                servers = [other, restarted] * 6
+                numbers = list(pool.map(lambda server: added(Over(server), path, LINE)["number"], servers))
+            assert sorted(numbers) == list(range(2, 14))
+            for server in (other, restarted):
+                assert [entry["number"] for entry in shown(Over(server), path)["history"]] == list(range(1, 14))
