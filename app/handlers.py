@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from app.errors import (
     BodyTooLarge,
@@ -37,6 +38,8 @@ def respond(request: Request, error: Exception) -> Response:
     headers: Mapping[str, str] = {}
     if isinstance(error, HTTPException):
         headers = error.headers or {}
+        if error.status_code == 405:
+            headers = {**headers, "Allow": ", ".join(_allowed(request))}
         error = _from_framework(error)
     reply = problem_reply(error, request.state.id)
     return to_http(Reply(reply.status, reply.body, {**headers, **reply.headers}))
@@ -45,6 +48,15 @@ def respond(request: Request, error: Exception) -> Response:
 def to_http(reply: Reply) -> Response:
     """A reply as an HTTP response."""
     return Response(reply.body, reply.status, reply.headers, reply.media_type)
+
+
+def _allowed(request: Request) -> list[str]:
+    """Every method that the path takes: Starlette names those of the first route that has the path alone."""
+    return [
+        method
+        for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
+        if any(route.matches({**request.scope, "method": method})[0] is Match.FULL for route in request.app.routes)
+    ]
 
 
 def _from_framework(error: HTTPException) -> Exception:

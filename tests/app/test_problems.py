@@ -108,7 +108,14 @@ def test_not_found(client: TestClient, path: str) -> None:
 
 @pytest.mark.parametrize(
     ("method", "path", "allow"),
-    [("GET", "/optimize", "POST"), ("DELETE", "/robots", "GET"), ("POST", "/healthz", "GET"), ("FANCY", "/ik", "POST")],
+    [
+        ("GET", "/optimize", "POST"),
+        ("DELETE", "/robots", "GET"),
+        ("POST", "/healthz", "GET"),
+        ("FANCY", "/ik", "POST"),
+        ("PUT", "/studies", "GET, POST"),
+        ("POST", "/studies/none", "GET, DELETE"),
+    ],
 )
 def test_method_not_allowed(client: TestClient, method: str, path: str, allow: str) -> None:
     answer = client.request(method, path)
