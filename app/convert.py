@@ -14,7 +14,7 @@ from app.schemas.common import QuaternionPose, RpyPose
 from app.schemas.ik import IKRequest
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
-from optimizer.arm import INVERTER_MOST, LIMIT_NAMES, Inverter, Payload, Pose
+from optimizer.arm import INVERTER_PARTS, LIMIT_NAMES, Inverter, Payload, Pose
 from optimizer.bus import Bus
 from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem, UnknownRobot
@@ -64,7 +64,7 @@ def arm_fields(request: asked.ArmRequest) -> dict[str, Any]:
         "gravity": np.array(request.gravity),
         "limits": _limits(request.limits, robot),
         "friction": request.friction,
-        "inverter": Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_MOST}),
+        "inverter": Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}),
         "bus": _bus(request.bus),
         "link_mass_scale": request.link_mass_scale,
     }

@@ -16,8 +16,9 @@ LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "t
 
 # factors on a link's mass and inertia that are still an arm like the robot
 LINK_MASS_SCALES = (0.1, 10.0)
-# greatest coefficients of the inverter's loss [W, W/A, W/A²]: far beyond any inverter's
-INVERTER_MOST = {"constant": 1e3, "linear": 1e2, "quadratic": 1e1}
+# coefficients of the inverter's loss, and their greatest values [W, W/A, W/A²]: far beyond any inverter's
+INVERTER_PARTS = ("constant", "linear", "quadratic")
+INVERTER_MOST = 1e3
 
 
 def frozen(values: object, shape: tuple[int, ...], name: str) -> Array:
@@ -127,9 +128,9 @@ class Arm:
         nq = self.robot.nq
         scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *LINK_MASS_SCALES)
         object.__setattr__(self, "link_mass_scale", scale)
-        given = {name: getattr(self.inverter, name) for name in INVERTER_MOST}
+        given = {name: getattr(self.inverter, name) for name in INVERTER_PARTS}
         figures = {
-            name: per_joint(value, nq, f"drives.inverter.{name}", 0.0, INVERTER_MOST[name])
+            name: per_joint(value, nq, f"drives.inverter.{name}", 0.0, INVERTER_MOST)
             for name, value in given.items()
             if value is not None
         }
@@ -149,7 +150,7 @@ class Arm:
     @property
     def drives(self) -> Drives:
         """The drives in force."""
-        names = [name for name in INVERTER_MOST if getattr(self.inverter, name) is not None]
+        names = [name for name in INVERTER_PARTS if getattr(self.inverter, name) is not None]
         return replace(self.robot.drives, **{f"inverter_{name}": getattr(self.inverter, name) for name in names})
 
     @property

@@ -58,4 +58,27 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
             "duration": 2.0,
         },
     },
+    "store_on_the_bus": {
+        "summary": "A capacitor on the bus",
+        "description": "Surplus of a heavy payload going down charges it; what is still in it at the end counts.",
+        "value": {
+            "start": {"q": [0.0, -1.6, 0.3, -1.0, -1.57, 0.0]},
+            "goal": {"q": [0.8, -0.5, 0.4, -1.5, -1.57, 0.0]},
+            "payload": {"mass": 5.0, "com": [0.0, 0.0, 0.1]},
+            "duration": {"max": 1.0},
+            "bus": {"mode": "storage", "capacity": 5.0, "power": 200.0, "efficiency": 0.9},
+            "drives": {"inverter": {"constant": 1.5, "linear": 0.6, "quadratic": 0.02}},
+        },
+    },
+    "cycle_with_brakes": {
+        "summary": "A cycle that ends on the brakes",
+        "description": "Moving faster leaves more of the cycle's time for the brakes, which take less than the motors.",
+        "value": {
+            "start": {"q": _HOME},
+            "goal": {"q": [1.2, -0.9, 1.3, -1.9, -1.57, 0.4]},
+            "payload": {"mass": 3.0, "com": [0.0, 0.0, 0.06]},
+            "cycle": {"time": 4.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 15.0},
+            "link_mass_scale": 0.8,
+        },
+    },
 }

@@ -176,9 +176,9 @@ Share = Annotated[float, Field(ge=0, le=1)]
 class Inverter(Request):
     """The inverters' loss constant + linear·|i| + quadratic·i². One number holds for every joint; null: the robot's."""
 
-    constant: LossPerJoint | None = described("Loss at no current, at most 1000.", "W", 1.5, default=None)
-    linear: LossPerJoint | None = described("Loss per current, at most 100.", "W/A", 0.6, default=None)
-    quadratic: LossPerJoint | None = described("Loss per current squared, at most 10.", "W/A²", 0.02, default=None)
+    constant: LossPerJoint | None = described("Loss at no current.", "W", 1.5, default=None)
+    linear: LossPerJoint | None = described("Loss per current.", "W/A", 0.6, default=None)
+    quadratic: LossPerJoint | None = described("Loss per current squared.", "W/A²", 0.02, default=None)
 
 
 class Drives(Request):
