@@ -29,8 +29,9 @@ from benchmarks.tasks import Move, move
 from models.registry import load_robot
 from models.robot import Array, Robot
 from optimizer import bspline
-from optimizer.candidate import Guess, Solver
+from optimizer.candidate import Guess
 from optimizer.kernel import compile_kernel
+from optimizer.methods.free_spline import FreeSpline
 from optimizer.motion import Task
 from optimizer.problem import Problem
 from optimizer.solution import Spline
@@ -69,7 +70,7 @@ class Search:
     def improve(self, guess: Guess) -> float:
         """The energy from a first guess, inf where it leads nowhere; kept if it is the least."""
         deadline = time.perf_counter() + PATIENCE
-        spline = Solver(self.task, self.move.q_start, self.move.q_goal, deadline).improve(guess).spline
+        spline = FreeSpline(self.task, self.move.q_start, self.move.q_goal, deadline).improve(guess).spline
         if spline is None:
             return float("inf")
         energy = self.task.energy(spline).electrical.total

@@ -17,10 +17,11 @@ from models.registry import load_robot
 from models.robot import Array, Robot
 from optimizer import bspline
 from optimizer.arm import Pose
-from optimizer.candidate import Guess, Solver
+from optimizer.candidate import Guess
 from optimizer.exceptions import JoulepathError
 from optimizer.inverse_kinematics import inverse_kinematics_for
 from optimizer.kernel import compile_kernel
+from optimizer.methods.free_spline import FreeSpline
 from optimizer.motion import Task
 from optimizer.optimize import optimize, warm_up
 from optimizer.problem import BranchFilter, Problem
@@ -40,7 +41,7 @@ def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
         for task in (move(seed, 0), *moves(seed, count)):
             points = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
             began = time.perf_counter()
-            solver = Solver(Task(Problem(task.q_start, task.q_goal)), task.q_start, task.q_goal, began + PATIENCE)
+            solver = FreeSpline(Task(Problem(task.q_start, task.q_goal)), task.q_start, task.q_goal, began + PATIENCE)
             outcome = solver.improve(Guess(space, points, 0.0))
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
@@ -60,7 +61,7 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
         for task in (move(seed, 0, robot), *moves(seed, count, robot)):
             began = time.perf_counter()
             problem = Problem(task.q_start, task.q_goal, robot=robot)
-            outcome = Solver(Task(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
+            outcome = FreeSpline(Task(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
             solved += outcome.status == "solved"

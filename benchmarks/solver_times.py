@@ -14,8 +14,9 @@ from benchmarks.command import keep, on_one_core, parser
 from benchmarks.figures import Spread
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
-from optimizer.candidate import Attempt, Solver
+from optimizer.candidate import Attempt
 from optimizer.kernel import compile_kernel
+from optimizer.methods import solver_for
 from optimizer.motion import Task
 from optimizer.optimize import warm_up
 from optimizer.problem import Method, Problem
@@ -28,7 +29,7 @@ def solve(move: Move, method: Method) -> tuple[float, Attempt]:
     """Wall time [s] and outcome of one candidate."""
     task = Task(Problem(move.q_start, move.q_goal, method=method))
     began = time.perf_counter()
-    outcome = Solver(task, move.q_start, move.q_goal, began + PATIENCE).solve()
+    outcome = solver_for(task, move.q_start, move.q_goal, began + PATIENCE).solve()
     return time.perf_counter() - began, outcome
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -98,15 +99,27 @@ class Basis:
     at_grid: Array
     anchors: npt.NDArray[np.bool_]
 
+    degree: ClassVar[int] = DEGREE
+    # how many control points rest fixes at either end
+    resting: ClassVar[int] = REST_POINTS
+
     @property
     def n(self) -> int:
         """Number of control points."""
-        return len(self.knots) - DEGREE - 1
+        return int(self.at_nodes.shape[2])
 
     @property
     def free(self) -> slice:
         """The control points that rest at the ends leaves free."""
-        return slice(REST_POINTS, self.n - REST_POINTS)
+        return slice(self.resting, self.n - self.resting)
+
+    def to_spline(self, points: Array) -> Array:
+        """Control points of the B-spline over `knots` for this space's own: the same here."""
+        return points
+
+    def fit(self, samples: Array, at: Array) -> Array:
+        """Points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,) in [0, 1]."""
+        return fit(samples, at, self.knots)
 
     @cached_property
     def quintic(self) -> Array:

@@ -1,29 +1,27 @@
-"""One start and goal pair from first guess to a motion that holds every limit between the nodes too."""
+"""One start and goal pair: what solves it, and the way from a first guess to a motion that holds every limit.
+
+The methods themselves are in `optimizer.methods`, a file each.
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
+from scipy.interpolate import BSpline
 
 from models.robot import Array, Limits
-from optimizer import bspline, profile, shortest_line, verify
-from optimizer.baselines import time_optimal, time_optimal_positions
-from optimizer.bounds import LEAST_DURATION, LONGEST_DURATION
+from optimizer import verify
+from optimizer.bounds import LONGEST_DURATION
 from optimizer.bspline import Basis
 from optimizer.motion import Task, fine_samples, peak_rates, sample, slowed, spline_of, stretch
 from optimizer.nlp import Coordinates, Programme
-from optimizer.solution import Spline
+from optimizer.solution import BaselineName, Spline
 from optimizer.solve import FEASIBILITY, solve
 from optimizer.windows import Window, windows
 
-# control points of a first attempt with evenly spaced knots
-COARSE = 13
-# evenly spaced knots are not tried where less than this multiple of the shortest duration is allowed
-TIGHT = 1.12
-# how often knots are repeated where jerk switches: it bends there in a refined motion, and jumps in the finest
-REFINED, EXACT = 2, 3
 # the solver works within limits tightened by this share, so that its own tolerance does not break the real ones
 MARGIN = 2 * FEASIBILITY
 # times that limits are tightened where the motion breaks them between the nodes, and by how much beyond the excess
@@ -37,11 +35,17 @@ MOST_STRETCH = 1 + 5e-4
 STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # points per knot span at which torque is checked between the nodes
 TORQUE_POINTS = 4
+# samples of a motion that another is fitted to
+FIT_SAMPLES = 201
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of a candidate: the spline if it is solved, and what was spent on it."""
+    """What came of a candidate: the spline if it is solved, and what was spent on it.
+
+    `iterations` are the method's own: of the SQP, generations, or energies evaluated. `converged` is whether more of
+    them would find nothing better nearby.
+    """
 
     status: Literal["solved", "infeasible", "failed", "out of time"]
     reason: str
@@ -49,6 +53,7 @@ class Attempt:
     solves: int = 0
     spline: Spline | None = None
     stationarity: float | None = None
+    converged: bool = True
 
 
 @dataclass(frozen=True)
@@ -60,63 +65,56 @@ class Guess:
     duration: float
 
 
-class Solver:
-    """Solves one candidate, from q_start to q_goal (nq,), as often as it is asked to before `deadline`.
+class Solver(ABC):
+    """Solves one candidate, from q_start to q_goal (nq,), by one method, before `deadline`.
 
     `window` says which durations are allowed and what is minimised; None: the problem's first.
     """
 
+    # the baselines that are first guesses of a motion of this kind, and those that are motions of this kind
+    learns: ClassVar[tuple[BaselineName, ...]] = ()
+    adopts: ClassVar[tuple[BaselineName, ...]] = ()
+    # how many candidates are solved before the rest is left
+    most_solved: ClassVar[int | None] = None
+
     def __init__(
         self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
     ) -> None:
-        problem = task.problem
         self.task, self.deadline = task, deadline
-        self.on_line = problem.method == "time_scaling"
         self.q_start, self.q_goal = q_start, q_goal
         self.window = windows(task, q_goal)[0] if window is None else window
         self.t_min, self.t_max = self.window.t_min, self.window.t_max
-        self.coordinates = self._coordinates(problem.active_limits.scaled(1 - MARGIN))
 
+    @abstractmethod
     def solve(self) -> Attempt:
-        """From the ground up; over knots made for haste where time is short or evenly spaced ones find nothing."""
-        if self.on_line:
-            return self._on_line()
-        shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        first = Attempt("failed", "not tried")
-        if not self.window.hurried and self.t_max >= TIGHT * shortest:
-            space = bspline.uniform(COARSE)
-            first = self.improve(Guess(space, self._smoothed(space), 0.0))
-            if first.status in ("solved", "out of time"):
-                return first
-        second = self.improve(self.in_haste())
-        return replace(second, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
+        """The method, from the ground up."""
 
-    def in_haste(self) -> Guess:
-        """The fastest motion under limits on speed, acceleration and jerk, in a space that holds its jerk's jumps."""
-        line = self.coordinates
-        fastest = time_optimal(line.limits, line.start, line.goal)
-        duration = max(fastest.duration, LEAST_DURATION)
-        space = self.graded(duration, EXACT)
-        return Guess(space, bspline.fit(fastest.q, fastest.t / duration, space.knots), duration)
+    @staticmethod
+    def may_refine(found: Spline) -> bool:
+        """Whether `learn` may make more of what `solve` found."""
+        return False
 
-    def graded(self, duration: float, repeat: int) -> Basis:
-        """A space with knots where the leading coordinate's jerk switches in a motion of that duration."""
-        line = self.coordinates
-        return bspline.graded(profile.switches(line.goal - line.start, duration, line.limits), repeat)
+    def learn(self, q: Array, t: Array, fine: bool) -> Attempt:
+        """An attempt from samples q (k, nq) at times t (k,) of a motion; `fine` where a first one fell short."""
+        return Attempt("failed", "the method takes no motion for a guess")
 
-    def _on_line(self) -> Attempt:
-        law = shortest_line.shortest_law(self.task, self.q_start, self.q_goal)
-        if law is None:
-            return Attempt("infeasible", "the straight line needs more torque than the joints have")
-        if law.duration_bound > self.t_max:
-            return Attempt("infeasible", f"the straight line takes at least {law.duration_bound:.4f} s")
-        self.t_min = max(self.t_min, law.duration_bound)
-        line = self.coordinates
-        space = self.graded(float(profile.shortest_duration(line.goal - line.start, line.limits)), EXACT)
-        # toppra's law jumps in acceleration: few control points round that off before many follow it
-        coarse = bspline.uniform(COARSE).knots
-        points = bspline.refit(law.fractions(coarse)[:, None], coarse, space.knots)
-        return self.improve(Guess(space, points, self.t_min))
+    def torque_peaks(self, spline: Spline) -> Array:
+        """Greatest absolute motor torques (nq,) at the nodes of a motion and at the certificate's own instants."""
+        # where a joint turns back, friction changes sign within a millisecond
+        between, replayed = fine_samples(spline, TORQUE_POINTS)[1:], sample(spline, verify.grid(spline.duration))
+        q, v, a = (np.concatenate(both) for both in zip(between, replayed, strict=True))
+        tau = self.task.torques(q, v, a) + self.task.friction.torque(v)
+        return np.asarray(np.abs(tau).max(axis=0))
+
+
+class Programmed(Solver):
+    """A method whose motions live in a linear space and are optimised by the SQP."""
+
+    def __init__(
+        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+    ) -> None:
+        super().__init__(task, q_start, q_goal, deadline, window)
+        self.coordinates = self._coordinates(task.problem.active_limits.scaled(1 - MARGIN))
 
     def improve(self, guess: Guess) -> Attempt:
         """Optimise from a guess, tightening the limits where the motion breaks them between the nodes."""
@@ -141,24 +139,16 @@ class Solver:
                 excess = self._excess(spline)
             if excess is None:
                 return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)
-            limits = limits.scaled(excess)
+            limits = _tightened(limits, excess)
             programme = replace(programme, coordinates=self._coordinates(limits))
-            free, duration, multiplier = result.free, result.duration, result.multiplier
+            # the solver takes no step for positions alone: it bounds them
+            free = np.clip(result.free, programme.limits.q_min, programme.limits.q_max)
+            duration, multiplier = result.duration, result.multiplier
         return Attempt("failed", "limits stay broken between the nodes", iterations, REPAIRS)
 
     def _coordinates(self, limits: Limits) -> Coordinates:
-        build = Coordinates.straight_line if self.on_line else Coordinates.joints
-        return build(self.q_start, self.q_goal, limits)
-
-    def _smoothed(self, space: Basis) -> Array:
-        """Control points (n, r) of the fastest motion with its corners rounded: its positions at the Greville points.
-
-        Control values set to a function's values there give a spline that varies less than the function (Schoenberg).
-        """
-        line = self.coordinates
-        points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
-        points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
-        return points
+        """What the space describes: every joint by itself."""
+        return Coordinates.joints(self.q_start, self.q_goal, limits)
 
     def _first_duration(self, programme: Programme, free: Array, least: float) -> float:
         """The cheapest of a few durations at which the guess holds the limits on speed, acceleration and jerk."""
@@ -189,22 +179,36 @@ class Solver:
         return spline if needed > MOST_STRETCH or spline.duration * needed > self.t_max else slowed(spline, needed)
 
     def _excess(self, spline: Spline) -> Limits | None:
-        """The factors (≤ 1) by which each limit must be tightened, None when the motion holds them all."""
+        """The factors (≤ 1) by which each limit must be tightened, positions by how much [rad]; None if all hold."""
         limits = self.task.problem.active_limits
-        # the certificate's own instants too: where a joint turns back, friction changes sign within a millisecond
-        between, replayed = fine_samples(spline, TORQUE_POINTS)[1:], sample(spline, verify.grid(spline.duration))
-        q, v, a = (np.concatenate(both) for both in zip(between, replayed, strict=True))
-        tau = self.task.torques(q, v, a) + self.task.friction.torque(v)
         rates = peak_rates(spline)
         found = {
             "v_max": rates[0] / limits.v_max,
             "a_max": rates[1] / limits.a_max,
             "j_max": rates[2] / limits.j_max,
-            "tau_max": np.abs(tau).max(axis=0) / limits.tau_max,
+            "tau_max": self.torque_peaks(spline) / limits.tau_max,
         }
+        below, above = self._overshoot(spline)
         held = 1 - REPAIR_MARGIN / 4
-        if max(float(ratio.max()) for ratio in found.values()) <= held:
+        if max(float(ratio.max()) for ratio in found.values()) <= held and not (below.any() or above.any()):
             return None
         factors = {name: np.where(r > held, r + REPAIR_MARGIN, 1.0) for name, r in found.items()}
         factors["tau_max"] = 1 + TORQUE_REPAIR * (factors["tau_max"] - 1)
-        return Limits(q_min=limits.q_min, q_max=limits.q_max, **{name: 1 / factor for name, factor in factors.items()})
+        return Limits(q_min=below, q_max=above, **{name: 1 / factor for name, factor in factors.items()})
+
+    def _overshoot(self, spline: Spline) -> tuple[Array, ...]:
+        """How far the joints go below and above their range [rad], (nq,) each: a B-spline's hull keeps it inside."""
+        none = np.zeros(len(self.q_start))
+        return none, none
+
+
+def sampled(spline: Spline) -> tuple[Array, Array]:
+    """Samples q (k, nq) of a motion at times t (k,), to learn from."""
+    t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
+    return np.asarray(BSpline(spline.knots, spline.control_points, spline.degree)(t)), t
+
+
+def _tightened(limits: Limits, excess: Limits) -> Limits:
+    """Limits on speed, acceleration, jerk and torque times factors per joint, and positions moved inwards."""
+    inner = limits.scaled(excess)
+    return replace(inner, q_min=inner.q_min + excess.q_min, q_max=inner.q_max - excess.q_max)

@@ -178,9 +178,9 @@ class Task(Plant):
         return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total
 
 
-def spline_of(basis: bspline.Basis, control_points: Array, duration: float) -> Spline:
-    """A motion in a spline space: control points (n, nq), lasting `duration` [s]."""
-    return Spline(bspline.DEGREE, basis.knots * duration, control_points)
+def spline_of(basis: bspline.Basis, points: Array, duration: float) -> Spline:
+    """A motion in a spline space: its points (n, nq) there, lasting `duration` [s]."""
+    return Spline(basis.degree, basis.knots * duration, basis.to_spline(points))
 
 
 def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
@@ -200,18 +200,20 @@ def peak_rates(spline: Spline) -> Array:
     """Greatest absolute speed, acceleration and jerk of every joint, (3, nq).
 
     Every knot span is expanded around its middle, so that both sides of a repeated knot count, and samples are
-    raised to the vertex of the parabola through their neighbours: exact for jerk, which is such a parabola.
+    raised to the vertex of the parabola through their neighbours: exact for a quintic's jerk, which is such a parabola.
+    Samples are denser where the degree is higher.
     """
+    terms = spline.degree + 1
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
     edges = np.unique(spline.knots)
     middle, half = (edges[:-1] + edges[1:]) / 2, np.diff(edges) / 2
     # the spans as polynomials in x ∈ [-1, 1] around their middles
-    series = np.stack([curve(middle, k) * half[:, None] ** k for k in range(6)])
-    x = np.linspace(-1.0, 1.0, RATE_POINTS)
-    powers = np.stack([x**k / math.factorial(k) for k in range(6)], axis=1)
+    series = np.stack([curve(middle, k) * half[:, None] ** k for k in range(terms)])
+    x = np.linspace(-1.0, 1.0, (RATE_POINTS - 1) * (1 + 3 * max(spline.degree - bspline.DEGREE, 0)) + 1)
+    powers = np.stack([x**k / math.factorial(k) for k in range(terms)], axis=1)
     peaks = []
     for d in range(1, 4):
-        values = np.tensordot(powers[:, : 6 - d], series[d:], axes=1) / half[:, None] ** d
+        values = np.tensordot(powers[:, : terms - d], series[d:], axes=1) / half[:, None] ** d
         low, top, high = np.abs(values[:-2]), np.abs(values[1:-1]), np.abs(values[2:])
         bend = 2 * top - low - high
         # the vertex counts where it lies between the two outer samples

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array, Limits
-from optimizer.bspline import REST_POINTS, Basis
+from optimizer.bspline import Basis
 from optimizer.kernel import Kernel
 
 Index = npt.NDArray[np.intp]
@@ -116,7 +116,7 @@ class Programme:
     @property
     def free_count(self) -> int:
         """Number of free control points."""
-        return self.basis.n - 2 * REST_POINTS
+        return self.basis.n - 2 * self.basis.resting
 
     @cached_property
     def rates(self) -> Array:
@@ -129,11 +129,11 @@ class Programme:
 
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""
-        ends = np.ones((REST_POINTS, 1))
+        ends = np.ones((self.basis.resting, 1))
         return np.concatenate([ends * self.coordinates.start, free, ends * self.coordinates.goal])
 
     def joint_points(self, free: Array) -> Array:
-        """Control points of q, (n, nq)."""
+        """The points of q, (n, nq), in the spline's space."""
         return self.coordinates.to_joints(self.points(free))
 
     def _states(self, free: Array, T: float) -> tuple[Array, Array]:

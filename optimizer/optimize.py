@@ -9,16 +9,15 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from scipy.interpolate import BSpline
 from threadpoolctl import ThreadpoolController
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer import bspline, search
+from optimizer import search
 from optimizer.baselines import baselines, guesses, nearest, quintic_spline, time_optimal_spline
 from optimizer.bounds import LEAST_DURATION
 from optimizer.bus import Bus
-from optimizer.candidate import COARSE, EXACT, REFINED, Attempt, Guess, Solver
+from optimizer.candidate import Attempt, Solver, sampled
 from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
@@ -26,6 +25,7 @@ from optimizer.exceptions import (
     NoTrajectory,
 )
 from optimizer.kernel import kernel_for
+from optimizer.methods import METHODS, solver_for
 from optimizer.motion import Task, peak_rates, slowed, stretch
 from optimizer.problem import Problem
 from optimizer.search import Entry
@@ -48,7 +48,6 @@ from optimizer.windows import Window, fastest, windows
 RESERVE_SHARE, RESERVE = 0.2, 0.1
 # a baseline counts as better only beyond the quadrature's own error
 SLACK = 1e-6
-FIT_SAMPLES = 201
 # what a joule of surplus may be worth where a store has not room for all of it, between burning it and storing it
 CREDITS = (0.75, 0.5, 0.25)
 UNCONFIRMED = "the certificate did not confirm it"
@@ -87,6 +86,7 @@ class Run:
         self.problem = problem
         self.task = Task(problem)
         self.known = known
+        self.method = METHODS[problem.method]
         self.entries: list[Entry] = []
         self.unreachable: list[UnreachableTarget] = []
         self.iterations = self.solves = 0
@@ -193,14 +193,14 @@ class Run:
         energy = self.task.energy(retimed)
         if self.certified(entry, retimed, energy).valid:
             self.keep(entry, Attempt("solved", "a known motion, retimed", spline=retimed), energy)
-        self.learn(entry, retimed, EXACT if self.problem.method == "time_scaling" else REFINED)
+        self.learn(entry, *sampled(retimed), fine=self.problem.method == "time_scaling")
         outcome = self.attempt(entry)
         if outcome.spline is None:
             return
         self.keep(entry, outcome, self.task.energy(outcome.spline))
-        if len(outcome.spline.control_points) == COARSE and entry.attempt is not outcome:
+        if self.method.may_refine(outcome.spline) and entry.attempt is not outcome:
             # few control points are no match for the many of a known motion, but may lead to a better place
-            self.learn(entry, outcome.spline, REFINED)
+            self.learn(entry, *sampled(outcome.spline), fine=False)
 
     def best(self) -> Entry | None:
         """The solved entry of least energy."""
@@ -208,7 +208,7 @@ class Run:
 
     def solver(self, entry: Entry, window: Window) -> Solver:
         """What solves the entry in a window of durations."""
-        return Solver(self.task, entry.q_start, entry.q_goal, self.deadline, window)
+        return solver_for(self.task, entry.q_start, entry.q_goal, self.deadline, window)
 
     def count(self, outcome: Attempt) -> Attempt:
         """Add up what an attempt took."""
@@ -232,7 +232,8 @@ class Run:
         elif fastest[1].duration > longest:
             raise DurationTooShort(fastest[1].duration)
         else:
-            self.learn(*fastest)
+            entry, spline = fastest
+            self.learn(entry, *sampled(spline), fine=True)
 
     def fastest(self) -> tuple[Entry, Spline] | None:
         """The fastest motion over all candidates, whatever the problem allows, and whose it is; None if none is found
@@ -250,23 +251,13 @@ class Run:
         """The fastest motion of one candidate, whatever the problem allows."""
         return self.count(self.solver(entry, fastest(self.task)).solve()).spline
 
-    def learn(self, entry: Entry, spline: Spline, repeat: int = EXACT, credit: float | None = None) -> None:
-        """Optimise the entry from a motion, over knots where jerk switches, and keep what spends less."""
-        at = np.linspace(0.0, spline.duration, FIT_SAMPLES)
-        q = BSpline(spline.knots, spline.control_points, spline.degree)(at)
-        self.improve(entry, q, at, repeat, credit)
-
-    def improve(self, entry: Entry, q: Array, t: Array, repeat: int, credit: float | None = None) -> None:
+    def learn(self, entry: Entry, q: Array, t: Array, fine: bool, credit: float | None = None) -> None:
         """Optimise the entry from samples q (k, nq) at times t (k,), and keep the outcome if it spends less.
 
         `credit` [1] is what surplus is taken to be worth where there is a store.
         """
-        duration = float(t[-1])
         for window in windows(self.task, entry.q_goal, credit):
-            solver = self.solver(entry, window)
-            space = solver.graded(duration, repeat)
-            s = solver.coordinates.from_joints(q)
-            outcome = self.count(solver.improve(Guess(space, bspline.fit(s, t / duration, space.knots), duration)))
+            outcome = self.count(self.solver(entry, window).learn(q, t, fine))
             if outcome.spline is not None:
                 self.keep(entry, outcome, self.task.energy(outcome.spline))
 
@@ -277,38 +268,39 @@ class Run:
             entry.attempt, entry.energy, entry.status, entry.reason = outcome, objective, "solved", outcome.reason
 
     def refine(self, entry: Entry) -> None:
-        """More control points for the winner, placed where jerk switches, warm."""
+        """A finer motion for the winner, where the method has one."""
         assert entry.attempt is not None and entry.attempt.spline is not None
-        spline = entry.attempt.spline
-        if len(spline.control_points) == COARSE and time.perf_counter() < self.deadline:
-            self.learn(entry, spline, REFINED)
-        if self.has_store:
+        if self.method.may_refine(entry.attempt.spline) and time.perf_counter() < self.deadline:
+            self.learn(entry, *sampled(entry.attempt.spline), fine=False)
+        if self.has_store and self.method.learns:
             for share in CREDITS:
                 if time.perf_counter() < self.deadline:
                     worth = self.problem.regeneration
                     credit = worth + share * max(self.problem.bus.efficiency - worth, 0.0)
-                    self.learn(entry, entry.attempt.spline, REFINED, credit)
+                    self.learn(entry, *sampled(entry.attempt.spline), fine=False, credit=credit)
 
     def compared(self, best: Entry) -> list[Baseline]:
-        """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt."""
-        for repeat in (REFINED, EXACT, None):
+        """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt.
+
+        Only baselines that the method can learn from, and only those of its own kind are adopted: what another
+        parametrisation does better is not this one's answer.
+        """
+        for last, fine in ((False, False), (False, True), (True, True)):
             table, q_nearest = self.baselines(best)
             better = [b.name for b in table if b.within_limits and b.saving < -SLACK and self.allows(b.duration)]
-            if self.problem.method == "time_scaling":
-                # a baseline off the straight line is no guess for a motion along it
-                better = [name for name in better if name in ("trapezoid", "quintic")]
+            better = [name for name in better if name in (self.method.adopts if last else self.method.learns)]
             if not better:
                 return table
             entry = next(e for e in self.entries if (e.q_start == best.q_start).all() and (e.q_goal == q_nearest).all())
             if entry.reason == UNCONFIRMED:
                 return table
-            if repeat is None:
+            if last:
                 self.adopt(entry, better)
                 break
             motions = guesses(self.problem, best.q_start, q_nearest, best.duration)
             for name in better:
                 if time.perf_counter() < self.deadline:
-                    self.improve(entry, motions[name].q, motions[name].t, repeat)
+                    self.learn(entry, motions[name].q, motions[name].t, fine)
             best = self.best() or best
         return self.baselines(self.best() or best)[0]
 
@@ -325,14 +317,12 @@ class Run:
         best = self.best()
         assert best is not None
         fastest = time_optimal_spline(self.problem.active_limits, entry.q_start, entry.q_goal)
-        motions = {
+        motions: dict[BaselineName, Spline] = {
             "ruckig": fastest,
             "ruckig_slowed": slowed(fastest, best.duration / fastest.duration),
             "quintic": quintic_spline(entry.q_start, entry.q_goal, best.duration),
         }
         for name in better:
-            if name not in motions:
-                continue
             limits = self.problem.active_limits
             needed = stretch(peak_rates(motions[name]) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
             spline = slowed(motions[name], max(needed, 1.0))
@@ -362,8 +352,9 @@ class Run:
         for entry in open_ends:
             if entry.lower_bound >= self.task.objective_of(energy):
                 entry.status, entry.reason = "pruned", search.PRUNED
+        converged = best.attempt.converged and not self.cut_short
         return Solution(
-            status="feasible" if self.cut_short or any(e.status != "pruned" for e in open_ends) else "optimal",
+            status="optimal" if converged and all(e.status == "pruned" for e in open_ends) else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=self.task.trajectory(spline, self.problem.sample_period),
@@ -387,5 +378,5 @@ def warm_up(robot_name: str) -> None:
     robot = load_robot(robot_name)
     kernel_for(robot)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
-    optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot))
-    optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot, method="time_scaling"))
+    for method in METHODS:
+        optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot, method=method))

@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.common import IDENTITY, JointPositions, Pose, Request, RobotName, Vector3, by_field, described
+from optimizer.problem import Method
 
 MAX_DURATION = 600.0
 """Longest motion [s]."""
@@ -330,8 +331,10 @@ class OptimizeRequest(ArmRequest):
         None,
         {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
     )
-    method: Literal["bspline", "time_scaling"] = described(
-        "How the motion is parametrised: a free B-spline, or the straight joint-space line with an optimised time law.",
+    method: Method = described(
+        "How the motion is parametrised. `bspline`: every joint a free B-spline. `time_scaling`: the straight line in "
+        "joint space with an optimised time law. `lagrange`: every joint one polynomial, by its values at Chebyshev "
+        "nodes. `uniform_scaling`: the time-optimal motion slowed evenly.",
         None,
         "bspline",
         default="bspline",

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.common import Response, described, part
+from optimizer.problem import Method
 
 Joints = list[float]
 Samples = list[float]
@@ -200,11 +201,13 @@ class Solver(Response):
     """What the answer cost to compute."""
 
     wall_time: float = described("Wall time.", "s", 0.41)
-    iterations: int = described("Iterations, over all candidates.", "1", 52)
+    iterations: int = described(
+        "Iterations over all candidates: the solver's steps, or the energies evaluated by `uniform_scaling`.", "1", 52
+    )
     nlp_solves: int = described("Nonlinear programmes solved.", "1", 4)
     stationarity: float | None = described(
         "Largest component of the Lagrangian's gradient at the answer, as a share of the cost. Null where that is "
-        "a baseline's motion.",
+        "a baseline's motion, or the method has none.",
         "1/rad",
         2e-4,
     )
@@ -217,7 +220,7 @@ class OptimizeResponse(Response):
         "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
     )
     robot: str = described("Name of the robot.", None, "ur5e")
-    method: Literal["bspline", "time_scaling"] = described("How the motion is parametrised.", None, "bspline")
+    method: Method = described("How the motion is parametrised.", None, "bspline")
     objective: Literal["electrical", "mechanical"] = described("What was minimised.", None, "electrical")
     duration: float = described("Length of the motion.", "s", 1.8)
     status: Literal["optimal", "feasible"] = described(

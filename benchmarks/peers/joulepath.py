@@ -6,9 +6,9 @@ import time
 
 from benchmarks.motion import SplineMotion
 from models.robot import Array, Robot
-from optimizer.candidate import Solver
 from optimizer.exceptions import JoulepathError
 from optimizer.kernel import compile_kernel
+from optimizer.methods import solver_for
 from optimizer.motion import Task
 from optimizer.optimize import optimize, warm_up
 from optimizer.problem import Problem
@@ -31,7 +31,7 @@ class Candidate:
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
         task = Task(Problem(q_start, q_goal, robot=self.robot))
-        return _motion(Solver(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
+        return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
 
 
 class Answer:
@@ -67,7 +67,7 @@ class Line:
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
         task = Task(Problem(q_start, q_goal, robot=self.robot, method="time_scaling"))
-        return _motion(Solver(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
+        return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
 
 
 def _prepare(robot: Robot) -> None:

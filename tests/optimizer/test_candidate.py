@@ -13,6 +13,7 @@ from models.robot import Array
 from optimizer import windows
 from optimizer.candidate import Attempt, Solver
 from optimizer.kernel import compile_kernel
+from optimizer.methods import METHODS, solver_for
 from optimizer.motion import Task
 from optimizer.problem import Problem
 from optimizer.profile import shortest_duration
@@ -47,7 +48,7 @@ def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0,
     compile_kernel(ROBOT)
     task = Task(problem(start, goal, **given))
     window = windows.fastest(task) if fastest else None
-    return Solver(task, start, goal, time.perf_counter() + wait, window)
+    return solver_for(task, start, goal, time.perf_counter() + wait, window)
 
 
 def spline(attempt: Attempt) -> Spline:
@@ -70,7 +71,7 @@ def assert_held(task: Problem, motion: Spline) -> None:
     assert q[-1] == pytest.approx(np.asarray(task.goal), abs=ROUNDING)
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("objective", ["electrical", "mechanical"])
 def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
     for (start, goal), given in zip(random_moves(31, len(CONDITIONS)), CONDITIONS, strict=True):
@@ -111,20 +112,20 @@ def test_haste_forgets_the_duration_asked_for() -> None:
         assert spline(solver(START, GOAL, fastest=True, **given).solve()).duration == pytest.approx(quick, rel=1e-9)
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+@pytest.mark.parametrize("method", METHODS)
 def test_too_little_time_gives_no_motion(method: str) -> None:
     least = float(shortest_duration(GOAL - START, ROBOT.limits))
     attempt = solver(START, GOAL, method=method, **fixed(0.9 * least)).solve()
     assert attempt.status in ("infeasible", "failed") and attempt.spline is None and attempt.reason
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
     attempt = solver(START, GOAL, method=method, wait=-1.0).solve()
     assert attempt.status == "out of time" and attempt.spline is None
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_fixed_duration_is_kept(method: str) -> None:
     for duration in (0.75, 1.0, 4.0):
         mine = solver(START, GOAL, method=method, **fixed(duration))
@@ -133,7 +134,7 @@ def test_a_fixed_duration_is_kept(method: str) -> None:
         assert_held(mine.task.problem, motion)
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+@pytest.mark.parametrize("method", METHODS)
 def test_going_nowhere_is_a_motion(method: str) -> None:
     mine = solver(START, START, method=method)
     motion = spline(mine.solve())

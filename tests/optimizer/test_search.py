@@ -12,10 +12,11 @@ import pytest
 from models.robot import Array
 from optimizer import search
 from optimizer.arm import Payload
-from optimizer.candidate import Attempt, Solver
+from optimizer.candidate import Attempt
 from optimizer.exceptions import TorqueInfeasible, UnreachablePose
 from optimizer.inverse_kinematics import inverse_kinematics_for
 from optimizer.kernel import compile_kernel
+from optimizer.methods import solver_for
 from optimizer.motion import Task
 from optimizer.optimize import optimize
 from optimizer.problem import BranchFilter, Problem
@@ -190,7 +191,7 @@ class Recorder:
 
     def __call__(self, entry: Entry) -> Attempt:
         self.asked.append(entry)
-        return Solver(self.task, entry.q_start, entry.q_goal, np.inf).solve()
+        return solver_for(self.task, entry.q_start, entry.q_goal, np.inf).solve()
 
     def energy(self, entry: Entry) -> float:
         """What a motion of the candidate takes, inf where none is found."""
