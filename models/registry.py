@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import yaml
 
-from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, Robot
+from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, LinkCapsule, Robot, link_names
 
 ROBOTS = ("ur5e",)
 
@@ -50,6 +50,12 @@ def load_robot(name: str) -> Robot:
         ),
         friction_laws=_friction_laws(figures, model.nq),
         default_motion=DefaultMotion(float(motion["velocity"]["value"]), float(motion["acceleration"]["value"])),
+        capsules=tuple(
+            LinkCapsule(link, _read_only([row[:3], row[3:6]]), row[6])
+            for link, name in enumerate(link_names(model))
+            for row in figures["collision"][name]["value"]
+        ),
+        never_meet=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
         figures=figures,
     )
 
@@ -79,11 +85,16 @@ def _read(name: str, file: str) -> str:
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:
     """A figure's value as a read-only array, shape (nq,): the robot is shared by all who load it."""
-    values = np.array(figure["value"], dtype=float)
+    values = _read_only(figure["value"])
     if values.shape != (nq,):
         raise ValueError(f"A figure over joints must have {nq} values, not shape {values.shape}.")
-    values.setflags(write=False)
     return values
+
+
+def _read_only(values: Any) -> Array:
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
 
 
 def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:

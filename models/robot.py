@@ -102,6 +102,18 @@ class DefaultMotion:
     acceleration: float
 
 
+@dataclass(frozen=True)
+class LinkCapsule:
+    """A capsule fixed to a link: ends of its axis (2, 3) [m] in the link frame, and radius [m].
+
+    `link` is the number of the joint that moves the link, 0 for the base.
+    """
+
+    link: int
+    axis: Array
+    radius: float
+
+
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`. Compared by identity.
@@ -109,6 +121,9 @@ class Robot:
     `model` holds link inertias and rotor inertia (as armature) but neither payload nor tilted gravity: those belong
     to a problem (see `with_payload`). `friction_laws` are named; the first one is the default. `figures` is what
     `GET /robots/{name}` shows: every figure with its unit, source and trust letter.
+
+    Every link lies within its `capsules`. `never_meet` holds pairs of links that cannot touch at any joint positions;
+    neighbours are not among them.
     """
 
     name: str
@@ -120,6 +135,8 @@ class Robot:
     electronics: Electronics
     friction_laws: dict[str, FrictionLaw]
     default_motion: DefaultMotion
+    capsules: tuple[LinkCapsule, ...]
+    never_meet: frozenset[tuple[int, int]]
     figures: dict[str, Any] = field(repr=False)
 
     @property
@@ -131,6 +148,11 @@ class Robot:
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints from base to flange."""
         return tuple(self.model.names)[1:]
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Names of the links from the base to the last one that moves, nq + 1 of them."""
+        return link_names(self.model)
 
     @property
     def friction(self) -> FrictionLaw:
@@ -156,3 +178,10 @@ class Robot:
         model.inertias[last] = model.inertias[last] + flange.act(body)
         model.gravity.linear = np.asarray(gravity, dtype=float)
         return model
+
+
+def link_names(model: pin.Model) -> tuple[str, ...]:
+    """Names of the links of a chain from the base to the last one that moves, njoints of them."""
+    # a link that a fixed joint carries, as the flange is, comes after the one that the moving joint carries
+    first = {frame.parentJoint: frame.name for frame in reversed(model.frames) if frame.type == pin.BODY}
+    return tuple(first[joint] for joint in range(model.njoints))

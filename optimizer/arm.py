@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,8 +12,11 @@ from models.registry import load_robot
 from models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from optimizer.bus import Bus
 from optimizer.exceptions import InvalidProblem, OutsideLimits
+from optimizer.scene import Attachment, Scene
 
 LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
+# most shapes that a tool is made of
+MOST_PARTS = 16
 
 # factors on a link's mass and inertia that are still an arm like the robot
 LINK_MASS_SCALES = (0.1, 10.0)
@@ -61,11 +65,15 @@ class Pose:
 
 @dataclass(frozen=True)
 class Payload:
-    """A body fixed to the flange: mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com."""
+    """A body fixed to the flange: mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com.
+
+    `shape` is what it takes up of space, for collisions only.
+    """
 
     mass: float = 0.0
     com: Array = field(default_factory=lambda: np.zeros(3))
     inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    shape: Attachment | None = None
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.mass) and self.mass >= 0):
@@ -102,7 +110,8 @@ class Arm:
     `limits` replaces the robot's limits and may only tighten them. `gravity` (3,) [m/s²] is in the base frame.
     `friction` names one of the robot's friction laws (None: its default). `inverter` replaces figures of the robot's
     inverters, `bus` says where surplus power goes, `link_mass_scale` (nq,), or one number, multiplies mass and inertia
-    of every moving link, payload apart.
+    of every moving link, payload apart. `tool` is what the flange bears, for collisions
+    only, and `scene` what stands around the arm.
 
     Raises InvalidProblem, with the field named, when the parts do not fit together.
     """
@@ -116,11 +125,16 @@ class Arm:
     inverter: Inverter = field(default_factory=Inverter)
     bus: Bus = field(default_factory=Bus)
     link_mass_scale: Array = field(default_factory=lambda: np.array(1.0))
+    tool: Sequence[Attachment] = ()
+    scene: Scene = field(default_factory=Scene)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tcp", Pose(self.T_flange_tcp).T)
         object.__setattr__(self, "gravity", frozen(self.gravity, (3,), "gravity"))
         object.__setattr__(self, "limits", self.robot.limits if self.limits is None else self.limits)
+        object.__setattr__(self, "tool", tuple(self.tool))
+        if len(self.tool) > MOST_PARTS:
+            raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_PARTS} capsules.")
         self._check_limits()
         if self.friction is not None and self.friction not in self.robot.friction_laws:
             known = ", ".join(self.robot.friction_laws)

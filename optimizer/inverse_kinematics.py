@@ -12,6 +12,7 @@ import numpy as np
 from models.robot import Array, Limits, Robot
 from optimizer.closed_form import ROUNDING, ClosedForm, Label
 from optimizer.exceptions import SingularPose, UnreachablePose
+from optimizer.kinematics import joint_placements, link_frames
 
 __all__ = ["IKSolution", "InverseKinematics", "Label", "inverse_kinematics_for", "turns"]
 
@@ -52,8 +53,7 @@ class InverseKinematics:
     def __init__(self, robot: Robot) -> None:
         self._limits = robot.limits
         self._closed_form = ClosedForm.of(robot.model)
-        placements = [placement.homogeneous for placement in robot.model.jointPlacements][1:]
-        self._placements = np.array(placements)
+        self._placements = joint_placements(robot.model)
         self._T_last_flange = robot.model.frames[robot.model.getFrameId("flange")].placement.homogeneous
 
     def label(self, q: Array) -> Label:
@@ -140,16 +140,7 @@ class InverseKinematics:
 
     def _forward(self, q: Array) -> tuple[Array, Array]:
         """T_base_flange (n, 4, 4) and its geometric Jacobian (n, 6, nq), linear part first, in base axes."""
-        joints = np.zeros((*q.shape, 4, 4))
-        joints[..., 0, 0] = joints[..., 1, 1] = np.cos(q)
-        joints[..., 1, 0] = np.sin(q)
-        joints[..., 0, 1] = -joints[..., 1, 0]
-        joints[..., 2, 2] = joints[..., 3, 3] = 1
-        joints = self._placements @ joints
-        frames = np.empty_like(joints)
-        frames[:, 0] = joints[:, 0]
-        for j in range(1, q.shape[1]):
-            np.matmul(frames[:, j - 1], joints[:, j], out=frames[:, j])
+        frames = link_frames(self._placements, q)[:, 1:]
         T = frames[:, -1] @ self._T_last_flange
         axes, arms = frames[..., :3, 2], T[:, None, :3, 3] - frames[..., :3, 3]
         jacobian = np.concatenate([np.cross(axes, arms), axes], axis=2).swapaxes(1, 2)

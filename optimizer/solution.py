@@ -211,6 +211,20 @@ class Certificate:
 
 
 @dataclass(frozen=True)
+class Clearance:
+    """How far a motion keeps away from what it could hit, the margins asked for taken off [m].
+
+    `min_clearance` is proven for every instant; `sampled` is the least distance met, of `pair` at `time` [s]: the truth
+    lies between the two. Below zero they overlap.
+    """
+
+    min_clearance: float
+    sampled: float
+    pair: tuple[str, str]
+    time: float
+
+
+@dataclass(frozen=True)
 class SolverReport:
     """Cost of the answer: wall time [s], iterations and programmes solved over all candidates, and the
     largest component of the Lagrangian's gradient, as a share of the cost per rad (None for a baseline's motion).

@@ -23,7 +23,7 @@ TRUST = {
     "T": "transferred from a sister robot",
     "E": "engineering default, no source",
 }
-_SECTIONS = ("kinematics", "inertials", "limits", "drives", "electronics", "default_motion")
+_SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion")
 
 
 @router.get("", summary="Every robot", response_model=RobotList, responses=problem_responses())

@@ -63,6 +63,10 @@ class RobotDetail(RobotSummary):
     kinematics: Figures = part("Geometry.")
     inertials: Figures = part("Masses and inertias of the links.")
     limits: Figures = part("Limits and rated payload.")
+    collision: Figures = part(
+        "Capsules that each link lies within (rows of x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, and "
+        "radius), and the pairs of links that never meet."
+    )
     drives: Figures = part("Motors, gears and inverters.")
     electronics: Figures = part("What the arm draws besides its motors.")
     friction: Friction = part("Joint friction.")

@@ -30,7 +30,7 @@ def test_robot_shows_every_figure(client: TestClient) -> None:
     answer = client.get("/robots/ur5e")
     robot = RobotDetail.model_validate_json(answer.content)
     figures = load_robot("ur5e").figures
-    for section in ("kinematics", "inertials", "limits", "drives", "electronics", "default_motion"):
+    for section in ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion"):
         assert answer.json()[section] == figures[section]
     assert [(law.name, law.default) for law in robot.friction.laws] == [("curved", True), ("coulomb_viscous", False)]
     for law in robot.friction.laws:

@@ -1,0 +1,296 @@
+"""What of an arm can hit what: bodies, pairs, and signed distances with gradients over many configurations at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.arm import Arm
+from optimizer.convex import ConvexPairs
+from optimizer.distance import box_segment, segment_segment
+from optimizer.kinematics import joint_placements, link_frames
+from optimizer.scene import Core
+
+Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+TOOL, PAYLOAD = "tool", "payload"
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A core fixed to a link (0: the base or the surroundings) at `T_link_core`; kept `margin` [m] away from."""
+
+    name: str
+    link: int
+    core: Core
+    T_link_core: Array
+    margin: float = 0.0
+
+    @cached_property
+    def points(self) -> Array:
+        """The core's points (m, 3) in the link frame."""
+        return self.core.points @ self.T_link_core[:3, :3].T + self.T_link_core[:3, 3]
+
+    @property
+    def middle(self) -> Array:
+        """Centre (3,) of a ball that holds the core, in the link frame."""
+        return np.asarray((self.points.min(axis=0) + self.points.max(axis=0)) / 2)
+
+    @property
+    def reach(self) -> float:
+        """Radius of that ball, the core's own radius left out."""
+        return float(np.linalg.norm(self.points - self.middle, axis=1).max()) + self.core.ring
+
+    @property
+    def is_segment(self) -> bool:
+        """Whether the core is a point or a segment."""
+        core = self.core
+        return len(core.points) <= 2 and core.ring == 0 and not core.plane
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The pair of bodies that is nearest: `distance` [m] less the margin asked for, below zero by how deep they are."""
+
+    pair: tuple[str, str]
+    distance: float
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """Of k pairs: signed distance (k,) [m], unit normal (k, 3) from first to second, a point (k, 3) of its line."""
+
+    distance: Array
+    normal: Array
+    point: Array
+
+
+class CollisionModel:
+    """An arm's bodies and the pairs of them that are compared, `pairs` (p, 2), the less moved body first.
+
+    Links are compared unless they are neighbours or cannot meet; what the flange carries with every link but the last
+    two, next to which it is; the surroundings with all that moves. Distances are less the obstacle's margin.
+    """
+
+    def __init__(self, arm: Arm) -> None:
+        self.bodies = _bodies(arm)
+        self._placements = joint_placements(arm.robot.model)
+        self.nq = arm.robot.nq
+        own = range(len(arm.robot.capsules))
+        moved = range(len(self.bodies) - len(arm.scene.obstacles))
+        pairs = []
+        for k in moved:
+            link = self.bodies[k].link
+            # next to each other, or never near each other
+            apart = [i for i in own if link - self.bodies[i].link > 1]
+            if k in own:
+                apart = [i for i in apart if (self.bodies[i].link, link) not in arm.robot.never_meet]
+            around = range(len(moved), len(self.bodies)) if link > 0 else ()
+            pairs += [(i, k) for i in (*apart, *around)]
+        self.pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        bodies, pairs = self.bodies, self.pairs
+        most = max(len(body.points) for body in bodies)
+        # shorter cores repeat their last point
+        self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
+        self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
+        self._ring = np.array([body.core.ring for body in bodies])
+        self._middles, self._reach = np.array([b.middle for b in bodies]), np.array([b.reach for b in bodies])
+        self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
+        self._half = np.array([body.core.half if body.core.half is not None else np.zeros(3) for body in bodies])
+        self._T_link_core = np.array([body.T_link_core for body in bodies])
+        swelling = np.array([body.core.radius + body.margin for body in bodies])
+        self._swelling = swelling[pairs].sum(axis=1)
+        joints = np.arange(1, self.nq + 1)
+        first, second = self.links[pairs].T
+        # which joints move the second body against the first
+        self.between = (joints > first[:, None]) & (joints <= second[:, None])
+        segment = np.array([body.is_segment for body in bodies])[pairs]
+        box = np.array([body.core.half is not None for body in bodies])[pairs]
+        plane = np.array([body.core.plane for body in bodies])[pairs][:, 0]
+        # 0: segments, 1: box and segment, 2: segment and box, 3: half-space, 4: any other
+        self._kinds = np.select(
+            [plane, segment.all(axis=1), box[:, 0] & segment[:, 1], segment[:, 0] & box[:, 1]], [3, 0, 1, 2], 4
+        )
+        self.closed_form = self._kinds < 4
+        self._convex = ConvexPairs([body.core for body in bodies])
+
+    def names(self, pair: int) -> tuple[str, str]:
+        """Names of a pair's bodies."""
+        first, second = self.pairs[pair]
+        return self.bodies[first].name, self.bodies[second].name
+
+    def frames(self, q: Array) -> Array:
+        """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad]."""
+        return link_frames(self._placements, q)
+
+    def distances(self, q: Array, within: float = np.inf) -> tuple[Array, Array]:
+        """Signed distances (n, p) [m] of every pair at q (n, nq) and their gradients (n, p, nq) [m/rad].
+
+        Pairs whose bounding balls are further apart than `within` [m] get the balls' distance instead, which is less.
+        """
+        frames, n, p = self.frames(q), len(q), len(self.pairs)
+        configuration, pair = np.divmod(np.arange(n * p), max(p, 1))
+        found = self.nearest(frames, configuration, pair, within)
+        gradient = self.gradients(frames, configuration, pair, found)
+        return found.distance.reshape(n, p), gradient.reshape(n, p, self.nq)
+
+    def contact(self, q: Array) -> Contact | None:
+        """The nearest pair at q (nq,); None where nothing is compared."""
+        if not len(self.pairs):
+            return None
+        pair: Indices = np.arange(len(self.pairs))
+        distance = self.nearest(self.frames(q[None]), np.zeros_like(pair), pair).distance
+        nearest = int(distance.argmin())
+        return Contact(self.names(nearest), float(distance[nearest]))
+
+    def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: Nearest) -> Array:
+        """Derivatives (k, nq) of distances by the joints: n · (axis × (point - origin)) of every joint in between.
+
+        The nearest points' own shift over the bodies does not count: the distance is stationary in it.
+        """
+        axes, origins = frames[:, 1:, :3, 2], frames[:, 1:, :3, 3]
+        moment = np.cross(found.point, found.normal)
+        turning = np.einsum("kji,ki->kj", axes[configuration], moment)
+        turning -= np.einsum("kji,ki->kj", np.cross(axes, origins)[configuration], found.normal)
+        return np.asarray(turning * self.between[pair])
+
+    def nearest(self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf) -> Nearest:
+        """Distances of pairs (k,) at configurations (k,) of `frames`; beyond `within` the bounding balls' only."""
+        first, second = self.pairs[pair].T
+        k = len(pair)
+        result = Nearest(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
+        kinds = self._kinds[pair]
+        if np.isfinite(within):
+            kinds = np.where(self._balls(frames, configuration, first, second, result, pair) > within, -1, kinds)
+        handlers = (self._segments, self._box_first, self._box_second, self._planes, self._others)
+        for kind, handler in enumerate(handlers):
+            chosen = np.flatnonzero(kinds == kind)
+            if chosen.size:
+                found = handler(frames, configuration[chosen], first[chosen], second[chosen])
+                result.distance[chosen], result.normal[chosen], result.point[chosen] = found
+        exact = kinds >= 0
+        result.distance[exact] -= self._swelling[pair[exact]]
+        return result
+
+    def separation(self, frames: Array, configuration: Indices, pair: Indices, normal: Array) -> Array:
+        """min over the second body of n·x less max over the first of n·x (k,) [m] for unit n (k, 3) in the base frame.
+
+        Never more than the signed distance, whatever n is; for a half-space n must be its own.
+        """
+        first, second = self.pairs[pair].T
+        gap = self._least(frames, configuration, second, normal) + self._least(frames, configuration, first, -normal)
+        return np.asarray(gap - self._swelling[pair])
+
+    def levers(self) -> Array:
+        """How far any point of a pair's second core can be from each joint's axis, at any configuration (p, nq) [m]."""
+        offsets = self._placements[:, :3, 3]
+        across = np.hypot(offsets[:, 0], offsets[:, 1])
+        lengths = np.linalg.norm(offsets, axis=1)
+        result = np.zeros((len(self.bodies), self.nq))
+        for k, body in enumerate(self.bodies):
+            if body.link == 0:
+                continue
+            far = float(np.linalg.norm(body.points, axis=1).max()) + body.core.ring
+            result[k, body.link - 1] = float(np.hypot(body.points[:, 0], body.points[:, 1]).max()) + body.core.ring
+            for joint in range(body.link - 2, -1, -1):
+                # the next joint's offset is in this joint's frame: what lies along its own axis is no lever
+                result[k, joint] = across[joint + 1] + far
+                far += lengths[joint + 1]
+        return np.asarray(result[self.pairs[:, 1]])
+
+    def _least(self, frames: Array, configuration: Indices, body: Indices, normal: Array) -> Array:
+        T = frames[configuration, self.links[body]]
+        turned = np.einsum("kij,ki->kj", T[:, :3, :3], normal)
+        least = np.einsum("kmj,kj->km", self._points[body], turned).min(axis=1)
+        if self._ring.any():
+            along = np.einsum("kj,kj->k", self._axes[body], turned)
+            least -= self._ring[body] * np.sqrt(np.maximum(1 - along**2, 0))
+        return np.asarray(least + np.einsum("ki,ki->k", T[:, :3, 3], normal))
+
+    def _ends(self, frames: Array, configuration: Indices, body: Indices) -> Array:
+        T = frames[configuration, self.links[body]]
+        return np.asarray(self._points[body, :2] @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3])
+
+    def _balls(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices, result: Nearest, pair: Indices
+    ) -> Array:
+        """Fills in the bounding balls' distances. A half-space has no ball: minus infinity."""
+        middles = []
+        for body in (first, second):
+            T = frames[configuration, self.links[body]]
+            middles.append(np.einsum("kij,kj->ki", T[:, :3, :3], self._middles[body]) + T[:, :3, 3])
+        across = middles[1] - middles[0]
+        length = np.linalg.norm(across, axis=1)
+        result.distance[:] = length - self._reach[first] - self._reach[second] - self._swelling[pair]
+        result.distance[self._kinds[pair] == 3] = -np.inf
+        result.normal[:] = across / np.maximum(length, 1e-12)[:, None]
+        result.point[:] = middles[1]
+        return result.distance
+
+    def _segments(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        distance, normal, _, point = segment_segment(
+            self._ends(frames, configuration, first), self._ends(frames, configuration, second)
+        )
+        return distance, normal, point
+
+    def _box_first(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        T = frames[configuration, self.links[first]] @ self._T_link_core[first]
+        R, ends = T[:, :3, :3], self._ends(frames, configuration, second)
+        distance, normal, point = box_segment(self._half[first], (ends - T[:, None, :3, 3]) @ R)
+        return distance, np.einsum("kij,kj->ki", R, normal), np.einsum("kij,kj->ki", R, point) + T[:, :3, 3]
+
+    def _box_second(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        distance, normal, point = self._box_first(frames, configuration, second, first)
+        return distance, -normal, point
+
+    def _planes(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        normal, origin = self._axes[first], self._points[first, 0]
+        T = frames[configuration, self.links[second]]
+        points = self._points[second] @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
+        axis = np.einsum("kij,kj->ki", T[:, :3, :3], self._axes[second])
+        along = np.einsum("ki,ki->k", axis, normal)
+        # down the disc: the part of the normal that lies in it
+        down = normal - along[:, None] * axis
+        steep = np.linalg.norm(down, axis=1)
+        height = np.einsum("kmi,ki->km", points - origin[:, None], normal)
+        lowest = height.argmin(axis=1)
+        rows = np.arange(len(lowest))
+        ring = self._ring[second]
+        point = points[rows, lowest] - (ring / np.maximum(steep, 1e-12))[:, None] * down
+        return height[rows, lowest] - ring * steep, normal, point
+
+    def _others(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        T_first = frames[configuration, self.links[first]] @ self._T_link_core[first]
+        T_second = frames[configuration, self.links[second]] @ self._T_link_core[second]
+        return self._convex.nearest(first.tolist(), second.tolist(), T_first, T_second)
+
+
+def _bodies(arm: Arm) -> tuple[Body, ...]:
+    """The robot's capsules, then what it carries, then what surrounds it."""
+    robot, last = arm.robot, arm.robot.nq
+    T_last_flange = robot.model.frames[robot.model.getFrameId("flange")].placement.homogeneous
+    links = [
+        Body(robot.link_names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
+        for capsule in robot.capsules
+    ]
+    carried = [Body(TOOL, last, part.shape.core, T_last_flange @ part.T_flange_shape) for part in arm.tool]
+    if arm.payload.shape is not None:
+        shape = arm.payload.shape
+        carried.append(Body(PAYLOAD, last, shape.shape.core, T_last_flange @ shape.T_flange_shape))
+    around = [Body(o.name, 0, o.shape.core, o.T_base_shape, o.margin) for o in arm.scene.obstacles]
+    return (*links, *carried, *around)
