@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from app.schemas import request as asked
 from app.schemas.common import Pose as PoseSchema
 from app.schemas.common import QuaternionPose, RpyPose
+from app.schemas.compare import ROW_FIELDS, CompareRequest
 from app.schemas.ik import IKRequest
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
@@ -19,7 +20,7 @@ from optimizer.bus import Bus
 from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
-from optimizer.problem import BranchFilter, Problem
+from optimizer.problem import BranchFilter, Method, Problem
 from optimizer.solution import Candidate, ElectricalEnergy, Energy, Solution, StorageUse, UnreachableTarget
 from optimizer.targets import AnyOf, Single, Target
 
@@ -137,7 +138,7 @@ def _payload(payload: asked.Payload | None) -> Payload:
     return Payload(payload.mass, np.array(payload.com), inertia)
 
 
-def _duration(request: asked.OptimizeRequest) -> tuple[float | None, float | None]:
+def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]:
     """Bounds on the duration. An open end is closed for the electrical objective: an answer has to end some time."""
     if isinstance(request.duration, float | int):
         return request.duration, request.duration
@@ -168,8 +169,6 @@ def _per_joint(field: str, value: float | list[float] | None, nq: int) -> Array 
 def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
     """The answer as the contract lays it out: numbers, strings, lists, dicts, and C-contiguous arrays."""
     trajectory, certificate = solution.trajectory, solution.certificate
-    electrical, mechanical = solution.energy.electrical, solution.energy.mechanical
-    objective = electrical.total if request.objective == "electrical" else mechanical.total
     return {
         "id": request_id,
         "robot": request.robot,
@@ -185,13 +184,9 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "energy": {
             **energy_fields(solution.energy),
             "lower_bound": solution.lower_bound,
-            # a motion that costs nothing is as good as can be
-            "optimality_gap": 1 - solution.lower_bound / objective if objective > 0 else 0.0,
+            "optimality_gap": _gap(solution.lower_bound, _objective(request, solution)),
         },
-        "baselines": [
-            fields(baseline, "name", "duration", "electrical", "mechanical", "within_limits", "saving")
-            for baseline in solution.baselines
-        ],
+        "baselines": baseline_fields(solution),
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
         "unreachable": [unreachable_fields(target) for target in solution.unreachable],
         "certificate": {
@@ -202,6 +197,68 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         },
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
     }
+
+
+def to_comparison(
+    request: CompareRequest, request_id: str, found: Mapping[Method, Solution], failed: Mapping[Method, dict[str, Any]]
+) -> dict[str, Any]:
+    """The answer of `POST /compare`: what every method found, at least one, or the problem that it met."""
+    energies = {method: _objective(request, solution) for method, solution in found.items()}
+    best = min(energies, key=energies.__getitem__)
+    # the same candidates, so the same bound, whatever the method
+    bound = found[best].lower_bound
+    rows = []
+    for method in request.methods:
+        row: dict[str, Any] = dict.fromkeys(ROW_FIELDS)
+        if method in found:
+            solution = found[method]
+            own = energies[method]
+            row |= {
+                "status": solution.status,
+                "duration": solution.duration,
+                "electrical": solution.energy.electrical.total,
+                "mechanical": solution.energy.mechanical.total,
+                "excess": own / energies[best] - 1 if energies[best] > 0 else 0.0,
+                "optimality_gap": _gap(bound, own),
+                **fields(solution.solver, "wall_time", "iterations", "nlp_solves"),
+                "valid": solution.certificate.valid,
+                "worst_ratio": max(solution.certificate.worst_ratio.values()),
+            }
+            if request.answers:
+                row["answer"] = to_response(single(request, method), request_id, solution)
+        rows.append({**row, "method": method, "problem": failed.get(method)})
+    return {
+        "id": request_id,
+        "robot": request.robot,
+        "objective": request.objective,
+        "lower_bound": bound,
+        "best": best,
+        "methods": rows,
+        "baselines": baseline_fields(found[best]),
+    }
+
+
+def single(request: CompareRequest, method: Method) -> asked.OptimizeRequest:
+    """The request to `POST /optimize` that a row of a comparison answers."""
+    shared = {name: getattr(request, name) for name in asked.MotionRequest.model_fields}
+    # each part has been validated
+    return asked.OptimizeRequest.model_construct(method=method, **shared)
+
+
+def _objective(request: asked.MotionRequest, solution: Solution) -> float:
+    energy = solution.energy
+    return energy.electrical.total if request.objective == "electrical" else energy.mechanical.total
+
+
+def _gap(bound: float, energy: float) -> float:
+    """1 - bound / energy; a motion that costs nothing is as good as can be."""
+    return 1 - bound / energy if energy > 0 else 0.0
+
+
+def baseline_fields(solution: Solution) -> list[dict[str, Any]]:
+    """The entries of `baselines`."""
+    names = ("name", "duration", "electrical", "mechanical", "within_limits", "saving")
+    return [fields(baseline, *names) for baseline in solution.baselines]
 
 
 def candidate_fields(candidate: Candidate) -> dict[str, Any]:

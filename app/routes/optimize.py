@@ -12,7 +12,7 @@ from app.handlers import to_http
 from app.routes.disconnect import unless_disconnected
 from app.schemas import problems
 from app.schemas.examples import OPTIMIZE_EXAMPLES
-from app.schemas.request import OptimizeRequest
+from app.schemas.request import MotionRequest, OptimizeRequest
 from app.schemas.response import OptimizeResponse
 from app.settings import Settings
 from app.tasks import OptimizeTask
@@ -53,7 +53,7 @@ async def optimize(
     return to_http(await unless_disconnected(request, work))
 
 
-def allowed_deadline(body: OptimizeRequest, most: float) -> float:
+def allowed_deadline(body: MotionRequest, most: float) -> float:
     """The request's deadline [s]. Raises InvalidProblem when the caller asks for too much."""
     if "deadline" not in body.model_fields_set:
         return min(body.deadline, most)

@@ -82,3 +82,22 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
         },
     },
 }
+
+COMPARE_EXAMPLES: dict[str, Example] = {
+    "all_methods": {
+        "summary": "Every method on one move",
+        "description": "A table of energies, durations and solve times.",
+        "value": {"start": {"q": _HOME}, "goal": {"q": [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]}},
+    },
+    "two_methods_to_a_pose": {
+        "summary": "Two methods, to a pose, whole answers",
+        "description": "Each row also holds what `POST /optimize` would answer.",
+        "value": {
+            "start": {"q": _HOME},
+            "goal": {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+            "methods": ["bspline", "lagrange"],
+            "answers": True,
+            "windings": False,
+        },
+    },
+}

@@ -318,7 +318,7 @@ class ArmRequest(Request):
     )
 
 
-class OptimizeRequest(ArmRequest):
+class MotionRequest(ArmRequest):
     """A motion from rest at `start` to rest at `goal`."""
 
     start: Target = described(
@@ -330,14 +330,6 @@ class OptimizeRequest(ArmRequest):
         "Where it ends: joints, a pose, or any of several.",
         None,
         {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
-    )
-    method: Method = described(
-        "How the motion is parametrised. `bspline`: every joint a free B-spline. `time_scaling`: the straight line in "
-        "joint space with an optimised time law. `lagrange`: every joint one polynomial, by its values at Chebyshev "
-        "nodes. `uniform_scaling`: the time-optimal motion slowed evenly.",
-        None,
-        "bspline",
-        default="bspline",
     )
     objective: Literal["electrical", "mechanical"] = described(
         "What is minimised: energy drawn from the bus, or the joints' absolute mechanical work.",
@@ -389,3 +381,16 @@ class OptimizeRequest(ArmRequest):
                 {"most": MAX_SAMPLES},
             )
         return self
+
+
+class OptimizeRequest(MotionRequest):
+    """A motion from rest at `start` to rest at `goal`, by one method."""
+
+    method: Method = described(
+        "How the motion is parametrised. `bspline`: every joint a free B-spline. `time_scaling`: the straight line in "
+        "joint space with an optimised time law. `lagrange`: every joint one polynomial, by its values at Chebyshev "
+        "nodes. `uniform_scaling`: the time-optimal motion slowed evenly.",
+        None,
+        "bspline",
+        default="bspline",
+    )

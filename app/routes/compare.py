@@ -1,0 +1,52 @@
+"""POST /compare."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Request, Response
+
+from app.comparison import CompareTask
+from app.documentation import problem_responses
+from app.engine import Engine
+from app.handlers import to_http
+from app.routes.disconnect import unless_disconnected
+from app.routes.optimize import allowed_deadline
+from app.schemas import problems
+from app.schemas.compare import CompareRequest, CompareResponse
+from app.schemas.examples import COMPARE_EXAMPLES
+from app.settings import Settings
+
+router = APIRouter(tags=["motion"])
+
+
+@router.post(
+    "/compare",
+    summary="The same motion by several methods",
+    response_model=CompareResponse,
+    responses=problem_responses(
+        problems.Validation,
+        problems.UnreachablePose,
+        problems.SingularPose,
+        problems.UnreachableTargets,
+        problems.OutsideLimits,
+        problems.DurationTooShort,
+        problems.TorqueInfeasible,
+        problems.NoTrajectory,
+        problems.UnknownRobot,
+        problems.BodyTooLarge,
+        problems.Busy,
+        problems.ShuttingDown,
+        problems.DeadlineExceeded,
+    ),
+)
+async def compare(
+    request: Request, body: Annotated[CompareRequest, Body(openapi_examples=COMPARE_EXAMPLES)]
+) -> Response:
+    """Solves one request by several methods, one after another, and answers a table of their energies, durations and
+    solve times, each motion certified. A method that finds nothing has its problem in its row; where none finds a
+    motion, the answer is the problem of the first one asked for."""
+    settings: Settings = request.app.state.settings
+    engine: Engine = request.app.state.engine
+    work = engine.run(CompareTask(body, request.state.id), allowed_deadline(body, settings.max_deadline))
+    return to_http(await unless_disconnected(request, work))
