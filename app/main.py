@@ -15,7 +15,20 @@ from app.documentation import install_openapi
 from app.engine import Engine
 from app.handlers import install_handlers
 from app.json_body import JsonBody
-from app.routes import answers, compare, docs, evaluate, health, ik, iterations, optimize, problems, robots, studies
+from app.routes import (
+    answers,
+    compare,
+    docs,
+    evaluate,
+    health,
+    ik,
+    ik_path,
+    iterations,
+    optimize,
+    problems,
+    robots,
+    studies,
+)
 from app.settings import Settings
 from app.store.store import Store
 
@@ -54,6 +67,19 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(RequestContext)  # added last: the outermost
     install_handlers(app)
     install_openapi(app, settings)
-    for routes in (optimize, compare, evaluate, ik, studies, iterations, answers, robots, health, problems, docs):
+    for routes in (
+        optimize,
+        compare,
+        evaluate,
+        ik,
+        ik_path,
+        studies,
+        iterations,
+        answers,
+        robots,
+        health,
+        problems,
+        docs,
+    ):
         app.include_router(routes.router)
     return app

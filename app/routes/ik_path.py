@@ -1,0 +1,42 @@
+"""POST /ik/path."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Request, Response
+
+from app.documentation import problem_responses
+from app.engine import Engine
+from app.handlers import to_http
+from app.ik_path import IKPathTask
+from app.routes.disconnect import unless_disconnected
+from app.schemas import problems
+from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathRequest, IKPathResponse
+from app.settings import Settings
+
+router = APIRouter(tags=["motion"])
+
+
+@router.post(
+    "/ik/path",
+    summary="Configurations along a path of the TCP",
+    response_model=IKPathResponse,
+    responses=problem_responses(
+        problems.Validation,
+        problems.OutsideLimits,
+        problems.UnknownRobot,
+        problems.BodyTooLarge,
+        problems.Busy,
+        problems.ShuttingDown,
+        problems.DeadlineExceeded,
+    ),
+)
+async def follow(request: Request, body: Annotated[IKPathRequest, Body(openapi_examples=IK_PATH_EXAMPLES)]) -> Response:
+    """Follows positions or poses of the TCP from a guess, each from the configuration before (Levenberg-Marquardt).
+    What is out of reach, nearly singular or beyond a joint's range is listed and left out of `trajectory`, which
+    `POST /evaluate` takes as it is."""
+    settings: Settings = request.app.state.settings
+    engine: Engine = request.app.state.engine
+    work = engine.run(IKPathTask(body, request.state.id), settings.max_deadline)
+    return to_http(await unless_disconnected(request, work))
