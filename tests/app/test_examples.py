@@ -8,13 +8,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-FILES = sorted(EXAMPLES.glob("*/*.json"))
+FILES = sorted(EXAMPLES.rglob("*.json"))
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: f"{file.parent.name}/{file.stem}")
 def test_example_is_answered(file: Path, client: TestClient) -> None:
     headers = {"Content-Type": "application/json"}
-    answer = client.post(f"/{file.parent.name}", content=file.read_bytes(), headers=headers)
+    answer = client.post(f"/{file.parent.relative_to(EXAMPLES).as_posix()}", content=file.read_bytes(), headers=headers)
     assert answer.is_success, answer.text
 
 
@@ -23,3 +23,15 @@ def test_paper_requests_are_up_to_date() -> None:
     made = script["requests"]()
     assert len(made) == 15 + 3
     assert {name: json.loads((EXAMPLES / "optimize" / name).read_text()) for name in made} == made
+    motions = script["motions"]()
+    assert len(motions) == 15
+    assert {name: json.loads((EXAMPLES / "evaluate" / name).read_text()) for name in motions} == motions
+
+
+def test_csv_example_is_answered(client: TestClient) -> None:
+    settings = {"units": "deg", "interpolation": "linear", "time_per_segment": "1.5"}
+    content = (EXAMPLES / "evaluate" / "paper_motion_1.csv").read_bytes()
+    by_csv = client.post("/evaluate", content=content, headers={"Content-Type": "text/csv"}, params=settings)
+    by_json = client.post("/evaluate", json=json.loads((EXAMPLES / "evaluate" / "paper_motion_1.json").read_text()))
+    ours, theirs = (answer.json()["total"]["energy"]["electrical"]["total"] for answer in (by_csv, by_json))
+    assert ours == pytest.approx(theirs, rel=1e-9)
