@@ -204,11 +204,15 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
 
 @dataclass(frozen=True)
 class Reply:
-    """What goes back to a caller: status, JSON, and headers of its own."""
+    """What goes back to a caller: status, body, and headers of its own.
+
+    `kept` are whole answers that the body refers to by `reference(k)`, to be put into the store: see `app.kept`.
+    """
 
     status: int
     body: bytes
     headers: dict[str, str] = field(default_factory=dict)
+    kept: tuple[bytes, ...] = ()
 
     @property
     def media_type(self) -> str:

@@ -25,6 +25,7 @@ from app.routes import (
     ik_path,
     iterations,
     optimize,
+    pareto,
     problems,
     robots,
     studies,
@@ -70,6 +71,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for routes in (
         optimize,
         compare,
+        pareto,
         evaluate,
         ik,
         ik_path,

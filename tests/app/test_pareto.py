@@ -1,0 +1,123 @@
+"""POST /pareto: the front as the contract lays it out, its answers by reference, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+from io import StringIO
+from itertools import pairwise
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.schemas.pareto import PARETO_EXAMPLES, ParetoResponse
+from app.schemas.response import OptimizeResponse
+from tests.app.requests import move
+
+# fresh answers and those of a front are local optima found from different guesses
+LOCAL = 1e-3
+# enough for every point on a busy machine
+TIME = 100.0
+
+
+@pytest.fixture(scope="module", params=list(PARETO_EXAMPLES))
+def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tuple[dict[str, Any], dict[str, Any]]:
+    asked: dict[str, Any] = (PARETO_EXAMPLES[request.param]["value"] or {}) | {"deadline": TIME}
+    answer = client.post("/pareto", json=asked)
+    assert answer.status_code == 200, answer.text
+    ParetoResponse.model_validate_json(answer.content)
+    return asked, answer.json()
+
+
+def test_the_front_falls(asked_and_answered: tuple[dict[str, Any], dict[str, Any]]) -> None:
+    asked, front = asked_and_answered
+    assert 2 <= len(front["points"]) <= len(front["points"]) + len(front["dropped"]) <= asked["points"]
+    for earlier, later in pairwise(front["points"]):
+        assert earlier["duration"] < later["duration"]
+        assert earlier["energy"] > later["energy"]
+    assert front["points"][0]["duration"] == pytest.approx(front["shortest"])
+
+
+def test_every_point_refers_to_its_answer(
+    asked_and_answered: tuple[dict[str, Any], dict[str, Any]], client: TestClient
+) -> None:
+    asked, front = asked_and_answered
+    for point in front["points"]:
+        kept = client.get(point["answer"]).json()
+        assert kept["kind"] == "optimize"
+        answer = OptimizeResponse.model_validate(kept["answer"]).model_dump()
+        energy = answer["energy"]
+        assert (point["duration"], point["status"]) == (answer["duration"], answer["status"])
+        assert point["electrical"] == energy["electrical"]["total"]
+        assert point["mechanical"] == energy["mechanical"]["total"]
+        assert point["energy"] == energy[asked.get("objective", "electrical")]["total"]
+        assert all(point[name] == energy[name] for name in ("mean_power", "peak_power", "lower_bound"))
+        assert (point["start"], point["goal"]) == tuple(answer["branch"][end]["label"] for end in ("start", "goal"))
+        assert point["certified"] and point["worst_ratio"] == max(answer["certificate"]["worst_ratio"].values())
+
+
+def test_no_point_is_worse_than_a_fresh_answer(
+    asked_and_answered: tuple[dict[str, Any], dict[str, Any]], client: TestClient
+) -> None:
+    asked, front = asked_and_answered
+    fields = {name: value for name, value in asked.items() if name != "points"}
+    for point in front["points"][::3]:
+        fresh = client.post("/optimize", json=fields | {"duration": point["duration"]})
+        # where no motion is found from the ground up, there is nothing to compare with
+        if fresh.status_code == 200:
+            objective = asked.get("objective", "electrical")
+            assert point["energy"] <= fresh.json()["energy"][objective]["total"] * (1 + LOCAL)
+        else:
+            assert fresh.json()["type"] in ("/problems/no-trajectory", "/problems/duration-too-short")
+
+
+def test_begins_where_optimize_says_it_must(client: TestClient) -> None:
+    refused = client.post("/optimize", json=move(duration=0.05)).json()
+    front = client.post("/pareto", json=move(points=2)).json()
+    assert front["points"][0]["duration"] == pytest.approx(refused["shortest"], rel=1e-6)
+
+
+def test_as_csv(client: TestClient) -> None:
+    request = PARETO_EXAMPLES["lift"]["value"] or {}
+    answer = client.post("/pareto", json=request | {"points": 3, "deadline": TIME}, headers={"Accept": "text/csv"})
+    assert answer.headers["content-type"].startswith("text/csv")
+    rows = list(csv.DictReader(StringIO(answer.text)))
+    assert len(rows) >= 2
+    for row in rows:
+        kept = client.get(row["answer"]).json()["answer"]
+        assert float(row["duration"]) == kept["duration"]
+
+
+@pytest.mark.parametrize(
+    ("fields", "loc"),
+    [
+        ({"points": 1}, "points"),
+        ({"points": 1_000_000_000}, "points"),
+        ({"points": 2.5}, "points"),
+        ({"duration": 2.0}, "duration"),
+        ({"duration": {"min": 2.0, "max": 2.0}}, "duration"),
+        ({"objective": "mechanical"}, "duration"),
+        ({"deadline": 1e5}, "deadline"),
+    ],
+)
+def test_refuses_what_is_no_front(client: TestClient, fields: dict[str, Any], loc: str) -> None:
+    answer = client.post("/pareto", json=move(**fields))
+    assert answer.status_code == 422
+    assert answer.json()["type"] == "/problems/validation"
+    assert answer.json()["errors"][0]["loc"][:2] == ["body", loc]
+
+
+def test_no_front_above_the_longest_duration(client: TestClient) -> None:
+    answer = client.post("/pareto", json=move(duration={"max": 0.05}))
+    assert answer.json()["type"] == "/problems/duration-too-short"
+
+
+@pytest.mark.parametrize("deadline", [1e-3, 1.0])
+def test_a_deadline_gives_what_was_found(client: TestClient, deadline: float) -> None:
+    answer = client.post(
+        "/pareto", json=move(points=100, deadline=deadline, objective="mechanical", duration={"max": 9})
+    )
+    if answer.status_code == 200:
+        assert answer.json()["status"] == "feasible"
+    else:
+        assert answer.status_code == 504
