@@ -5,6 +5,7 @@ Starlette's own middleware for this answers in plain text, and puts that in the 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from starlette.datastructures import Headers
@@ -13,7 +14,10 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class BodyLimit:
-    """ASGI middleware: reading a body of more than `most` bytes, or what `uploads` says of its path, raises a 413."""
+    """ASGI middleware: reading a body of more than `most` bytes, or what `uploads` says of its path, raises a 413.
+
+    A path there is a regular expression.
+    """
 
     def __init__(self, app: ASGIApp, most: int, uploads: Mapping[str, int]) -> None:
         self._app = app
@@ -25,7 +29,7 @@ class BodyLimit:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        most = self._uploads.get(scope["path"], self._most)
+        most = next((most for path, most in self._uploads.items() if re.fullmatch(path, scope["path"])), self._most)
         declared = Headers(scope=scope).get("content-length", "")
         size = int(declared) if declared.isdecimal() else 0
 

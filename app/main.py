@@ -29,6 +29,7 @@ from app.routes import (
     problems,
     robots,
     studies,
+    suggest,
 )
 from app.settings import Settings
 from app.store.store import Store
@@ -63,7 +64,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=lifespan,
     )
     app.state.settings = settings
-    app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads={"/evaluate": settings.max_upload_bytes})
+    uploads = {"/evaluate": settings.max_upload_bytes, "/studies/[^/]+/iterations": settings.max_iteration_bytes}
+    app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
     app.add_middleware(RequestContext)  # added last: the outermost
     install_handlers(app)
@@ -77,6 +79,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         ik_path,
         studies,
         iterations,
+        suggest,
         answers,
         robots,
         health,

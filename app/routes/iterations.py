@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated, Any
+from tempfile import NamedTemporaryFile
+from typing import Annotated, Any, TypeVar
 
 import orjson
 from fastapi import APIRouter, Body, Path, Request, Response
 
 from app.documentation import problem_responses
 from app.engine import Engine
+from app.errors import Reply
+from app.evaluation import EvaluateTask
 from app.handlers import to_http
 from app.routes.disconnect import unless_disconnected
 from app.routes.optimize import allowed_deadline
 from app.routes.studies import CREATED_HEADERS, Key, StudyId, set_location
 from app.schemas import problems
+from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
-from app.schemas.studies import IterationDetail, OptimizeStep
+from app.schemas.studies import IterationDetail, IterationRequest, OptimizeStep
 from app.schemas.study_examples import ITERATION_EXAMPLES
 from app.settings import Settings
 from app.store import studies
@@ -25,6 +29,8 @@ from app.store.tables import Study
 from app.study_answers import detail
 from app.tasks import OptimizeTask
 from optimizer.exceptions import InvalidProblem
+
+R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -62,30 +68,41 @@ async def add(
     request: Request,
     response: Response,
     id: StudyId,
-    body: Annotated[OptimizeStep, Body(openapi_examples=ITERATION_EXAMPLES)],
+    body: Annotated[IterationRequest, Body(openapi_examples=ITERATION_EXAMPLES)],
     key: Key = None,
 ) -> Any:
     """Computes the next step and keeps it: what was asked, the whole answer, and its energy against the step before,
     the best and the threshold. A request that fails is answered with its problem and leaves no trace in the study."""
     store: Store = request.app.state.store
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
     study = (await store.read(partial(studies.history, study_id=id))).study
-    asked = _completed(body.optimize, study)
-    deadline = allowed_deadline(asked, settings.max_deadline)
+    kind, asked = _completed(body, study)
     sent = asked.model_dump(mode="json", exclude_unset=True)
-    known = await store.read(partial(studies.known_step, study_id=id, kind="optimize", request=sent, key=key))
+    known = await store.read(partial(studies.known_step, study_id=id, kind=kind, request=sent, key=key))
     if known is None:
-        reply = await unless_disconnected(request, engine.run(OptimizeTask(asked, request.state.id), deadline))
+        reply = await unless_disconnected(request, _answer(request, asked))
         if reply.status != 200:
             return to_http(reply)
         number, again = await store.write(
-            partial(studies.add, study_id=id, step=_step("optimize", sent, reply.body), key=key)
+            partial(studies.add, study_id=id, step=_step(kind, sent, reply.body), key=key)
         )
     else:
         number, again = known, True
     set_location(request, response, f"{id}/iterations/{number}", again)
     return detail(await store.read(partial(studies.up_to, study_id=id, number=number)))
+
+
+async def _answer(request: Request, asked: OptimizeRequest | EvaluateRequest) -> Reply:
+    """What the endpoint of that request answers."""
+    settings: Settings = request.app.state.settings
+    engine: Engine = request.app.state.engine
+    if isinstance(asked, OptimizeRequest):
+        deadline = allowed_deadline(asked, settings.max_deadline)
+        return await engine.run(OptimizeTask(asked, request.state.id), deadline)
+    with NamedTemporaryFile(prefix="joulepath-", suffix=".json") as file:
+        file.write(asked.model_dump_json(exclude_unset=True).encode())
+        file.flush()
+        task = EvaluateTask(file.name, "json", {}, "json", request.state.id)
+        return await engine.run(task, settings.max_deadline)
 
 
 @router.get(
@@ -106,17 +123,24 @@ async def show(
 
 def _step(kind: str, sent: dict[str, Any], body: bytes) -> studies.Step:
     answer = orjson.loads(body)
-    energy = answer["energy"]
+    energy = answer["energy"] if kind == "optimize" else answer["total"]["energy"]
     return studies.Step(
         kind, sent, body, answer["duration"], energy["electrical"]["total"], energy["mechanical"]["total"]
     )
 
 
-def _completed(asked: OptimizeRequest, study: Study) -> OptimizeRequest:
-    """The request, about the study's robot and objective. Raises InvalidProblem where it is about another."""
-    for name in ("robot", "objective"):
+def _completed(body: IterationRequest, study: Study) -> tuple[str, OptimizeRequest | EvaluateRequest]:
+    """The endpoint and its request, about the study's robot and objective. Raises InvalidProblem where it is about
+    another."""
+    if isinstance(body, OptimizeStep):
+        return "optimize", _about(study, "optimize", body.optimize, "robot", "objective")
+    return "evaluate", _about(study, "evaluate", body.evaluate, "robot")
+
+
+def _about(study: Study, kind: str, asked: R, *names: str) -> R:
+    for name in names:
         if name in asked.model_fields_set and getattr(asked, name) != getattr(study, name):
             raise InvalidProblem(
-                f"optimize.{name}", f"The study is about another {name}: leave {name} out, or begin another study."
+                f"{kind}.{name}", f"The study is about another {name}: leave {name} out, or begin another study."
             )
-    return asked.model_copy(update={"robot": study.robot, "objective": study.objective})
+    return asked.model_copy(update={name: getattr(study, name) for name in names})

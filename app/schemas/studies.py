@@ -5,11 +5,12 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field, Tag
 from pydantic_core import PydanticCustomError
 
 from app.schemas.answers import KeptAnswer
-from app.schemas.common import Request, Response, RobotName, described, part
+from app.schemas.common import Request, Response, RobotName, by_field, described, part
+from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
 from app.store.tables import KEY_LENGTH, NAME_LENGTH
 
@@ -17,6 +18,10 @@ _CREATED = "2025-03-14T09:26:53.589793Z"
 _OPTIMIZE = {
     "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     "goal": {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+}
+_EVALUATE = {
+    "configurations": [[0.0, -1.57, 1.57, -1.57, -1.57, 0.0], [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]],
+    "time_per_segment": 1.5,
 }
 
 
@@ -49,12 +54,14 @@ class StudyRequest(Request):
     )
 
 
-class _Query(Request):
+class Query(Request):
+    """The parameters of a query."""
+
     # what stands in a query is text
     model_config = ConfigDict(strict=False)
 
 
-class StudyPage(_Query):
+class StudyPage(Query):
     """Which studies to list."""
 
     limit: int = described("Most studies in the answer.", "1", 50, default=50, ge=1, le=200)
@@ -73,6 +80,20 @@ class OptimizeStep(Request):
     optimize: OptimizeRequest = described(
         "As for `POST /optimize`. `robot` and `objective`, where left out, are the study's.", None, _OPTIMIZE
     )
+
+
+class EvaluateStep(Request):
+    """An iteration that evaluates a given motion."""
+
+    evaluate: EvaluateRequest = described(
+        "As for `POST /evaluate`. `robot`, where left out, is the study's.", None, _EVALUATE
+    )
+
+
+IterationRequest = Annotated[
+    Annotated[OptimizeStep, Tag("by optimize")] | Annotated[EvaluateStep, Tag("by evaluate")],
+    by_field("optimize", "evaluate"),
+]
 
 
 class Iteration(Response):

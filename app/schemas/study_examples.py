@@ -18,10 +18,18 @@ STUDY_EXAMPLES: dict[str, Example] = {
 }
 
 ITERATION_EXAMPLES: dict[str, Example] = {
-    name: {
-        "summary": OPTIMIZE_EXAMPLES[name]["summary"],
-        "value": {"optimize": OPTIMIZE_EXAMPLES[name]["value"]},
+    "evaluate": {
+        "summary": "What the motion costs as it is now",
+        "value": {
+            "evaluate": {
+                "configurations": [[0.0, -1.57, 1.57, -1.57, -1.57, 0.0], [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]],
+                "time_per_segment": 3.0,
+            }
+        },
     }
+}
+ITERATION_EXAMPLES |= {
+    name: {"summary": OPTIMIZE_EXAMPLES[name]["summary"], "value": {"optimize": OPTIMIZE_EXAMPLES[name]["value"]}}
     for name in ("time_scaling", "joint_to_pose")
 }
 

@@ -1,0 +1,225 @@
+"""What a study is told to try next: every figure is what the request comes to when it is sent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.convert import to_matrix
+from app.schemas import problems
+from app.schemas.common import QuaternionPose
+from app.schemas.suggestions import Suggestions
+from models.registry import load_robot
+from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.turned import turned_poses
+from tests.app.requests import HOME, NEAR, move
+from tests.app.test_studies import ABSENT, SECRET, added, begin
+
+SAME = 1e-9
+"""Relative: the optimiser computes the same from the same request; clocks only tell it when to stop."""
+PAYLOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.2]}
+TOOL = {"position": [0.0, 0.0, 0.15], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+
+
+def suggested(client: TestClient, path: str, **query: Any) -> dict[str, Any]:
+    answer = client.get(f"{path}/suggest", params={"deadline": 60, **query})
+    assert answer.status_code == 200, answer.text
+    Suggestions.model_validate_json(answer.content)
+    content: dict[str, Any] = answer.json()
+    gains = [entry["gain"] for entry in content["suggestions"]]
+    assert gains == sorted(gains, reverse=True)
+    for entry in content["suggestions"]:
+        assert entry["gain"] == content["base"]["energy"] - entry["energy"]
+    return content
+
+
+def steps(content: dict[str, Any], step: str) -> list[dict[str, Any]]:
+    return [entry for entry in content["suggestions"] if entry["step"] == step]
+
+
+@pytest.fixture(scope="module")
+def slow(client: TestClient) -> tuple[str, dict[str, Any]]:
+    """A slow straight line with a payload on a long tool, between joint positions."""
+    path = begin(client, threshold=150.0)
+    request = move(method="time_scaling", duration=3.0, payload=PAYLOAD, tcp=TOOL)
+    added(client, path, {"optimize": request})
+    return path, suggested(client, path)
+
+
+def test_every_kind_of_step_is_tried(slow: Any) -> None:
+    _, content = slow
+    assert content["not_computed"] == []
+    assert {entry["step"] for entry in content["suggestions"]} == {
+        "method",
+        "branch",
+        "orientation",
+        "duration",
+        "payload",
+    }
+
+
+def test_what_it_promises_is_what_the_request_comes_to(client: TestClient, slow: Any) -> None:
+    path, content = slow
+    for entry in content["suggestions"]:
+        if entry["status"] == "optimal":
+            step = added(client, path, entry["request"])
+            assert step["energy"] == pytest.approx(entry["energy"], rel=SAME)
+            assert step["duration"] == pytest.approx(entry["duration"], rel=SAME)
+            assert step["threshold_met"] == entry["threshold_met"]
+
+
+def test_three_seconds_are_too_many_and_a_line_is_a_spline(slow: Any) -> None:
+    _, content = slow
+    free, *others = steps(content, "duration")
+    assert free["request"]["optimize"].get("duration") is None
+    # 37 W of idle power for the time that is saved, and more for holding the load meanwhile
+    assert free["gain"] > 37 * 0.9 * (3.0 - free["duration"])
+    assert free["energy"] <= min(other["energy"] for other in others) * (1 + 1e-3)
+    (payload,) = steps(content, "payload")
+    assert payload["request"]["optimize"]["payload"] == {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
+    (method,) = steps(content, "method")
+    # the line is one of the B-splines
+    assert method["gain"] > -1e-3 * content["base"]["energy"]
+
+
+def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
+    _, content = slow
+    robot = load_robot("ur5e")
+    T_tcp = to_matrix(QuaternionPose(**TOOL))
+    ((position, _),) = turned_poses(robot, T_tcp, np.array(NEAR), [np.zeros(3)])
+    for entry in steps(content, "orientation"):
+        goals = entry["request"]["optimize"]["goal"]["any_of"]
+        assert len(goals) in (11, 4)
+        for goal in goals:
+            assert goal["pose"]["position"] == pytest.approx(position, abs=1e-12)
+    (branch,) = [entry for entry in steps(content, "branch") if "pose" in entry["request"]["optimize"]["goal"]]
+    # inverse kinematics, which has forward kinematics of its own, finds the way back
+    pose = QuaternionPose(**branch["request"]["optimize"]["goal"]["pose"])
+    solutions = inverse_kinematics_for(robot).solve(to_matrix(pose), T_tcp)
+    assert min(np.abs(solution.q - NEAR).max() for solution in solutions) < 1e-9
+
+
+def test_turns_are_about_the_axis_asked_for() -> None:
+    turn = np.array([0.0, 0.0, 0.5])
+    robot = load_robot("ur5e")
+    (at, before), (still_at, after) = turned_poses(robot, np.eye(4), np.array(HOME), [np.zeros(3), turn])
+    R_before, R_after = (
+        to_matrix(QuaternionPose(position=[0.0] * 3, quaternion=q.tolist()))[:3, :3] for q in (before, after)
+    )
+    assert np.array_equal(at, still_at)
+    c, s = np.cos(0.5), np.sin(0.5)
+    assert R_before.T @ R_after == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), abs=1e-12)
+
+
+def test_the_best_motion_to_a_pose_is_hard_to_beat(client: TestClient) -> None:
+    path = begin(client, threshold=10.0)
+    added(client, path, {"optimize": move(duration=4.0)})
+    pose = {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+    added(client, path, {"optimize": move(goal=pose)})
+    last = suggested(client, path, base="last")
+    assert last["base"]["number"] == 2
+    assert suggested(client, path)["base"]["number"] == 1 + (last["base"]["energy"] < suggested_energy(client, path, 1))
+    # all branches and durations were open: neither another branch nor another duration can save more than the gap
+    for entry in steps(last, "branch") + steps(last, "duration"):
+        assert entry["gain"] < 0.01 * last["base"]["energy"]
+    assert len(steps(last, "branch")) == 2
+    assert steps(last, "method") == steps(last, "payload") == []
+    assert not any(entry["threshold_met"] for entry in last["suggestions"])
+
+
+def suggested_energy(client: TestClient, path: str, number: int) -> float:
+    energy: float = client.get(f"{path}/iterations/{number}").json()["energy"]
+    return energy
+
+
+def test_a_branch_that_was_asked_for_is_opened(client: TestClient) -> None:
+    path = begin(client)
+    pose = {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+    added(client, path, {"optimize": move(goal=pose, branch={"shoulder": "right"}, windings=False)})
+    best = steps(suggested(client, path), "branch")[0]
+    assert "branch" not in best["request"]["optimize"]
+    assert best["gain"] > 0
+
+
+def test_a_given_motion_is_optimised_between_its_ends(client: TestClient) -> None:
+    path = begin(client)
+    motion = {"configurations": [HOME, NEAR], "time_per_segment": 2.0, "payload": PAYLOAD}
+    step = added(client, path, {"evaluate": motion})
+    alone = client.post("/evaluate", json=motion).json()
+    assert step["energy"] == alone["total"]["energy"]["electrical"]["total"]
+    assert step["duration"] == alone["duration"] == 2.0
+    content = suggested(client, path)
+    free, timed = steps(content, "method")
+    if "duration" in free["request"]["optimize"]:
+        free, timed = timed, free
+    assert timed["request"]["optimize"] == {
+        "robot": "ur5e",
+        "payload": PAYLOAD,
+        "start": {"q": HOME},
+        "goal": {"q": NEAR},
+        "objective": "electrical",
+        "duration": 2.0,
+    }
+    # a quintic is a B-spline, if not one on these knots: the optimum in the same time costs no more
+    assert timed["gain"] > -1e-3 * content["base"]["energy"]
+    assert free["gain"] > timed["gain"]
+    after = added(client, path, free["request"])
+    assert after["change_from_last"] == pytest.approx(-free["gain"], rel=1e-6)
+
+
+@pytest.mark.parametrize("configurations", [[HOME, NEAR, HOME], [HOME, NEAR, [0.5, *NEAR[1:]]], [HOME, HOME]])
+def test_a_motion_without_two_ends_gets_none(client: TestClient, configurations: Any) -> None:
+    path = begin(client)
+    added(client, path, {"evaluate": {"configurations": configurations, "time_per_segment": 1.0}})
+    content = suggested(client, path)
+    assert content["suggestions"] == content["not_computed"] == []
+
+
+def test_a_long_trajectory_is_taken(client: TestClient) -> None:
+    t = np.linspace(0.0, 3.0, 2000)
+    q = np.array(HOME) + np.multiply.outer(0.5 - 0.5 * np.cos(np.pi * t / 3.0), np.subtract(NEAR, HOME))
+    path = begin(client, objective="mechanical")
+    step = added(client, path, {"evaluate": {"trajectory": {"t": t.tolist(), "q": q.tolist()}}})
+    assert step["energy"] == step["mechanical"]
+    for entry in steps(suggested(client, path), "method"):
+        assert entry["request"]["optimize"]["duration"] == pytest.approx(3.0)
+
+
+def test_what_there_is_no_time_for_is_listed(client: TestClient, slow: Any) -> None:
+    path, _ = slow
+    content = suggested(client, path, deadline=0.001)
+    assert content["suggestions"] == []
+    whole = suggested(client, path)
+    everything = [entry["summary"] for entry in whole["suggestions"] + whole["not_computed"]]
+    assert sorted(entry["summary"] for entry in content["not_computed"]) == sorted(everything)
+    assert {entry["problem"] for entry in content["not_computed"]} == {"deadline-exceeded"}
+
+
+def test_what_cannot_be_is_listed(client: TestClient) -> None:
+    path = begin(client)
+    shortest = client.post("/optimize", json=move(duration=0.05)).json()["shortest"]
+    added(client, path, {"optimize": move(duration=1.05 * shortest)})
+    content = suggested(client, path)
+    assert [(entry["step"], entry["problem"]) for entry in content["not_computed"]] == [
+        ("duration", "duration-too-short")
+    ]
+
+
+def test_an_empty_study_has_no_next_step(client: TestClient) -> None:
+    answer = client.get(f"{begin(client)}/suggest")
+    assert answer.status_code == 409
+    problems.EmptyStudy.model_validate_json(answer.content)
+
+
+@pytest.mark.parametrize("query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"{SECRET}=1"])
+def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
+    answer = client.get(f"/studies/{ABSENT}/suggest?{query}")
+    assert problems.Validation.model_validate_json(answer.content).errors
+    assert SECRET not in answer.text
+
+
+def test_unknown_study(client: TestClient) -> None:
+    problems.UnknownStudy.model_validate_json(client.get(f"/studies/{ABSENT}/suggest").content)
