@@ -141,7 +141,7 @@ class Run:
 
     def explore(self) -> None:
         """Solve candidates until no bound is below the best."""
-        search.explore(self.task, self.entries, self.attempt, self.deadline)
+        search.explore(self.task, self.entries, self.attempt, self.deadline, most_solved=self.method.most_solved)
 
     def attempt(self, entry: Entry) -> Attempt:
         """Solve the entry in every window of durations; the outcome of least energy."""
@@ -378,5 +378,7 @@ def warm_up(robot_name: str) -> None:
     robot = load_robot(robot_name)
     kernel_for(robot)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
-    for method in METHODS:
-        optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot, method=method))
+    for method, solver in METHODS.items():
+        # what takes seconds would keep the others waiting
+        if solver.most_solved is None:
+            optimize(Problem(start=middle + 0.1, goal=middle + 0.4, robot=robot, method=method))

@@ -12,7 +12,7 @@ from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem
 from optimizer.targets import Target, validated
 
-Method = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling"]
+Method = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
 Objective = Literal["electrical", "mechanical"]
 Shoulder = Literal["left", "right"]
 Elbow = Literal["up", "down"]

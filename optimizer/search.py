@@ -209,14 +209,21 @@ def explore(
     attempt: Callable[[Entry], Attempt],
     deadline: float,
     clock: Callable[[], float] = time.perf_counter,
+    most_solved: int | None = None,
 ) -> Entry | None:
-    """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none."""
+    """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none.
+
+    With `most_solved`, candidates beyond so many solved ones are left unless a bound rules them out.
+    """
     best = min((e for e in entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
     for entry in sorted(entries, key=lambda e: (e.lower_bound, e.shortest)):
         if entry.status != "unvisited":
             continue
         if best is not None and best.energy is not None and entry.lower_bound >= best.energy:
             entry.status, entry.reason = "pruned", PRUNED
+            continue
+        if most_solved is not None and sum(e.status == "solved" for e in entries) >= most_solved:
+            entry.reason = f"the method solves no more than {most_solved} candidates"
             continue
         if clock() > deadline:
             break

@@ -389,7 +389,8 @@ class OptimizeRequest(MotionRequest):
     method: Method = described(
         "How the motion is parametrised. `bspline`: every joint a free B-spline. `time_scaling`: the straight line in "
         "joint space with an optimised time law. `lagrange`: every joint one polynomial, by its values at Chebyshev "
-        "nodes. `uniform_scaling`: the time-optimal motion slowed evenly.",
+        "nodes. `uniform_scaling`: the time-optimal motion slowed evenly. `polynomial_ga`: one polynomial each, bred "
+        "by a genetic algorithm over the three likeliest candidates: seconds, and never `optimal`.",
         None,
         "bspline",
         default="bspline",

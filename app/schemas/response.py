@@ -202,7 +202,10 @@ class Solver(Response):
 
     wall_time: float = described("Wall time.", "s", 0.41)
     iterations: int = described(
-        "Iterations over all candidates: the solver's steps, or the energies evaluated by `uniform_scaling`.", "1", 52
+        "Iterations over all candidates: the solver's steps, the energies evaluated by `uniform_scaling`, or the "
+        "generations of `polynomial_ga`.",
+        "1",
+        52,
     )
     nlp_solves: int = described("Nonlinear programmes solved.", "1", 4)
     stationarity: float | None = described(

@@ -6,6 +6,7 @@ from models.robot import Array
 from optimizer.candidate import Solver
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.lagrange import Lagrange
+from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.methods.time_scaling import TimeScaling
 from optimizer.methods.uniform_scaling import UniformScaling
 from optimizer.motion import Task
@@ -17,6 +18,7 @@ METHODS: dict[Method, type[Solver]] = {
     "time_scaling": TimeScaling,
     "lagrange": Lagrange,
     "uniform_scaling": UniformScaling,
+    "polynomial_ga": PolynomialGA,
 }
 
 

@@ -5,6 +5,7 @@ Each is held to the limits, to fixed durations and to its deadline in `test_cand
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any, get_args
 
@@ -12,9 +13,11 @@ import numpy as np
 import pytest
 
 from optimizer.baselines import time_optimal_spline
+from optimizer.candidate import Attempt
 from optimizer.exceptions import DurationTooShort
 from optimizer.kernel import compile_kernel
 from optimizer.methods import METHODS
+from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.motion import Task
 from optimizer.optimize import optimize
 from optimizer.problem import Method
@@ -136,3 +139,36 @@ def test_mechanical_work(method: str) -> None:
     quick, slow = (solved(method, objective="mechanical", duration_max=most) for most in (1.2, 3.0))
     assert slow.energy.mechanical.total < quick.energy.mechanical.total
     assert slow.duration <= 3.0
+
+
+def bred(start: Any = START, goal: Any = GOAL, **given: Any) -> tuple[PolynomialGA, Attempt]:
+    task = Task(problem(start, goal, method="polynomial_ga", **given))
+    solver = PolynomialGA(task, start, goal, time.perf_counter() + 60.0)
+    return solver, solver.solve()
+
+
+def test_breeding_is_the_same_every_time_and_improves_on_its_first_population() -> None:
+    solver, attempt = bred()
+    _, again = bred()
+    assert attempt.spline is not None and again.spline is not None
+    assert (attempt.spline.control_points == again.spline.control_points).all()
+    assert attempt.spline.duration == again.spline.duration
+    # by a share far beyond what making it hold every limit can take away
+    assert solver.task.energy(attempt.spline).electrical.total < 0.999 * solver.first_cost
+    assert not attempt.converged and attempt.iterations == solver.generations > 0
+
+
+def test_the_deadline_cuts_breeding_short() -> None:
+    solution = optimize(problem(method="polynomial_ga", deadline=0.6))
+    assert solution.certificate.valid and solution.status == "feasible"
+    assert 0 < solution.solver.iterations < 120
+    assert solution.solver.wall_time < 3.0  # a generation, a loaded machine
+
+
+def test_breeding_solves_a_few_candidates_and_says_so_of_the_others() -> None:
+    solution = optimize(problem(tcp_pose(START), tcp_pose(GOAL), method="polynomial_ga", windings=False, deadline=60.0))
+    solved_ones = [each for each in solution.candidates if each.status == "solved"]
+    left = [each for each in solution.candidates if each.status == "unvisited"]
+    assert 0 < len(solved_ones) <= 3 and solution.status == "feasible"
+    assert all("no more than 3 candidates" in each.reason for each in left)
+    assert not left or max(e.lower_bound for e in solved_ones) <= min(e.lower_bound for e in left)

@@ -1,0 +1,63 @@
+"""The methods against each other on random moves: energies relative to `bspline`, and what they took.
+
+`python -m benchmarks.methods --count 20 --seed 0`
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import numpy as np
+
+from models.registry import load_robot
+from optimizer.exceptions import JoulepathError
+from optimizer.kernel import compile_kernel
+from optimizer.methods import METHODS
+from optimizer.optimize import optimize, warm_up
+from optimizer.problem import Method, Problem
+
+# within half a turn of zero, as the paper's poses are [rad]
+RANGE = np.pi
+DEADLINE = 60.0
+
+
+def measure(count: int, seed: int) -> dict[Method, list[tuple[float, float]]]:
+    """(energy [J], processor time [s]) of every method on `count` random moves; NaN where there is no motion."""
+    robot = load_robot("ur5e")
+    compile_kernel(robot)
+    warm_up(robot.name)
+    rng = np.random.default_rng(seed)
+    table: dict[Method, list[tuple[float, float]]] = {method: [] for method in METHODS}
+    for start, goal in rng.uniform(-RANGE, RANGE, (count, 2, robot.nq)):
+        for method, rows in table.items():
+            began = time.process_time()
+            try:
+                energy = optimize(Problem(start, goal, method=method, deadline=DEADLINE)).energy.electrical.total
+            except JoulepathError:
+                energy = np.nan
+            rows.append((energy, time.process_time() - began))
+    return table
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    table = measure(given.count, given.seed)
+    best = np.array([energy for energy, _ in table["bspline"]])
+    print("| method | solved | energy over `bspline`, median | greatest | processor time, median | greatest |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for method, rows in table.items():
+        energy, took = np.array(rows).T
+        over = energy / best - 1
+        print(
+            f"| `{method}` | {int(np.isfinite(energy).sum())} of {given.count} | {np.nanmedian(over):+.2%} | "
+            f"{np.nanmax(over):+.2%} | {np.median(took):.3f} s | {took.max():.3f} s |"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""`polynomial_ga`: every joint one polynomial, its values and the duration bred by a genetic algorithm.
+
+R.-F. Fung, Y.-H. Cheng, "Trajectory planning based on minimum absolute input energy for an LCD glass-handling robot",
+Appl. Math. Model. 38, 2014: high-degree polynomials by a real-coded genetic algorithm. The algorithm is PyGAD's (A. F.
+Gad, "PyGAD: an intuitive genetic algorithm Python library", Multimed. Tools Appl. 83, 2024). Nothing tells that it has
+converged, so its answers never count as optimal.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any, ClassVar
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.candidate import Attempt, Solver
+from optimizer.lagrange import polynomials
+from optimizer.motion import Task, peak_rates, slowed, spline_of, stretch
+from optimizer.windows import Window
+
+# degree 9: more values are more to search than a few seconds are enough for
+NODES = 4
+POPULATION, GENERATIONS, PARENTS, ELITE, TOURNAMENT = 80, 120, 24, 4, 4
+SEED = 0
+# how far values may leave the straight line: this share of the joint's travel, and this much in any case [rad]
+TRAVEL_SHARE, LEAST_REACH = 0.25, 0.15
+# spread of the first population and of a mutation, as a share of that; how many genes mutate
+SPREAD, MUTATION, MUTATION_SHARE = 0.1, 0.08, 0.15
+# the slowest duration bred, in multiples of the shortest that speed, acceleration and jerk allow
+SLOWEST = 4.0
+# rates peak between grid points, torque between nodes: kept below their limits by these shares
+RATES_HELD, TORQUE_HELD = 1 - 1e-3, 1 - 5e-3
+# what a limit broken by all of itself multiplies the cost by, beyond 1
+PENALTY = 20.0
+# a motion that still breaks torque between the nodes is slowed by this factor, so many times at most
+SLOWER, SLOWINGS = 1.01, 60
+
+
+class PolynomialGA(Solver):
+    """Solves a candidate by breeding. Genes: departures from the straight line at the nodes, and the duration."""
+
+    # each takes seconds: those of least bound, which are likeliest to be best
+    most_solved: ClassVar[int | None] = 3
+
+    def __init__(
+        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+    ) -> None:
+        super().__init__(task, q_start, q_goal, deadline, window)
+        self.space = polynomials(NODES)
+        x = self.space.at
+        self._line = q_start + np.outer(x**3 * (10 - 15 * x + 6 * x**2), q_goal - q_start)
+        self._reach = np.maximum(TRAVEL_SHARE * np.abs(q_goal - q_start), LEAST_REACH)
+        self.generations = 0
+        self.first_cost = np.inf
+
+    def solve(self) -> Attempt:
+        """Breed until the generations or the time are used up, and make the best motion hold every limit."""
+        import pygad  # a request for another method need not wait for it
+
+        if time.perf_counter() > self.deadline:
+            return Attempt("out of time", "the deadline passed")
+        rng = np.random.default_rng(SEED)
+        genes = NODES * len(self.q_start) + 1
+        first = np.clip(rng.normal(0.0, SPREAD, (POPULATION, genes)), -1.0, 1.0)
+        first[:, -1] = np.linspace(-1.0, 1.0, POPULATION)
+        # straight lines at several durations among them
+        first[::4, :-1] = 0.0
+        self.first_cost = float(self.costs(first).min())
+        ga = pygad.GA(
+            num_generations=GENERATIONS,
+            num_parents_mating=PARENTS,
+            initial_population=first,
+            fitness_func=self._fitness,
+            fitness_batch_size=POPULATION,
+            gene_space=[{"low": -1.0, "high": 1.0}] * genes,
+            parent_selection_type="tournament",
+            K_tournament=TOURNAMENT,
+            keep_elitism=ELITE,
+            crossover_type="uniform",
+            mutation_type="random",
+            mutation_probability=MUTATION_SHARE,
+            random_mutation_min_val=-MUTATION,
+            random_mutation_max_val=MUTATION,
+            on_generation=self._next,
+            random_seed=SEED,
+            suppress_warnings=True,
+        )
+        ga.run()
+        best = np.asarray(ga.best_solution(ga.last_generation_fitness)[0], dtype=float)
+        return self._held(best)
+
+    def costs(self, genes: Array) -> Array:
+        """The cost [J] of every chromosome (P, n), (P,), with the penalties for what it breaks."""
+        limits = self.task.problem.active_limits
+        points, duration, late = self._decoded(genes)
+        count, nq = len(points), points.shape[2]
+        z = np.einsum("dkm,pmj->pkdj", self.space.at_nodes, points, optimize=True)
+        z[:, :, 1] /= duration[:, None, None]
+        z[:, :, 2] /= duration[:, None, None] ** 2
+        cost, tau = self.task.kernel.value(z.reshape(-1, 3 * nq), self.window.p)
+        nodes = len(self.space.nodes)
+        total = duration * (cost.reshape(count, nodes) @ self.space.weights) + self.window.constant
+        torque = np.abs(tau).reshape(count, nodes, nq).max(axis=1) / (limits.tau_max * TORQUE_HELD)
+        q = z[:, :, 0]
+        beyond = np.maximum(limits.q_min - q.min(axis=1), q.max(axis=1) - limits.q_max) / self._reach
+        broken = np.maximum(torque - 1, 0).sum(axis=1) + np.maximum(beyond, 0).sum(axis=1) + late
+        return np.asarray(total + PENALTY * broken * np.abs(total))
+
+    def _decoded(self, genes: Array) -> tuple[Array, Array, Array]:
+        """Points (P, NODES + 2, nq), durations (P,) [s], and by which share the longest duration is too short (P,)."""
+        count, nq = len(genes), len(self.q_start)
+        values = self._line + genes[:, :-1].reshape(count, NODES, nq) * self._reach
+        ends = np.ones((count, 1, 1))
+        points = np.concatenate([ends * self.q_start, values, ends * self.q_goal], axis=1)
+        limits = self.task.problem.active_limits
+        peaks = np.abs(np.einsum("dgm,pmj->pdgj", self.space.at_grid, points, optimize=True)).max(axis=2)
+        ratios = (peaks / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD)).max(axis=2)
+        least = np.maximum((ratios ** (1 / np.arange(1, 4))).max(axis=1), self.t_min)
+        # the gene is linear in the duration's logarithm
+        duration = np.clip(least * SLOWEST ** ((genes[:, -1] + 1) / 2), self.t_min, self.t_max)
+        return points, duration, np.maximum(least / self.t_max - 1, 0)
+
+    def _fitness(self, ga: Any, genes: Array, indices: Any) -> list[float]:
+        genes = np.asarray(genes, dtype=float).reshape(-1, NODES * len(self.q_start) + 1)
+        # as many as ever: the kernel is set up for a number of nodes
+        padded = np.concatenate([genes, np.zeros((POPULATION - len(genes), genes.shape[1]))])
+        return [float(-cost) for cost in self.costs(padded)[: len(genes)]]
+
+    def _next(self, ga: Any) -> str | None:
+        self.generations += 1
+        return "stop" if time.perf_counter() > self.deadline else None
+
+    def _held(self, genes: Array) -> Attempt:
+        """The motion of a chromosome, slowed until it holds every limit between the nodes too."""
+        limits = self.task.problem.active_limits
+        points, duration, _ = self._decoded(genes[None])
+        spline = spline_of(self.space, points[0], float(duration[0]))
+        needed = stretch(peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+        if needed > 1:
+            spline = slowed(spline, needed)
+        for _ in range(SLOWINGS):
+            if spline.duration > self.t_max or (self.torque_peaks(spline) <= limits.tau_max).all():
+                break
+            spline = slowed(spline, SLOWER)
+        if spline.duration > self.t_max or (self.torque_peaks(spline) > limits.tau_max).any():
+            return Attempt("failed", "bred no motion that holds the limits", self.generations, 1)
+        reason = f"the best of {self.generations} generations"
+        return Attempt("solved", reason, self.generations, 1, spline, converged=False)
