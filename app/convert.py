@@ -17,6 +17,7 @@ from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
 from optimizer.arm import INVERTER_PARTS, LIMIT_NAMES, Inverter, Payload, Pose
 from optimizer.bus import Bus
+from optimizer.collision import Contact
 from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
@@ -291,13 +292,20 @@ def fields(source: object, *names: str) -> dict[str, Any]:
     }
 
 
-def to_ik_response(request: IKRequest, request_id: str, solutions: Sequence[IKSolution]) -> dict[str, Any]:
+def to_ik_response(
+    request: IKRequest, request_id: str, solutions: Sequence[IKSolution], contacts: Sequence[Contact]
+) -> dict[str, Any]:
     """The answer of `POST /ik`."""
     return {
         "id": request_id,
         "robot": request.robot,
         "solutions": [
-            {"label": str(solution.label), **fields(solution, "q", "limit_distance", "smallest_singular_value")}
-            for solution in solutions
+            {
+                "label": str(solution.label),
+                **fields(solution, "q", "limit_distance", "smallest_singular_value"),
+                "collides": contact.distance < 0,
+                "nearest": fields(contact, "pair", "distance"),
+            }
+            for solution, contact in zip(solutions, contacts, strict=True)
         ],
     }

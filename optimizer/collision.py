@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -139,14 +140,23 @@ class CollisionModel:
         gradient = self.gradients(frames, configuration, pair, found)
         return found.distance.reshape(n, p), gradient.reshape(n, p, self.nq)
 
-    def contact(self, q: Array) -> Contact | None:
-        """The nearest pair at q (nq,); None where nothing is compared."""
-        if not len(self.pairs):
-            return None
-        pair: Indices = np.arange(len(self.pairs))
-        distance = self.nearest(self.frames(q[None]), np.zeros_like(pair), pair).distance
-        nearest = int(distance.argmin())
-        return Contact(self.names(nearest), float(distance[nearest]))
+    def contacts(self, q: Sequence[Array] | Array) -> list[Contact]:
+        """The nearest pair at each of q (n, nq): none at all where nothing is compared."""
+        if not (len(self.pairs) and len(q)):
+            return []
+        frames, p = self.frames(np.asarray(q)), len(self.pairs)
+        # many of them differ by full turns alone, which move nothing
+        seen: dict[bytes, Contact] = {}
+        result = []
+        for n, turned in enumerate(np.round(frames[:, 1:, :3], 9) + 0.0):
+            key = turned.tobytes()
+            if key not in seen:
+                pair: Indices = np.arange(p)
+                distance = self.nearest(frames, np.full(p, n), pair).distance
+                nearest = int(distance.argmin())
+                seen[key] = Contact(self.names(nearest), float(distance[nearest]))
+            result.append(seen[key])
+        return result
 
     def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: Nearest) -> Array:
         """Derivatives (k, nq) of distances by the joints: n · (axis × (point - origin)) of every joint in between.

@@ -6,9 +6,11 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from app.convert import robot_named, to_ik_response, to_matrix
+from app.convert_scene import to_arm
 from app.documentation import problem_responses
 from app.schemas import problems
 from app.schemas.ik import IKRequest, IKResponse
+from optimizer.collision import CollisionModel
 from optimizer.inverse_kinematics import inverse_kinematics_for
 
 router = APIRouter(tags=["motion"])
@@ -28,10 +30,11 @@ router = APIRouter(tags=["motion"])
 )
 def solve(request: Request, body: IKRequest) -> Response:
     """Every solution within the joint range, with its branch, its distance to the limits and its smallest singular
-    value."""
+    value, and what the arm hits there, or is nearest to: itself, or what surrounds it."""
     robot = robot_named(body.robot)
     solutions = inverse_kinematics_for(robot).solve(
         to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal"
     )
-    content = to_ik_response(body, request.state.id, solutions)
+    contacts = CollisionModel(to_arm(body, robot)).contacts([solution.q for solution in solutions])
+    content = to_ik_response(body, request.state.id, solutions, contacts)
     return Response(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), media_type="application/json")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.schemas.common import IDENTITY, Pose, Request, Response, RobotName, described, part
+from app.schemas.scene import Carried, Scene, Tool
 
 _Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 
@@ -23,6 +24,33 @@ class IKRequest(Request):
     windings: bool = described(
         "Whether to also give solutions a full turn away, where the joint range allows.", None, True, default=True
     )
+    tool: Tool = described(
+        "The tool at the flange, for collisions with it.",
+        None,
+        {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]},
+        default=Tool(),
+    )
+    payload: Carried | None = described(
+        "What the flange carries, for collisions. Null: nothing.",
+        None,
+        {"shape": {"shape": "box", "size": [0.1, 0.1, 0.2]}},
+        default=None,
+    )
+    scene: Scene = described(
+        "What surrounds the arm.",
+        None,
+        {"obstacles": [{"name": "post", "shape": "cylinder", "radius": 0.05, "length": 1.0}]},
+        default=Scene(),
+    )
+
+
+class Contact(Response):
+    """The two bodies that are nearest to each other: links, `tool`, `payload`, or an obstacle by its name."""
+
+    pair: list[str] = described("Their names.", None, ["table", "forearm"])
+    distance: float = described(
+        "Distance between them, less the obstacle's margin; below zero they overlap by that much.", "m", 0.12
+    )
 
 
 class IKSolution(Response):
@@ -36,6 +64,8 @@ class IKSolution(Response):
     smallest_singular_value: float = described(
         "Of the Jacobian in metres and radians: near zero, the configuration is nearly singular.", "1", 0.12
     )
+    collides: bool = described("Whether the arm hits itself or an obstacle there.", None, False)
+    nearest: Contact = part("What is nearest to what, or deepest inside it.")
 
 
 class IKResponse(Response):

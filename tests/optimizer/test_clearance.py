@@ -51,8 +51,7 @@ def test_named_pair_has_that_distance_at_that_time(seed: int) -> None:
     model, spline = CollisionModel(Arm(scene=cell(seed))), wander(seed + 100)
     proof = clearance(model, spline)
     assert proof is not None
-    contact = model.contact(positions(spline, np.array([proof.time]))[0])
-    assert contact is not None
+    (contact,) = model.contacts(positions(spline, np.array([proof.time])))
     assert contact.pair == proof.pair
     assert contact.distance == pytest.approx(proof.sampled, abs=1e-8)
 
@@ -102,8 +101,8 @@ def test_standing_still() -> None:
     q = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
     spline = Spline(5, np.array([0.0] * 6 + [1.0] * 6), np.array([q] * 6))
     model = CollisionModel(Arm())
-    proof, contact = clearance(model, spline), model.contact(q)
-    assert proof is not None and contact is not None
+    proof, (contact,) = clearance(model, spline), model.contacts([q])
+    assert proof is not None
     assert proof.min_clearance == pytest.approx(contact.distance, abs=ROUNDING)
 
 

@@ -136,7 +136,7 @@ def test_nothing_to_compare() -> None:
     robot = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[:1])
     model = CollisionModel(Arm(robot=robot))
     assert model.distances(np.zeros((3, 6)))[0].shape == (3, 0)
-    assert model.contact(np.zeros(6)) is None
+    assert model.contacts(np.zeros((2, 6))) == []
 
 
 def test_links_that_never_meet() -> None:
@@ -156,9 +156,8 @@ def test_links_that_never_meet() -> None:
 
 def test_a_contact_known_by_hand() -> None:
     """The elbow folded flat: forearm on upper arm."""
-    contact = CollisionModel(Arm()).contact(np.array([0.0, -1.57, 3.1, 0.0, 0.0, 0.0]))
-    assert contact is not None
+    folded, stretched = np.array([[0.0, -1.57, 3.1, 0.0, 0.0, 0.0], [0.0, -1.57, 0.0, -1.57, 0.5, 0.0]])
+    contact, apart = CollisionModel(Arm()).contacts([folded, stretched])
     assert contact.distance < -0.01
     assert set(contact.pair) <= set(load_robot("ur5e").link_names)
-    stretched = CollisionModel(Arm()).contact(np.array([0.0, -1.57, 0.0, -1.57, 0.5, 0.0]))
-    assert stretched is not None and stretched.distance > 0.01
+    assert apart.distance > 0.01
