@@ -10,9 +10,11 @@ import numpy as np
 
 from app.schemas import request as asked
 from app.schemas.common import Pose as PoseSchema
-from app.schemas.common import QuaternionPose, RpyPose
+from app.schemas.common import WithQuaternion, WithRotvec, WithRpy
 from app.schemas.compare import ROW_FIELDS, CompareRequest
 from app.schemas.ik import IKRequest
+from app.schemas.orientation import InCone
+from app.schemas.orientation import LoosePose as LoosePoseSchema
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
 from optimizer.arm import INVERTER_PARTS, LIMIT_NAMES, Inverter, Payload, Pose
@@ -21,6 +23,7 @@ from optimizer.collision import Contact
 from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
+from optimizer.orientation import LoosePose
 from optimizer.problem import BranchFilter, Method, Problem
 from optimizer.solution import Candidate, ElectricalEnergy, Energy, Solution, StorageUse, UnreachableTarget
 from optimizer.targets import AnyOf, Single, Target
@@ -92,14 +95,18 @@ def to_matrix(pose: PoseSchema) -> Array:
     """Homogeneous matrix (4, 4) of a pose."""
     T = np.eye(4)
     T[:3, 3] = pose.position
-    if isinstance(pose, QuaternionPose):
-        T[:3, :3] = _from_quaternion(np.array(pose.quaternion))
-    elif isinstance(pose, RpyPose):
-        roll, pitch, yaw = (_from_rotvec(angle * axis) for angle, axis in zip(pose.rpy, np.eye(3), strict=True))
-        T[:3, :3] = yaw @ pitch @ roll
-    else:
-        T[:3, :3] = _from_rotvec(np.array(pose.rotvec))
+    T[:3, :3] = to_rotation(pose)
     return T
+
+
+def to_rotation(orientation: WithQuaternion | WithRpy | WithRotvec) -> Array:
+    """Rotation matrix (3, 3) of what holds one of `quaternion`, `rpy` and `rotvec`."""
+    if isinstance(orientation, WithQuaternion):
+        return _from_quaternion(np.array(orientation.quaternion))
+    if isinstance(orientation, WithRpy):
+        roll, pitch, yaw = (_from_rotvec(angle * axis) for angle, axis in zip(orientation.rpy, np.eye(3), strict=True))
+        return np.asarray(yaw @ pitch @ roll)
+    return _from_rotvec(np.array(orientation.rotvec))
 
 
 def _from_quaternion(quaternion: Array) -> Array:
@@ -128,7 +135,21 @@ def to_target(target: asked.Target) -> Target:
 
 
 def _single(target: asked.JointTarget | asked.PoseTarget) -> Single:
-    return np.array(target.q) if isinstance(target, asked.JointTarget) else Pose(to_matrix(target.pose))
+    if isinstance(target, asked.JointTarget):
+        return np.array(target.q)
+    return _loose(target.pose) if isinstance(target.pose, LoosePoseSchema) else Pose(to_matrix(target.pose))
+
+
+def _loose(pose: LoosePoseSchema) -> LoosePose:
+    position, orientation = np.array(pose.position), pose.orientation
+    if isinstance(orientation, str):
+        return LoosePose(position)
+    if isinstance(orientation, InCone):
+        cone = orientation.cone
+        return LoosePose(position, np.array(cone.axis), np.array(cone.direction), cone.half_angle)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = to_rotation(orientation), position
+    return LoosePose.about(Pose(T), np.array(orientation.free_about))
 
 
 def _payload(payload: asked.Payload | None) -> Payload:

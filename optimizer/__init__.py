@@ -18,6 +18,7 @@ from optimizer.exceptions import (
     UnreachablePose,
 )
 from optimizer.optimize import optimize
+from optimizer.orientation import LoosePose
 from optimizer.pareto import Front, pareto
 from optimizer.problem import BranchFilter, Problem
 from optimizer.solution import Solution
@@ -31,6 +32,7 @@ __all__ = [
     "Front",
     "InvalidProblem",
     "JoulepathError",
+    "LoosePose",
     "NoReachableTarget",
     "NoTrajectory",
     "OutsideLimits",

@@ -88,11 +88,25 @@ class Coordinates:
 
 
 @dataclass(frozen=True)
+class Leeway:
+    """How far the goal may move from where it is: lower ≤ rows · (goal - coordinates.goal) ≤ upper, linear.
+
+    rows (c, r), lower and upper (c,), equal where the goal may not move that way; `radius` bounds every coordinate's.
+    """
+
+    rows: Array
+    lower: Array
+    upper: Array
+    radius: float
+
+
+@dataclass(frozen=True)
 class Programme:
     """One candidate's programme.
 
     `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it. `constant`
-    [J] is a part of the cost that nothing changes: it keeps relative changes of the cost in proportion.
+    [J] is a part of the cost that nothing changes: it keeps relative changes of the cost in proportion. With `leeway`
+    the goal is an unknown too: the last row of the free control points, at which the motion comes to rest.
     """
 
     kernel: Kernel
@@ -102,6 +116,7 @@ class Programme:
     t_min: float
     t_max: float
     constant: float = 0.0
+    leeway: Leeway | None = None
 
     @property
     def r(self) -> int:
@@ -115,8 +130,8 @@ class Programme:
 
     @property
     def free_count(self) -> int:
-        """Number of free control points."""
-        return self.basis.n - 2 * self.basis.resting
+        """Number of free control points, the goal among them where it may move."""
+        return self.basis.n - 2 * self.basis.resting + (self.leeway is not None)
 
     @cached_property
     def rates(self) -> Array:
@@ -130,7 +145,15 @@ class Programme:
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""
         ends = np.ones((self.basis.resting, 1))
-        return np.concatenate([ends * self.coordinates.start, free, ends * self.coordinates.goal])
+        inner, goal = (free, self.coordinates.goal) if self.leeway is None else (free[:-1], free[-1])
+        return np.concatenate([ends * self.coordinates.start, inner, ends * goal])
+
+    def free_columns(self, matrix: Array) -> Array:
+        """Of a basis matrix (…, n), what multiplies the free control points (…, m)."""
+        inner = matrix[..., self.basis.free]
+        if self.leeway is None:
+            return np.ascontiguousarray(inner)
+        return np.concatenate([inner, matrix[..., -self.basis.resting :].sum(axis=-1, keepdims=True)], axis=-1)
 
     def joint_points(self, free: Array) -> Array:
         """The points of q, (n, nq), in the spline's space."""
@@ -209,7 +232,7 @@ class Programme:
     @cached_property
     def _nodes_free(self) -> Array:
         """Basis and derivatives of the free control points at the nodes, (N, 3, m)."""
-        return np.ascontiguousarray(self.basis.at_nodes[:, :, self.basis.free].transpose(1, 0, 2))
+        return np.ascontiguousarray(self.free_columns(self.basis.at_nodes).transpose(1, 0, 2))
 
     def torque_rows(self, line: Linearisation, T: float, k: Index, j: Index) -> Array:
         """Gradients (rows, n) of the torques of joints j at nodes k with respect to x."""

@@ -13,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer import search
+from optimizer import free_goal, search
 from optimizer.baselines import baselines, guesses, nearest, quintic_spline, time_optimal_spline
 from optimizer.bounds import LEAST_DURATION
 from optimizer.bus import Bus
@@ -24,6 +24,7 @@ from optimizer.exceptions import (
     InvalidProblem,
     NoTrajectory,
 )
+from optimizer.family_bound import family_bound_of
 from optimizer.kernel import kernel_for
 from optimizer.methods import METHODS, solver_for
 from optimizer.motion import Task, peak_rates, slowed, stretch
@@ -116,6 +117,8 @@ class Run:
             self.keep(*without)
         if self.best() is None:
             self.race()
+        if self.method.most_solved is None:
+            self.entries += free_goal.tours(self.task, self.entries, self.count, self.deadline)
         while (best := self.best()) is not None:
             self.refine(best)
             table = self.compared(best)
@@ -141,7 +144,11 @@ class Run:
 
     def explore(self) -> None:
         """Solve candidates until no bound is below the best."""
-        search.explore(self.task, self.entries, self.attempt, self.deadline, most_solved=self.method.most_solved)
+        free_goal.release(self.entries)
+        while True:
+            search.explore(self.task, self.entries, self.attempt, self.deadline, most_solved=self.method.most_solved)
+            if self.best() is not None or not free_goal.release(self.entries):
+                break
 
     def attempt(self, entry: Entry) -> Attempt:
         """Solve the entry in every window of durations; the outcome of least energy."""
@@ -168,15 +175,9 @@ class Run:
             return None
         self.iterations += found.solver.iterations
         self.solves += found.solver.nlp_solves
-        ends = found.start, found.goal
-        entry = next(
-            e
-            for e in self.entries
-            if all(
-                end.target == own.target and (q == own.q).all()
-                for end, q, own in zip((e.start, e.goal), (e.q_start, e.q_goal), ends, strict=True)
-            )
-        )
+        ends = found.start.target, found.goal.target
+        same = [e for e in self.entries if (e.start.target, e.goal.target) == ends]
+        entry = free_goal.between(self.task, self.entries, found.start.q, found.goal.q, same)
         spline = found.trajectory.spline
         outcome = Attempt("solved", "converged", spline=spline, stationarity=found.solver.stationarity)
         return entry, outcome, self.task.energy(spline)
@@ -184,8 +185,7 @@ class Run:
     def begin(self, spline: Spline) -> None:
         """Begin with a known motion, slowed or hastened to fit: as it is if it holds, improved, and beside it what is
         found from the ground up between its ends."""
-        q = spline.control_points
-        entry = min(self.entries, key=lambda e: float(np.abs(q[0] - e.q_start).max() + np.abs(q[-1] - e.q_goal).max()))
+        entry = free_goal.between(self.task, self.entries, spline.control_points[0], spline.control_points[-1])
         if entry.status == "infeasible" or time.perf_counter() > self.deadline:
             return
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
@@ -238,8 +238,9 @@ class Run:
     def fastest(self) -> tuple[Entry, Spline] | None:
         """The fastest motion over all candidates, whatever the problem allows, and whose it is; None if none is found
         before the deadline."""
+        free_goal.release(self.entries)
         winner, best = None, None
-        for entry in sorted((e for e in self.entries if e.holdable), key=lambda e: e.shortest):
+        for entry in sorted((e for e in self.entries if e.holdable and not e.held_back), key=lambda e: e.shortest):
             if (best is not None and entry.shortest >= best.duration) or time.perf_counter() > self.deadline:
                 break
             spline = self.fastest_of(entry)
@@ -352,14 +353,16 @@ class Run:
         for entry in open_ends:
             if entry.lower_bound >= self.task.objective_of(energy):
                 entry.status, entry.reason = "pruned", search.PRUNED
-        converged = best.attempt.converged and not self.cut_short
+        # a continuum is never searched through: it counts as done only where its bound rules it out
+        family = family_bound_of(self.task, self.entries, self.deadline)
+        done = all(e.status == "pruned" for e in open_ends) and family >= self.task.objective_of(energy)
         return Solution(
-            status="optimal" if converged and all(e.status == "pruned" for e in open_ends) else "feasible",
+            status="optimal" if done and best.attempt.converged and not self.cut_short else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=self.task.trajectory(spline, self.problem.sample_period),
             energy=energy,
-            lower_bound=min(e.lower_bound for e in self.entries),
+            lower_bound=min([family, *(e.lower_bound for e in self.entries if e.goal.loose is None)]),
             baselines=table,
             candidates=[e.report() for e in self.entries],
             unreachable=self.unreachable,

@@ -24,6 +24,7 @@ from typing import Literal
 import numpy as np
 
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
+from optimizer.free_goal import between
 from optimizer.optimize import Run, one_thread
 from optimizer.problem import Problem
 from optimizer.solution import Solution, Spline
@@ -178,7 +179,7 @@ class _Search:
         self.entered.add(key)
         run = self.run([])
         run.prepare()
-        entry = next(e for e in run.entries if (e.q_start == q_start).all() and (e.q_goal == q_goal).all())
+        entry = between(run.task, run.entries, q_start, q_goal)
         spline = run.fastest_of(entry)
         self.solves += run.solves
         if spline is None or not distinct(left.duration, spline.duration):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from optimizer.arm import Arm
 from optimizer.dwell import Cycle
 from optimizer.exceptions import InvalidProblem
 from optimizer.targets import Target, validated
+
+if TYPE_CHECKING:
+    from optimizer.closed_form import Label
 
 Method = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
 Objective = Literal["electrical", "mechanical"]
@@ -26,6 +29,11 @@ class BranchFilter:
     shoulder: Shoulder | None = None
     elbow: Elbow | None = None
     wrist: Wrist | None = None
+
+    def allows(self, label: Label) -> bool:
+        """Whether a branch is one of these."""
+        parts = ("shoulder", "elbow", "wrist")
+        return all(getattr(self, part) in (None, getattr(label, part)) for part in parts)
 
 
 @dataclass(frozen=True)
@@ -75,3 +83,7 @@ class Problem(Arm):
         for name in ("sample_period", "deadline"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
+
+    def allows(self, label: Label) -> bool:
+        """Whether the request leaves a branch open."""
+        return self.branch is None or self.branch.allows(label)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -24,15 +24,19 @@ from optimizer.exceptions import (
 )
 from optimizer.inverse_kinematics import inverse_kinematics_for, turns
 from optimizer.motion import Task
+from optimizer.orientation import LoosePose
 from optimizer.solution import Candidate, CandidateStatus, UnreachableTarget
 from optimizer.targets import AnyOf, Single
 
 FULL_TURN = 2 * np.pi
+# orientations tried of a pose that leaves it free, and of each of several at least
+SAMPLES, LEAST_SAMPLES = 96, 12
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
 MOST_PAIRS = 32768
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 UNVISITED = "not reached before the deadline"
+HELD_BACK = "other orientations promise more"
 PRUNED = "its lower bound is not below the best energy found"
 
 
@@ -40,7 +44,8 @@ PRUNED = "its lower bound is not below the best energy found"
 class End:
     """One branch at an end of the motion: its label, and for every joint the positions that the limits allow [rad].
 
-    `target` is the index, among the end's targets, of the one that it reaches.
+    `target` is the index, among the end's targets, of the one that it reaches; `loose` that target, where its
+    orientation is free in part and this is but a sample of it.
     """
 
     label: str
@@ -48,11 +53,15 @@ class End:
     choices: list[list[float]]
     fixed: bool
     target: int = 0
+    loose: LoosePose | None = None
 
 
 @dataclass
 class Entry:
-    """A start and goal pair and what is known of it; `energy` is exact, in the objective [J]."""
+    """A start and goal pair and what is known of it; `energy` is exact, in the objective [J].
+
+    What is `held_back` is not explored: there are others like it that promise more.
+    """
 
     start: End
     goal: End
@@ -65,6 +74,7 @@ class Entry:
     energy: float | None = None
     attempt: Attempt | None = field(default=None, repr=False)
     holdable: bool = True
+    held_back: bool = False
 
     @property
     def duration(self) -> float:
@@ -97,12 +107,13 @@ def ends(task: Task, name: str) -> tuple[list[End], list[UnreachableTarget]]:
     """
     target = getattr(task.problem, name)
     if not isinstance(target, AnyOf):
-        return _ends_of(task, name, target, 0), []
+        return _ends_of(task, name, target, 0, SAMPLES), []
+    loose = sum(isinstance(member, LoosePose) for member in target.targets)
     reached: list[End] = []
     unreachable: list[UnreachableTarget] = []
     for index, member in enumerate(target.targets):
         try:
-            reached += _ends_of(task, name, member, index)
+            reached += _ends_of(task, name, member, index, max(SAMPLES // max(loose, 1), LEAST_SAMPLES))
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
     if not reached:
@@ -110,22 +121,36 @@ def ends(task: Task, name: str) -> tuple[list[End], list[UnreachableTarget]]:
     return reached, unreachable
 
 
-def _ends_of(task: Task, name: str, target: Single, index: int) -> list[End]:
+def _ends_of(task: Task, name: str, target: Single, index: int, samples: int) -> list[End]:
     problem = task.problem
     kinematics, limits = inverse_kinematics_for(problem.robot), problem.active_limits
+    if isinstance(target, LoosePose):
+        return _ends_of_samples(task, name, target, index, samples)
     if not isinstance(target, Pose):
         problem.check_inside(name, target)
         return [End(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True, index)]
     solutions = kinematics.solve(target.T, problem.T_flange_tcp, limits, windings=False, target=name)
-    wanted = problem.branch
-    if wanted is not None:
-        parts = ("shoulder", "elbow", "wrist")
-        solutions = [s for s in solutions if all(getattr(wanted, p) in (None, getattr(s.label, p)) for p in parts)]
-        if not solutions:
-            raise UnreachablePose(
-                name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
-            )
+    solutions = [s for s in solutions if problem.allows(s.label)]
+    if not solutions:
+        raise UnreachablePose(
+            name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
+        )
     return [End(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False, index) for s in solutions]
+
+
+def _ends_of_samples(task: Task, name: str, pose: LoosePose, index: int, samples: int) -> list[End]:
+    """The branches of orientations spread over those that the pose allows."""
+    found: list[End] = []
+    errors: list[UnreachablePose | SingularPose] = []
+    for R in pose.sample(samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)):
+        try:
+            found += [replace(end, loose=pose) for end in _ends_of(task, name, pose.pose(R), index, samples)]
+        except (UnreachablePose, SingularPose) as error:
+            errors.append(error)
+    if found:
+        return found
+    # the nearest miss tells most
+    raise min(errors, key=lambda e: (isinstance(e, UnreachablePose), getattr(e, "distance", None) or np.inf))
 
 
 def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry]:
@@ -134,15 +159,16 @@ def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry
     Dynamics does not know full turns: where both ends are poses, pairs of the same relative travel are one candidate,
     and those that turn a joint by more than a full turn are left out, since the same pair of branches without that turn
     travels less in that joint and no further in the others, under a bound that is never higher.
-    Without `windings`, the one of least travel.
+    Without `windings`, and to samples of a free orientation, the one of least travel.
 
     Raises InvalidProblem when several targets make too many.
     """
     result: list[Entry] = []
     for start in starts:
         for goal in goals:
+            windings = task.problem.windings and goal.loose is None
             options = [
-                _joint_options(s, g, start.fixed or goal.fixed, task.problem.windings)
+                _joint_options(s, g, start.fixed or goal.fixed, windings)
                 for s, g in zip(start.choices, goal.choices, strict=True)
             ]
             if len(result) + math.prod(map(len, options)) > MOST_PAIRS:
@@ -153,7 +179,9 @@ def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry
                 )
             for combination in product(*options):
                 both = np.array(combination)
-                result.append(Entry(start, goal, both[:, 0], both[:, 1]))
+                result.append(Entry(start, goal, both[:, 0], both[:, 1], held_back=goal.loose is not None))
+                if goal.loose is not None:
+                    result[-1].reason = HELD_BACK
     return result
 
 
@@ -217,7 +245,7 @@ def explore(
     """
     best = min((e for e in entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
     for entry in sorted(entries, key=lambda e: (e.lower_bound, e.shortest)):
-        if entry.status != "unvisited":
+        if entry.status != "unvisited" or entry.held_back:
             continue
         if best is not None and best.energy is not None and entry.lower_bound >= best.energy:
             entry.status, entry.reason = "pruned", PRUNED

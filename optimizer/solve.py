@@ -42,7 +42,7 @@ Places = tuple[Index, Index, Index]  # derivative, grid point, coordinate
 Status = Literal["solved", "infeasible", "stalled", "out of time"]
 
 _DAQP_OPTIMAL = 1
-_ACTIVE, _SOFT = 1, 8
+_ACTIVE, _EQUAL, _SOFT = 1, 5, 8
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class _Solver:
         self.count = programme.free_count * programme.r
         self.n = self.count + int(self.free_time)
         basis = programme.basis
-        self.grid_free = np.ascontiguousarray(basis.at_grid[:, :, basis.free])
+        self.grid_free = programme.free_columns(basis.at_grid)
         self.anchors = basis.anchors[:, :, None]
         self.tau_max = programme.limits.tau_max
         self.orders = np.arange(1, 4)
@@ -203,10 +203,24 @@ class _Solver:
         p = self.p
         lower = np.maximum(np.tile(p.limits.q_min, p.free_count) - free.ravel(), -STEP)
         upper = np.minimum(np.tile(p.limits.q_max, p.free_count) - free.ravel(), STEP)
+        if p.leeway is not None:
+            moved = free[-1] - p.coordinates.goal
+            lower[-p.r :] = np.maximum(lower[-p.r :], -p.leeway.radius - moved)
+            upper[-p.r :] = np.minimum(upper[-p.r :], p.leeway.radius - moved)
         if self.free_time:
             lower = np.append(lower, max(p.t_min - T, -0.5 * T) / time_scale)
             upper = np.append(upper, min(p.t_max - T, T) / time_scale)
         return lower, upper
+
+    def _leeway_rows(self, free: Array) -> tuple[Array, Array, Array]:
+        """Rows (c, n) that keep the goal within its leeway, and the least and most that each may change."""
+        leeway = self.p.leeway
+        if leeway is None:
+            return np.zeros((0, self.n)), np.zeros(0), np.zeros(0)
+        A = np.zeros((len(leeway.rows), self.n))
+        A[:, self.count - self.p.r : self.count] = leeway.rows
+        moved = leeway.rows @ (free[-1] - self.p.coordinates.goal)
+        return A, leeway.lower - moved, leeway.upper - moved
 
     def _qp(
         self, H: Array, g: Array, line: Linearisation, free: Array, T: float, time_scale: float, ratio: Array
@@ -217,18 +231,23 @@ class _Solver:
         chosen = (size > NEAR) & (self.anchors | _peaks(size)) | self.active
         places: Places = np.nonzero(chosen)  # type: ignore[assignment]
         sign = np.sign(ratio[places])
-        A = np.concatenate([A_torque, self._kinematic_rows(places, sign, T, time_scale)])
+        A_goal, least_goal, most_goal = self._leeway_rows(free)
+        # unknowns and the goal's rows come first, and never give way
+        hard = self.n + len(A_goal)
+        equal = self.n + np.flatnonzero(least_goal == most_goal)
+        A = np.concatenate([A_goal, A_torque, self._kinematic_rows(places, sign, T, time_scale)])
         b = np.concatenate([b_torque, 1 - size[places]])
         soft = False
-        working = np.concatenate([np.zeros(self.n + len(k), dtype=bool), self.active[places]])
+        working = np.concatenate([np.zeros(hard + len(k), dtype=bool), self.active[places]])
         for attempt in range(QP_ROUNDS):
-            sense = np.zeros(self.n + len(b), dtype=np.int32)
+            sense = np.zeros(hard + len(b), dtype=np.int32)
             if soft:
-                sense[self.n :] = _SOFT
+                sense[hard:] = _SOFT
             else:
                 sense[: len(working)][working] = _ACTIVE
-            least = np.concatenate([lower, np.full(len(b), -1e30)])
-            most = np.concatenate([upper, b])
+            sense[equal] = _EQUAL
+            least = np.concatenate([lower, least_goal, np.full(len(b), -1e30)])
+            most = np.concatenate([upper, most_goal, b])
             x, _, flag, info = daqp.solve(H, g, A, most, least, sense, primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6)
             if flag < _DAQP_OPTIMAL and not soft:
                 soft = True
@@ -254,7 +273,7 @@ class _Solver:
             b = np.concatenate([b, 1 - fresh_sign * ratio[fresh]])
             places = tuple(np.concatenate(both) for both in zip(places, fresh, strict=True))  # type: ignore[assignment]
             sign = np.concatenate([sign, fresh_sign])
-        mu = np.maximum(info["lam"][self.n :], 0.0)
+        mu = np.maximum(info["lam"][hard:], 0.0)
         torque, kinematic = mu[: len(k)], mu[len(k) :]
         self.active[...] = False
         held = kinematic > 0

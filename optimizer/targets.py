@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from models.robot import Array
 from optimizer.arm import Arm, Pose, frozen
 from optimizer.exceptions import InvalidProblem
+from optimizer.orientation import LoosePose
 
 if TYPE_CHECKING:
     from optimizer.problem import Problem
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 # of `AnyOf`
 MOST_TARGETS = 64
 
-Single = Array | Pose
+Single = Array | Pose | LoosePose
 
 
 @dataclass(frozen=True)
@@ -53,18 +54,21 @@ def single(target: Target) -> Single:
 def validated(arm: Arm, name: str, target: Target) -> Target:
     """A problem's `start` or `goal` (which `name` says) with its joint positions read-only arrays.
 
-    Raises InvalidProblem, or OutsideLimits for joint positions out of range; those of an AnyOf are merely unreachable.
+    Raises InvalidProblem, also for a start whose orientation is free, or OutsideLimits for joint positions out of
+    range; those of an AnyOf are merely unreachable.
     """
+    if name == "start" and any(isinstance(member, LoosePose) for member in members(target)):
+        raise InvalidProblem(name, "Only a goal's orientation may be free: give the start's in full.")
     if isinstance(target, AnyOf):
         nq = (arm.robot.nq,)
         fields = [f"{name}.any_of.{k}.q" for k in range(len(target.targets))]
         return AnyOf(
             tuple(
-                member if isinstance(member, Pose) else frozen(member, nq, field)
+                member if isinstance(member, Pose | LoosePose) else frozen(member, nq, field)
                 for member, field in zip(target.targets, fields, strict=True)
             )
         )
-    if isinstance(target, Pose):
+    if isinstance(target, Pose | LoosePose):
         return target
     q = frozen(target, (arm.robot.nq,), f"{name}.q")
     arm.check_inside(name, q)

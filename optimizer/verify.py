@@ -15,6 +15,7 @@ from models.robot import Array, Limits
 from optimizer.arm import Pose
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown
+from optimizer.orientation import LoosePose
 from optimizer.problem import Problem
 from optimizer.solution import Certificate, Energy, Spline
 from optimizer.targets import Single, single
@@ -118,9 +119,13 @@ def _end_error(
     """(position [m], rotation [rad]) between the TCP reached and the target.
 
     Forward kinematics cannot tell joint positions a full turn apart: the rotation is the largest joint's deviation
-    from the joints named (and from those asked for) where that is more.
+    from the joints named (and from those asked for) where that is more. Where the orientation is free in part, it is
+    the angle to the nearest orientation allowed.
     """
     T_reached = _tcp(problem, reached, model, data)
+    if isinstance(target, LoosePose):
+        position = float(np.linalg.norm(T_reached[:3, 3] - target.position))
+        return position, _worst(target.excess(T_reached[:3, :3]), float(np.abs(reached - named).max()))
     if isinstance(target, Pose):
         T_asked, joints = target.T, [named]
     else:

@@ -18,6 +18,7 @@ PUBLIC = {
     "Front",
     "InvalidProblem",
     "JoulepathError",
+    "LoosePose",
     "NoReachableTarget",
     "NoTrajectory",
     "OutsideLimits",

@@ -74,12 +74,14 @@ Quaternion = Annotated[
 JointPositions = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=1, max_length=16)]
 
 
-class _Positioned(Request):
+class Positioned(Request):
+    """The place of a frame."""
+
     position: Vector3 = described("Origin of the frame: x, y, z.", "m", [0.4, -0.2, 0.3])
 
 
-class QuaternionPose(_Positioned):
-    """Position and unit quaternion."""
+class WithQuaternion(Request):
+    """An orientation as a quaternion."""
 
     quaternion: Quaternion = described(
         "Orientation as a quaternion x, y, z, w: normalised if its norm is within 0.001 of 1, else refused.",
@@ -88,20 +90,32 @@ class QuaternionPose(_Positioned):
     )
 
 
-class RpyPose(_Positioned):
-    """Position and roll, pitch, yaw."""
+class WithRpy(Request):
+    """An orientation as roll, pitch, yaw."""
 
     rpy: Vector3 = described(
         "Orientation as roll, pitch, yaw about the fixed axes x, y, z, in this order.", "rad", [3.14159, 0.0, 1.5708]
     )
 
 
-class RotvecPose(_Positioned):
-    """Position and rotation vector, as the teach pendant shows it."""
+class WithRotvec(Request):
+    """An orientation as a rotation vector."""
 
     rotvec: Vector3 = described(
         "Orientation as a rotation vector: axis times angle, as on the teach pendant.", "rad", [0.0, 3.14159, 0.0]
     )
+
+
+class QuaternionPose(WithQuaternion, Positioned):
+    """Position and unit quaternion."""
+
+
+class RpyPose(WithRpy, Positioned):
+    """Position and roll, pitch, yaw."""
+
+
+class RotvecPose(WithRotvec, Positioned):
+    """Position and rotation vector, as the teach pendant shows it."""
 
 
 Pose = Annotated[

@@ -27,6 +27,34 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
             "windings": False,
         },
     },
+    "any_of": {
+        "summary": "To whichever of several targets costs least",
+        "description": "Two grasps of one part; the answer says which was taken.",
+        "value": {
+            "start": {"q": _HOME},
+            "goal": {
+                "any_of": [
+                    {"pose": {"position": [-0.35, 0.4, 0.3], "rpy": [3.1416, 0.0, 0.0]}},
+                    {"pose": {"position": [-0.35, 0.4, 0.3], "rpy": [3.1416, 0.0, 1.5708]}},
+                ]
+            },
+        },
+    },
+    "free_orientation": {
+        "summary": "To a position, with the tool nearly upright",
+        "description": "The tool's z axis points within 0.2 rad of straight down; the rest is left to the optimiser.",
+        "value": {
+            "start": {"q": _HOME},
+            "goal": {
+                "pose": {
+                    "position": [-0.35, 0.4, 0.3],
+                    "orientation": {
+                        "cone": {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.2}
+                    },
+                }
+            },
+        },
+    },
     "payload_on_the_ceiling": {
         "summary": "Hanging from the ceiling, with a payload",
         "description": "Gravity points along +z of the base frame of an arm that hangs upside down.",

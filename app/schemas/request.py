@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.common import IDENTITY, JointPositions, Pose, Request, RobotName, Vector3, by_field, described
+from app.schemas.orientation import TargetPose
 from optimizer.problem import Method
 
 MAX_DURATION = 600.0
@@ -52,8 +53,10 @@ class JointTarget(Request):
 class PoseTarget(Request):
     """A target in space: every arm configuration that reaches it is a candidate."""
 
-    pose: Pose = described(
-        "Pose of the TCP in the robot's base frame.", None, {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
+    pose: TargetPose = described(
+        "Pose of the TCP in the robot's base frame. A goal's orientation may be free in part.",
+        None,
+        {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )
 
 

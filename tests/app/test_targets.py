@@ -39,6 +39,46 @@ def test_names_every_target_out_of_reach(client: TestClient) -> None:
     assert [entry["target"] for entry in content["unreachable"]] == [0, 1]
 
 
+PLACE = [0.4, -0.2, 0.3]
+CONE = {"axis": [0, 0, 1], "direction": [0, 0, -1], "half_angle": 0.3}
+UPRIGHT = [0.0, 1.0, 0.0, 0.0]
+
+
+def loose(orientation: Any, **fields: Any) -> dict[str, Any]:
+    return {"pose": {"position": PLACE, "orientation": orientation, **fields}}
+
+
+@pytest.mark.parametrize(
+    "orientation",
+    [
+        "free",
+        {"cone": CONE},
+        {"free_about": [0, 0, 2], "quaternion": UPRIGHT},
+        {"free_about": [0, 1, 0], "rpy": [3.1, 0.1, 0.2]},
+        {"free_about": [0, 0, 1], "rotvec": [0, 3.1, 0]},
+    ],
+    ids=str,
+)
+def test_chooses_the_orientation(client: TestClient, orientation: Any) -> None:
+    answer = client.post("/optimize", json=move(goal=loose(orientation)))
+    assert answer.status_code == 200, answer.text
+    OptimizeResponse.model_validate_json(answer.content)
+    content = answer.json()
+    assert content["status"] == "feasible"
+    assert content["certificate"]["goal_error"]["position"] < 1e-6
+    assert content["certificate"]["goal_error"]["rotation"] < 1e-6
+    assert 0 <= content["energy"]["lower_bound"] <= content["energy"]["electrical"]["total"]
+
+
+def test_other_endpoints_want_the_whole_pose(client: TestClient) -> None:
+    pose = loose("free")["pose"]
+    assert ["body", "pose"] in [error["loc"] for error in refused(client, {"pose": pose}, "/ik")]
+    assert ["body", "tcp"] in [error["loc"] for error in refused(client, move(tcp=pose))]
+    for start in (loose("free"), {"any_of": [{"q": NEAR}, loose("free")]}):
+        (error,) = refused(client, move(start=start))
+        assert error["loc"] == ["body", "start"] and "goal" in error["msg"]
+
+
 @pytest.mark.parametrize(
     ("goal", "loc"),
     [
@@ -49,6 +89,29 @@ def test_names_every_target_out_of_reach(client: TestClient) -> None:
         ({"any_of": [{"q": NEAR}, {"q": NEAR, "pose": POSE}]}, ["body", "goal", "any_of", 1]),
         ({"any_of": [{"q": NEAR}, {"q": NEAR[:5]}]}, ["body", "goal", "any_of", 1, "q"]),
         ({"any_of": [{"q": [float("nan"), *NEAR[1:]]}]}, ["body", "goal", "any_of", 0, "q", 0]),
+        (loose("loose"), ["body", "goal", "pose", "orientation"]),
+        (loose(None), ["body", "goal", "pose", "orientation"]),
+        (loose({}), ["body", "goal", "pose", "orientation"]),
+        (loose("free", rpy=[0, 0, 0]), ["body", "goal", "pose"]),
+        (loose({"cone": CONE, "free_about": [0, 0, 1]}), ["body", "goal", "pose", "orientation"]),
+        (loose({"cone": {**CONE, "axis": [0, 0, 0]}}), ["body", "goal", "pose", "orientation", "cone", "axis"]),
+        (
+            loose({"cone": {**CONE, "half_angle": 3.2}}),
+            ["body", "goal", "pose", "orientation", "cone", "half_angle"],
+        ),
+        (
+            loose({"cone": {**CONE, "half_angle": float("nan")}}),
+            ["body", "goal", "pose", "orientation", "cone", "half_angle"],
+        ),
+        (
+            loose({"cone": {**CONE, "direction": [0, 0]}}),
+            ["body", "goal", "pose", "orientation", "cone", "direction"],
+        ),
+        (loose({"free_about": [0, 0, 1]}), ["body", "goal", "pose", "orientation"]),
+        (
+            loose({"free_about": [0, 0, 0], "rpy": [0, 0, 0]}),
+            ["body", "goal", "pose", "orientation", "free_about"],
+        ),
         ({"any_of": [{"q": NEAR}], "q": NEAR}, ["body", "goal"]),
         ({"any_of": [{"q": NEAR}], "all_of": []}, ["body", "goal"]),
     ],

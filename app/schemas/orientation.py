@@ -1,0 +1,117 @@
+"""Poses whose orientation is free in part: what a goal may be beside a full pose."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Tag
+from pydantic_core import PydanticCustomError
+
+from app.schemas.common import (
+    Positioned,
+    QuaternionPose,
+    Request,
+    RotvecPose,
+    RpyPose,
+    Vector3,
+    WithQuaternion,
+    WithRotvec,
+    WithRpy,
+    by_field,
+    described,
+)
+
+SHORTEST_AXIS = 1e-6
+"""Length below which an axis is refused."""
+
+
+def _has_direction(axis: list[float]) -> list[float]:
+    if sum(part * part for part in axis) ** 0.5 < SHORTEST_AXIS:
+        raise PydanticCustomError("zero_axis", "The axis must not be zero")
+    return axis
+
+
+Axis = Annotated[Vector3, AfterValidator(_has_direction)]
+
+
+class _FreeAbout(Request):
+    free_about: Axis = described(
+        "Axis of the tool, in the TCP frame, about which it may turn freely; any length.", "1", [0.0, 0.0, 1.0]
+    )
+
+
+class QuaternionFreeAbout(WithQuaternion, _FreeAbout):
+    """One orientation, as a quaternion, and all that turning about the axis makes of it."""
+
+
+class RpyFreeAbout(WithRpy, _FreeAbout):
+    """One orientation, as roll, pitch, yaw, and all that turning about the axis makes of it."""
+
+
+class RotvecFreeAbout(WithRotvec, _FreeAbout):
+    """One orientation, as a rotation vector, and all that turning about the axis makes of it."""
+
+
+class Cone(Request):
+    """How far an axis of the tool may tilt; about the axis the tool turns freely."""
+
+    axis: Axis = described("Axis of the tool, in the TCP frame; any length.", "1", [0.0, 0.0, 1.0])
+    direction: Axis = described("Where it should point, in the base frame; any length.", "1", [0.0, 0.0, -1.0])
+    half_angle: float = described("How far it may be from there.", "rad", 0.35, ge=0, le=pi)
+
+
+class InCone(Request):
+    """Every orientation that keeps an axis of the tool within a cone."""
+
+    cone: Cone = described(
+        "The cone.", None, {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.35}
+    )
+
+
+def _by_kind(value: Any) -> str | None:
+    if isinstance(value, str):
+        return "by word"
+    names = ("cone", "free_about")
+    present = [name for name in names if (name in value if isinstance(value, dict) else hasattr(value, name))]
+    return f"by {present[0]}" if len(present) == 1 else None
+
+
+Orientation = Annotated[
+    Annotated[Literal["free"], Tag("by word")]
+    | Annotated[InCone, Tag("by cone")]
+    | Annotated[
+        Annotated[
+            Annotated[QuaternionFreeAbout, Tag("by quaternion")]
+            | Annotated[RpyFreeAbout, Tag("by rpy")]
+            | Annotated[RotvecFreeAbout, Tag("by rotvec")],
+            by_field("quaternion", "rpy", "rotvec"),
+        ],
+        Tag("by free_about"),
+    ],
+    Discriminator(
+        _by_kind,
+        custom_error_type="orientation",
+        custom_error_message='Give "free", or an object with exactly one of cone, free_about',
+    ),
+]
+
+
+class LoosePose(Positioned):
+    """A position, and an orientation that is free in part."""
+
+    orientation: Orientation = described(
+        '"free": any. `free_about`: turned freely about an axis of the tool. `cone`: an axis of the tool within an '
+        "angle of a direction.",
+        None,
+        {"cone": {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.35}},
+    )
+
+
+TargetPose = Annotated[
+    Annotated[QuaternionPose, Tag("by quaternion")]
+    | Annotated[RpyPose, Tag("by rpy")]
+    | Annotated[RotvecPose, Tag("by rotvec")]
+    | Annotated[LoosePose, Tag("by orientation")],
+    by_field("quaternion", "rpy", "rotvec", "orientation"),
+]
