@@ -3,7 +3,7 @@
 P_j is what joint j takes from the bus, base = idle + controller, P_net = base + Σ_j P_j.
 
 - `shared`        drawn = max(P_net, 0); the net surplus is burnt, but for the share that the robot's supply takes back
-- `isolated`      drawn = base + Σ_j max(P_j, 0); every joint burns its own surplus (Hansen et al. 2012)
+- `isolated`      drawn = base + Σ_j max(P_j, 0); every joint burns its own surplus
 - `recuperating`  drawn = max(P_net, 0) - efficiency · max(-P_net, 0)
 - `storage`       a capacitor or flywheel on the shared bus (Gale, Eielsen et al. 2015)
 
