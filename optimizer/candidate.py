@@ -43,8 +43,7 @@ FIT_SAMPLES = 201
 class Attempt:
     """What came of a candidate: the spline if it is solved, and what was spent on it.
 
-    `iterations` are the method's own: of the SQP, generations, or energies evaluated. `converged` is whether more of
-    them would find nothing better nearby.
+    `iterations` are the method's own: of the SQP, generations, or energies evaluated.
     """
 
     status: Literal["solved", "infeasible", "failed", "out of time"]
@@ -53,7 +52,6 @@ class Attempt:
     solves: int = 0
     spline: Spline | None = None
     stationarity: float | None = None
-    converged: bool = True
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,8 @@ class Solver(ABC):
     adopts: ClassVar[tuple[BaselineName, ...]] = ()
     # how many candidates are solved before the rest is left
     most_solved: ClassVar[int | None] = None
+    # whether it ends where nothing nearby is better
+    converges: ClassVar[bool] = True
 
     def __init__(
         self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None

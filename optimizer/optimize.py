@@ -357,7 +357,7 @@ class Run:
         family = family_bound_of(self.task, self.entries, self.deadline)
         done = all(e.status == "pruned" for e in open_ends) and family >= self.task.objective_of(energy)
         return Solution(
-            status="optimal" if done and best.attempt.converged and not self.cut_short else "feasible",
+            status="optimal" if done and self.method.converges and not self.cut_short else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=self.task.trajectory(spline, self.problem.sample_period),

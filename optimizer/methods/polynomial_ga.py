@@ -42,6 +42,7 @@ class PolynomialGA(Solver):
 
     # each takes seconds: those of least bound, which are likeliest to be best
     most_solved: ClassVar[int | None] = 3
+    converges: ClassVar[bool] = False
 
     def __init__(
         self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
@@ -146,4 +147,4 @@ class PolynomialGA(Solver):
         if spline.duration > self.t_max or (self.torque_peaks(spline) > limits.tau_max).any():
             return Attempt("failed", "bred no motion that holds the limits", self.generations, 1)
         reason = f"the best of {self.generations} generations"
-        return Attempt("solved", reason, self.generations, 1, spline, converged=False)
+        return Attempt("solved", reason, self.generations, 1, spline)

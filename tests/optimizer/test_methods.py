@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from optimizer.baselines import time_optimal_spline
+from optimizer.bus import Bus
 from optimizer.candidate import Attempt
 from optimizer.exceptions import DurationTooShort
 from optimizer.kernel import compile_kernel
@@ -155,7 +156,7 @@ def test_breeding_is_the_same_every_time_and_improves_on_its_first_population() 
     assert attempt.spline.duration == again.spline.duration
     # by a share far beyond what making it hold every limit can take away
     assert solver.task.energy(attempt.spline).electrical.total < 0.999 * solver.first_cost
-    assert not attempt.converged and attempt.iterations == solver.generations > 0
+    assert attempt.iterations == solver.generations > 0
 
 
 def test_the_deadline_cuts_breeding_short() -> None:
@@ -172,3 +173,10 @@ def test_breeding_solves_a_few_candidates_and_says_so_of_the_others() -> None:
     assert 0 < len(solved_ones) <= 3 and solution.status == "feasible"
     assert all("no more than 3 candidates" in each.reason for each in left)
     assert not left or max(e.lower_bound for e in solved_ones) <= min(e.lower_bound for e in left)
+
+
+def test_breeding_is_never_optimal_with_a_store_either() -> None:
+    """There the answer may be the one found without the store."""
+    store = Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9)
+    solution = optimize(problem(method="polynomial_ga", bus=store, deadline=60.0))
+    assert solution.certificate.valid and solution.status == "feasible"
