@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import coal
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import ConvexHull
 
 from models.robot import Array
@@ -45,16 +46,37 @@ class ConvexPairs:
                 result = coal.DistanceResult()
                 found = coal.distance(a, stand_a, b, stand_b, request, result)
                 if abs(found) < BEYOND and abs(float(result.normal @ result.normal) - 1) < 1e-6:
+                    distance[k], normal[k], point[k] = found + skin_a + skin_b, result.normal, result.getNearestPoint2()
                     break
             else:
-                raise FloatingPointError("Coal found no distance.")
-            distance[k], normal[k], point[k] = found + skin_a + skin_b, result.normal, result.getNearestPoint2()
+                distance[k], normal[k], point[k] = _rough(self._cores[i], T_first[k], self._cores[j], T_second[k])
         return distance, normal, point
 
     def _shape(self, number: int) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
         if number not in self._shapes:
             self._shapes[number] = coal_shape(self._cores[number])
         return self._shapes[number]
+
+
+def _rough(first: Core, T_first: Array, second: Core, T_second: Array) -> tuple[float, Array, Array]:
+    """The most that the line of centres or an axis of either body parts them by: never more than the distance."""
+    centres = T_second[:3, :3] @ second.points.mean(axis=0) + T_second[:3, 3]
+    centres = centres - T_first[:3, :3] @ first.points.mean(axis=0) - T_first[:3, 3]
+    line = centres / max(float(np.linalg.norm(centres)), 1e-12)
+    axes = np.vstack([T_first[:3, :3].T, T_second[:3, :3].T])
+    directions = np.vstack([axes, -axes, line if np.linalg.norm(line) > 0.5 else axes[0]])
+    lowest, which = _lowest(second, T_second, directions)
+    gap = lowest + _lowest(first, T_first, -directions)[0]
+    best = int(gap.argmax())
+    return float(gap[best]), directions[best], T_second[:3, :3] @ second.points[which[best]] + T_second[:3, 3]
+
+
+def _lowest(core: Core, T: Array, directions: Array) -> tuple[Array, npt.NDArray[np.intp]]:
+    """How low (k,) a core at T (4, 4) reaches along directions (k, 3), and by which of its points."""
+    turned = directions @ T[:3, :3]
+    heights = turned @ core.points.T
+    reach = core.ring * np.hypot(turned[:, 0], turned[:, 1])
+    return heights.min(axis=1) - reach + directions @ T[:3, 3], heights.argmin(axis=1)
 
 
 def _request(tolerance: float) -> coal.DistanceRequest:
