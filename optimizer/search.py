@@ -142,15 +142,24 @@ def _ends_of_samples(task: Task, name: str, pose: LoosePose, index: int, samples
     """The branches of orientations spread over those that the pose allows."""
     found: list[End] = []
     errors: list[UnreachablePose | SingularPose] = []
-    for R in pose.sample(samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)):
+    tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
+    for R in pose.sample(tried):
         try:
             found += [replace(end, loose=pose) for end in _ends_of(task, name, pose.pose(R), index, samples)]
         except (UnreachablePose, SingularPose) as error:
             errors.append(error)
     if found:
         return found
-    # the nearest miss tells most
-    raise min(errors, key=lambda e: (isinstance(e, UnreachablePose), getattr(e, "distance", None) or np.inf))
+    unreachable = [error for error in errors if isinstance(error, UnreachablePose)]
+    if len(unreachable) < tried:
+        raise next(error for error in errors if isinstance(error, SingularPose))
+    distances = [error.distance for error in unreachable if error.distance is not None]
+    raise UnreachablePose(
+        name,
+        min(distances, default=None),
+        f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to where the arm can "
+        "go, widen limits.position or leave `branch` out.",
+    )
 
 
 def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry]:

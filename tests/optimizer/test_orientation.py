@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from models.robot import Array
+from optimizer import bspline
 from optimizer.arm import Payload, Pose
 from optimizer.bounds import lower_bounds
 from optimizer.bus import Bus
@@ -18,12 +19,15 @@ from optimizer.family_bound import family_bound
 from optimizer.free_goal import leeway
 from optimizer.inverse_kinematics import inverse_kinematics_for
 from optimizer.motion import Task
+from optimizer.nlp import Coordinates, Leeway, Programme
 from optimizer.optimize import optimize
 from optimizer.orientation import LoosePose
 from optimizer.pareto import pareto
 from optimizer.problem import BranchFilter, Problem
 from optimizer.solution import Solution
+from optimizer.solve import solve
 from optimizer.targets import AnyOf
+from optimizer.windows import windows
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
 
 # the certificate's, of positions [m] and angles [rad]
@@ -100,6 +104,54 @@ def test_leeway_is_the_derivative_of_forward_kinematics(pose: LoosePose) -> None
     assert np.linalg.norm(after[:3, 3] - before[:3, 3]) < 1e-4 * step
     turned = np.linalg.norm((after - before)[:3, :3] @ pose.axis)
     assert (turned < 1e-4 * step) == (pose.half_angle == 0)
+
+
+def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
+    """Gradient and Hessian against central differences, the goal's row among the unknowns; the end is at rest."""
+    task = Task(problem(goal=GOAL))
+    space, window = bspline.uniform(9), windows(task, GOAL)[0]
+    coordinates = Coordinates.joints(START, GOAL, task.problem.active_limits)
+    free_end = Leeway(np.eye(6), np.full(6, -1.0), np.full(6, 1.0), 1.0)
+    programme = Programme(task.kernel, space, window.p, coordinates, 0.1, 10.0, leeway=free_end)
+    rng = np.random.default_rng(3)
+    free = np.linspace(START, GOAL, programme.free_count) + rng.normal(scale=0.1, size=(programme.free_count, 6))
+    assert (programme.points(free)[-3:] == free[-1]).all()
+    duration, none = 1.3, np.zeros((len(space.nodes), 6))
+    line = programme.derivatives(free, duration, none)
+    direction, step = rng.normal(size=free.shape), 1e-5
+    ends = [programme.value(free + sign * step * direction, duration)[0] for sign in (1, -1)]
+    slope = float(line.gradient[:-1] @ direction.ravel())
+    # third derivatives times the step squared, relative to a slope of tens of joules per radian
+    assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-5)
+    gradients = [
+        programme.derivatives(free + sign * step * direction, duration, none).gradient.copy() for sign in (1, -1)
+    ]
+    bent = line.hessian[:, :-1] @ direction.ravel()
+    assert bent == pytest.approx((gradients[0] - gradients[1]) / (2 * step), rel=1e-4, abs=1e-3)
+
+
+def test_the_solver_keeps_to_the_leeway() -> None:
+    """What it proposes lies on the plane, within the radius and within joint limits, and spends no more."""
+    task = Task(problem(goal=GOAL))
+    space, window = bspline.uniform(13), windows(task, GOAL)[0]
+    coordinates = Coordinates.joints(START, GOAL, task.problem.active_limits)
+    free = START + space.quintic[:, None] * (GOAL - START)
+    held = Programme(task.kernel, space, window.p, coordinates, 0.1, 10.0)
+    at_rest = solve(held, free[space.free], 2.0)
+    T = tcp_pose(GOAL).T
+    for pose in (
+        LoosePose(T[:3, 3]),
+        LoosePose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.1),
+        LoosePose.about(Pose(T), [1, 0, 0]),
+    ):
+        allowed = leeway(task, pose, GOAL, 0.3)
+        programme = Programme(task.kernel, space, window.p, coordinates, 0.1, 10.0, leeway=allowed)
+        found = solve(programme, np.concatenate([at_rest.free, GOAL[None]]), at_rest.duration)
+        moved = found.free[-1] - GOAL
+        assert found.violation < 1e-4 and found.cost < at_rest.cost
+        assert np.abs(moved).max() <= 0.3 + ROUNDING and np.abs(moved).max() > 0.01
+        assert (allowed.rows @ moved <= allowed.upper + 1e-8).all()
+        assert (allowed.rows @ moved >= allowed.lower - 1e-8).all()
 
 
 @pytest.mark.parametrize("number", range(3))
@@ -210,6 +262,7 @@ def test_out_of_reach_in_every_orientation() -> None:
     with pytest.raises(UnreachablePose) as refusal:
         optimize(problem(goal=far))
     assert refusal.value.distance is not None and 0.5 < refusal.value.distance < 1.5
+    assert "each of the 96 orientations" in str(refusal.value)
     with pytest.raises(NoReachableTarget):
         optimize(problem(goal=AnyOf((far, far))))
 
