@@ -230,16 +230,15 @@ class CollisionModel:
         self, frames: Array, configuration: Indices, first: Indices, second: Indices, result: Nearest, pair: Indices
     ) -> Array:
         """Fills in the bounding balls' distances. A half-space has no ball: minus infinity."""
-        middles = []
-        for body in (first, second):
-            T = frames[configuration, self.links[body]]
-            middles.append(np.einsum("kij,kj->ki", T[:, :3, :3], self._middles[body]) + T[:, :3, 3])
-        across = middles[1] - middles[0]
-        length = np.linalg.norm(across, axis=1)
+        T = frames[:, self.links]
+        middles = (T[..., :3, :3] @ self._middles[:, :, None])[..., 0] + T[..., :3, 3]
+        seconds = middles[configuration, second]
+        across = seconds - middles[configuration, first]
+        length = np.sqrt(np.einsum("ki,ki->k", across, across))
         result.distance[:] = length - self._reach[first] - self._reach[second] - self._swelling[pair]
         result.distance[self._kinds[pair] == 3] = -np.inf
         result.normal[:] = across / np.maximum(length, 1e-12)[:, None]
-        result.point[:] = middles[1]
+        result.point[:] = seconds
         return result.distance
 
     def _segments(
