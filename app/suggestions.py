@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi, radians
+from math import radians
 from typing import Any, Literal
 
 import numpy as np
@@ -19,8 +19,8 @@ from optimizer.turned import turned_poses
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]
 
-_TURNS = 12
-"""How many orientations about the tool's axis are tried, the present one among them."""
+_TOOL_AXIS = [0.0, 0.0, 1.0]
+"""In the TCP frame."""
 _TILT = radians(10.0)
 _LONGER = 1.25
 _NEARER = 0.5
@@ -109,11 +109,12 @@ def _branch(base: Base) -> Iterator[Proposal]:
 
 
 def _orientation(base: Base) -> Iterator[Proposal]:
-    about = [np.array([0.0, 0.0, 2 * pi * k / _TURNS]) for k in range(1, _TURNS)]
+    (here,) = _poses(base, [np.zeros(3)])
+    orientation = {"free_about": _TOOL_AXIS, "quaternion": here["pose"]["quaternion"]}
     yield Proposal(
         "orientation",
-        f"Turn the tool about its axis: the best of {_TURNS - 1} turns of the goal, {360 / _TURNS:g} degrees apart.",
-        base.request | {"goal": {"any_of": _poses(base, about)}},
+        "Let the tool turn freely about its axis at the goal.",
+        base.request | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
     )
     tilts = [sign * _TILT * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
     yield Proposal(

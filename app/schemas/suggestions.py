@@ -51,7 +51,7 @@ class Suggestion(_Proposal):
     gain: float = described("Energy of the base less its own: below zero, it costs more.", "J", 38.6)
     duration: float = described("Length of the motion.", "s", 1.33)
     status: Literal["optimal", "feasible"] = described(
-        "`feasible`: the search was cut short, and the request may come to less.", None, "optimal"
+        "`feasible`: not everything was searched, and the request may come to less.", None, "optimal"
     )
     threshold_met: bool = described("Whether it meets the study's threshold.", None, True)
 
