@@ -55,6 +55,6 @@ CSV_EXAMPLES: dict[str, Example] = {
     },
 }
 CSV_TABLE = (
-    "segment,start,end,electrical.total,…,balance_error\n1,0.0,1.5,76.5,…,9e-16\n2,1.5,3.0,76.5,…,7e-16\n"
+    "segment,start,end,electrical.total,…,balance_error\n1,0.0,1.5,53.1,…,9e-16\n2,1.5,3.0,99.8,…,7e-16\n"
     "total,0.0,3.0,152.9,…,9e-16\n"
 )
