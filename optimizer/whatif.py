@@ -1,0 +1,57 @@
+"""What an arm's motion would cost were the arm another: lighter links, another payload, other drives.
+
+Two effects are told apart: what the change does to the motion that was best before it (`same_motion`), and what a
+motion found for the changed arm does beside that (`reoptimised`).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+
+from optimizer.exceptions import JoulepathError
+from optimizer.motion import Task
+from optimizer.optimize import SLACK, Run, one_thread, optimize
+from optimizer.problem import Problem
+from optimizer.solution import Certificate, Energy, Solution
+from optimizer.targets import narrowed
+from optimizer.verify import certify
+
+
+@dataclass(frozen=True)
+class Changed:
+    """A change's outcome.
+
+    `same_motion` is the energy [J] of the base's motion on the changed arm, `certificate` whether it holds there.
+    `reoptimised` is the best motion of the changed arm; None, with the `error`, where none was found.
+    """
+
+    same_motion: Energy
+    certificate: Certificate
+    reoptimised: Solution | None
+    error: JoulepathError | None
+
+
+def changed(base: Solution, problem: Problem) -> Changed:
+    """Hold the answer `base` against `problem`, the same motion asked of a changed arm.
+
+    The changed problem is solved on its own. Where the base's motion holds on the changed arm and costs less than what
+    was found, it is solved again from that motion: re-optimising never costs more than not to. `problem.deadline` [s]
+    holds for all of it.
+    """
+    began = time.perf_counter()
+    spline, task = base.trajectory.spline, Task(problem)
+    energy = task.energy(spline)
+    asked = narrowed(problem, base.start.target, base.goal.target)
+    certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
+    try:
+        found = optimize(problem)
+    except JoulepathError as error:
+        return Changed(energy, certificate, None, error)
+    left = problem.deadline - (time.perf_counter() - began)
+    same, best = task.objective_of(energy), task.objective_of(found.energy)
+    if certificate.valid and same < best * (1 - SLACK) and left > 0:
+        with one_thread():
+            again = Run(replace(problem, deadline=left), [spline]).solution()
+        found = min(found, again, key=lambda each: task.objective_of(each.energy))
+    return Changed(energy, certificate, found, None)
