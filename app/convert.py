@@ -25,7 +25,7 @@ from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
 from optimizer.orientation import LoosePose
 from optimizer.problem import BranchFilter, Method, Problem
-from optimizer.solution import Candidate, ElectricalEnergy, Energy, Solution, StorageUse, UnreachableTarget
+from optimizer.solution import Candidate, Certificate, ElectricalEnergy, Energy, Solution, StorageUse, UnreachableTarget
 from optimizer.targets import AnyOf, Single, Target
 
 
@@ -190,7 +190,7 @@ def _per_joint(field: str, value: float | list[float] | None, nq: int) -> Array 
 
 def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
     """The answer as the contract lays it out: numbers, strings, lists, dicts, and C-contiguous arrays."""
-    trajectory, certificate = solution.trajectory, solution.certificate
+    trajectory = solution.trajectory
     return {
         "id": request_id,
         "robot": request.robot,
@@ -211,12 +211,7 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "baselines": baseline_fields(solution),
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
         "unreachable": [unreachable_fields(target) for target in solution.unreachable],
-        "certificate": {
-            "worst_ratio": certificate.worst_ratio,
-            "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
-            "goal_error": dict(zip(("position", "rotation"), certificate.goal_error, strict=True)),
-            **fields(certificate, "energy_error", "balance_error"),
-        },
+        "certificate": certificate_fields(solution.certificate),
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
     }
 
@@ -302,6 +297,16 @@ def energy_fields(energy: Energy) -> dict[str, Any]:
         "per_joint": fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
         "storage": None if energy.storage is None else fields(energy.storage, *StorageUse.__dataclass_fields__),
         **fields(energy, "peak_power", "mean_power"),
+    }
+
+
+def certificate_fields(certificate: Certificate) -> dict[str, Any]:
+    """A certificate as every answer lays it out."""
+    return {
+        "worst_ratio": certificate.worst_ratio,
+        "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
+        "goal_error": dict(zip(("position", "rotation"), certificate.goal_error, strict=True)),
+        **fields(certificate, "energy_error", "balance_error"),
     }
 
 

@@ -81,7 +81,7 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
     for operation in (operation for path in document["paths"].values() for operation in path.values()):
         if "HTTPValidationError" in str(operation["responses"].get("422", "")):
             del operation["responses"]["422"]
-    for name in ("OptimizeRequest", "CompareRequest", "ParetoRequest"):
+    for name in ("OptimizeRequest", "CompareRequest", "ParetoRequest", "WhatifRequest"):
         deadline = schemas[name]["properties"]["deadline"]
         deadline |= {"maximum": settings.max_deadline, "default": min(deadline["default"], settings.max_deadline)}
     return document

@@ -11,9 +11,9 @@ import orjson
 
 from app.convert import fields, to_problem, to_response
 from app.errors import Reply
-from app.kept import reference
+from app.kept import Shelf
 from app.schemas.pareto import ParetoRequest
-from app.tasks import answer, json_reply
+from app.tasks import answer
 from optimizer.pareto import Front, pareto
 from optimizer.solution import Solution
 
@@ -32,12 +32,12 @@ class ParetoTask:
 
     def _solve(self, deadline: float) -> Reply:
         front = pareto(to_problem(self.request, deadline), self.request.points)
-        kept = tuple(json_reply(to_response(self.request, self.request_id, point)).body for point in front.points)
-        points = [self._point(k, point) for k, point in enumerate(front.points)]
+        shelf = Shelf()
+        points = [self._point(point, shelf) for point in front.points]
         if self.wanted == "csv":
-            return Reply(200, _table(points).encode(), {"Content-Type": "text/csv; charset=utf-8"}, kept)
+            return Reply(200, _table(points).encode(), {"Content-Type": "text/csv; charset=utf-8"}, shelf.kept())
         body = orjson.dumps(self._content(front, points), option=orjson.OPT_SERIALIZE_NUMPY)
-        return Reply(200, body, kept=kept)
+        return Reply(200, body, kept=shelf.kept())
 
     def _content(self, front: Front, points: list[dict[str, Any]]) -> dict[str, Any]:
         return {
@@ -49,7 +49,7 @@ class ParetoTask:
             "solver": fields(front, "wall_time", "nlp_solves"),
         }
 
-    def _point(self, k: int, point: Solution) -> dict[str, Any]:
+    def _point(self, point: Solution, shelf: Shelf) -> dict[str, Any]:
         energy = point.energy
         totals = {"electrical": energy.electrical.total, "mechanical": energy.mechanical.total}
         return {
@@ -62,7 +62,7 @@ class ParetoTask:
             **fields(point, "lower_bound", "status"),
             "certified": point.certificate.valid,
             "worst_ratio": max(point.certificate.worst_ratio.values()),
-            "answer": reference(k),
+            "answer": shelf.add(to_response(self.request, self.request_id, point)),
         }
 
 

@@ -30,6 +30,7 @@ from app.routes import (
     robots,
     studies,
     suggest,
+    whatif,
 )
 from app.settings import Settings
 from app.store.store import Store
@@ -64,7 +65,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=lifespan,
     )
     app.state.settings = settings
-    uploads = {"/evaluate": settings.max_upload_bytes, "/studies/[^/]+/iterations": settings.max_iteration_bytes}
+    uploads = {
+        "/evaluate": settings.max_upload_bytes,
+        "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
+    }
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
     app.add_middleware(RequestContext)  # added last: the outermost
@@ -74,6 +78,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         optimize,
         compare,
         pareto,
+        whatif,
         evaluate,
         ik,
         ik_path,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import signal
 
-from app import evaluation, fronts, ik_path, tasks
+from app import evaluation, fronts, ik_path, tasks, whatif
 
-__all__ = ["evaluation", "fronts", "ik_path", "tasks"]
+__all__ = ["evaluation", "fronts", "ik_path", "tasks", "whatif"]
 
 # A service manager's SIGTERM reaches every process of the service. This one ends with its parent, and its end would be
 # the workers': they have to last until the requests in flight are answered.

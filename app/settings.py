@@ -37,7 +37,9 @@ class Settings(BaseSettings):
         default=67_108_864, ge=1024, description="Largest body of `POST /evaluate`, which goes to a file [byte]."
     )
     max_iteration_bytes: int = Field(
-        default=1 << 20, ge=1024, description="Largest body of a study's iteration, which may hold a motion [byte]."
+        default=1 << 20,
+        ge=1024,
+        description="Largest body of a study's iteration or of `POST /whatif`, which may hold a motion [byte].",
     )
     max_deadline: float = Field(default=120.0, gt=0, le=600, description="Longest deadline a caller may ask for [s].")
     deadline_grace: float = Field(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
-from optimizer.exceptions import JoulepathError
+from optimizer.exceptions import InvalidProblem, JoulepathError
 from optimizer.motion import Task
 from optimizer.optimize import SLACK, Run, one_thread, optimize
 from optimizer.problem import Problem
@@ -32,12 +32,14 @@ class Changed:
     error: JoulepathError | None
 
 
-def changed(base: Solution, problem: Problem) -> Changed:
-    """Hold the answer `base` against `problem`, the same motion asked of a changed arm.
+def whatif(base: Solution, problem: Problem) -> Changed:
+    """Hold the answer `base` against `problem`, the same motion asked of a changed arm of as many joints.
 
     The changed problem is solved on its own. Where the base's motion holds on the changed arm and costs less than what
     was found, it is solved again from that motion: re-optimising never costs more than not to. `problem.deadline` [s]
     holds for all of it.
+
+    Raises InvalidProblem where the changed problem is malformed.
     """
     began = time.perf_counter()
     spline, task = base.trajectory.spline, Task(problem)
@@ -46,12 +48,18 @@ def changed(base: Solution, problem: Problem) -> Changed:
     certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
     try:
         found = optimize(problem)
+    except InvalidProblem:
+        raise
     except JoulepathError as error:
         return Changed(energy, certificate, None, error)
     left = problem.deadline - (time.perf_counter() - began)
     same, best = task.objective_of(energy), task.objective_of(found.energy)
     if certificate.valid and same < best * (1 - SLACK) and left > 0:
-        with one_thread():
-            again = Run(replace(problem, deadline=left), [spline]).solution()
+        try:
+            with one_thread():
+                again = Run(replace(problem, deadline=left), [spline]).solution()
+        except JoulepathError:
+            # too little time was left: the first answer stands
+            return Changed(energy, certificate, found, None)
         found = min(found, again, key=lambda each: task.objective_of(each.energy))
     return Changed(energy, certificate, found, None)

@@ -14,6 +14,7 @@ from app.schemas import problems
 from app.schemas.examples import OPTIMIZE_EXAMPLES
 from app.schemas.request import MotionRequest, OptimizeRequest
 from app.schemas.response import OptimizeResponse
+from app.schemas.whatif import WhatifRequest
 from app.settings import Settings
 from app.tasks import OptimizeTask
 from optimizer.exceptions import InvalidProblem
@@ -53,7 +54,7 @@ async def optimize(
     return to_http(await unless_disconnected(request, work))
 
 
-def allowed_deadline(body: MotionRequest, most: float) -> float:
+def allowed_deadline(body: MotionRequest | WhatifRequest, most: float) -> float:
     """The request's deadline [s]. Raises InvalidProblem when the caller asks for too much."""
     if "deadline" not in body.model_fields_set:
         return min(body.deadline, most)

@@ -1,0 +1,55 @@
+"""POST /whatif."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body, Request, Response
+
+from app.documentation import problem_responses
+from app.engine import Engine
+from app.handlers import to_http
+from app.kept import keep
+from app.routes.disconnect import unless_disconnected
+from app.routes.optimize import allowed_deadline
+from app.schemas import problems
+from app.schemas.whatif import WhatifRequest, WhatifResponse
+from app.schemas.whatif_examples import WHATIF_EXAMPLES
+from app.settings import Settings
+from app.whatif import WhatifTask
+
+router = APIRouter(tags=["motion"])
+
+
+@router.post(
+    "/whatif",
+    summary="What a motion would cost on a changed arm",
+    response_model=WhatifResponse,
+    responses=problem_responses(
+        problems.Validation,
+        problems.InvalidTable,
+        problems.UnreachablePose,
+        problems.SingularPose,
+        problems.UnreachableTargets,
+        problems.OutsideLimits,
+        problems.DurationTooShort,
+        problems.TorqueInfeasible,
+        problems.NoTrajectory,
+        problems.UnknownRobot,
+        problems.BodyTooLarge,
+        problems.Busy,
+        problems.ShuttingDown,
+        problems.StoreUnavailable,
+        problems.DeadlineExceeded,
+    ),
+)
+async def whatif(request: Request, body: Annotated[WhatifRequest, Body(openapi_examples=WHATIF_EXAMPLES)]) -> Response:
+    """Asks one motion of an arm as it is and of changed ones: lighter links, another payload, other drives or limits.
+    Each change is answered twice, as a difference from the base, part by part: for the base's own motion on the changed
+    arm, and for the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""
+    settings: Settings = request.app.state.settings
+    engine: Engine = request.app.state.engine
+    task = WhatifTask(body, request.state.id)
+    reply = await unless_disconnected(request, engine.run(task, allowed_deadline(body, settings.max_deadline)))
+    kind = "evaluate" if body.optimize is None else "optimize"
+    return to_http(await keep(request.app.state.store, settings, kind, reply))
