@@ -117,7 +117,7 @@ class _Optimized(_Work):
         if isinstance(problem, OutsideLimits):
             return self.row(change, problem)
         limited = replace(problem, deadline=min(asked.deadline, share))
-        found = _located(lambda: whatif(base, limited), f"changes.{k}.arm", change)
+        found = whatif(base, limited)
         same = {
             "holds": found.certificate.valid,
             "certificate": certificate_fields(found.certificate),
@@ -125,7 +125,8 @@ class _Optimized(_Work):
             **_against(content, found.same_motion, base.duration),
         }
         if found.reoptimised is None:
-            return self.row(change, found.error, same_motion=same)
+            assert found.error is not None
+            return self.row(change, _moved(found.error, f"changes.{k}.arm", change), same_motion=same)
         return self.row(change, same_motion=same, **self._reoptimised(asked, change, content, found, found.reoptimised))
 
     def _reoptimised(
@@ -152,10 +153,7 @@ class _Evaluated(_Work):
         asked = self.request.evaluate
         assert asked is not None
         arm = _located(lambda: Arm(**arm_fields(asked)), "evaluate")
-        arms = [
-            _located(lambda: Arm(**arm_fields(_changed(asked, change))), f"changes.{k}.arm", change)
-            for k, change in enumerate(self.request.changes)
-        ]
+        arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         base = _located(lambda: self._evaluate(arm, asked), "evaluate")
         content = {
             "answer": self.shelf.add(to_evaluate_response(self.request_id, asked.robot, base)),
@@ -165,6 +163,10 @@ class _Evaluated(_Work):
         }
         rows = [self._row(asked, k, content, arm) for k, arm in enumerate(arms)]
         return self.content(asked.robot, None, content, rows)
+
+    def _arm(self, asked: EvaluateRequest, k: int) -> Arm:
+        change = self.request.changes[k]
+        return _located(lambda: Arm(**arm_fields(_changed(asked, change))), f"changes.{k}.arm", change)
 
     def _evaluate(self, arm: Arm, asked: EvaluateRequest) -> Evaluation:
         return evaluate(arm, to_motion(asked), asked.sample_period, self.share())
@@ -185,15 +187,20 @@ class _Evaluated(_Work):
 
 
 def _located(work: Callable[[], T], where: str, change: Change | None = None) -> T:
-    """What the work returns. An InvalidProblem's field is told as the request has it: under `where`, and there no
-    deeper than what the change names."""
+    """What the work returns. Raises what it raises, `_moved`."""
     try:
         return work()
-    except (OutsideLimits, InvalidTable):
-        raise  # these tell of the motion, not of a field
     except InvalidProblem as error:
-        named = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
-        raise InvalidProblem(f"{where}.{error.field}" if named else where, str(error)) from None
+        raise _moved(error, where, change) from None
+
+
+def _moved(error: Exception, where: str, change: Change | None = None) -> Exception:
+    """The error with its field told as the request has it: under `where`, and there no deeper than what the change
+    names. Those that tell of the motion, not of a field, stay as they are."""
+    if not isinstance(error, InvalidProblem) or isinstance(error, OutsideLimits | InvalidTable):
+        return error
+    named = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
+    return InvalidProblem(f"{where}.{error.field}" if named else where, str(error))
 
 
 def _changed(asked: R, change: Change) -> R:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
-from optimizer.exceptions import InvalidProblem, JoulepathError
+from optimizer.exceptions import JoulepathError
 from optimizer.motion import Task
 from optimizer.optimize import SLACK, Run, one_thread, optimize
 from optimizer.problem import Problem
@@ -38,8 +38,6 @@ def whatif(base: Solution, problem: Problem) -> Changed:
     The changed problem is solved on its own. Where the base's motion holds on the changed arm and costs less than what
     was found, it is solved again from that motion: re-optimising never costs more than not to. `problem.deadline` [s]
     holds for all of it.
-
-    Raises InvalidProblem where the changed problem is malformed.
     """
     began = time.perf_counter()
     spline, task = base.trajectory.spline, Task(problem)
@@ -48,8 +46,6 @@ def whatif(base: Solution, problem: Problem) -> Changed:
     certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
     try:
         found = optimize(problem)
-    except InvalidProblem:
-        raise
     except JoulepathError as error:
         return Changed(energy, certificate, None, error)
     left = problem.deadline - (time.perf_counter() - began)

@@ -98,8 +98,8 @@ PARETO_EXAMPLES: dict[str, Example] = {
         "summary": "A lift with a payload",
         "description": "From the fastest motion to the one of least energy.",
         "value": {
-            "start": {"q": _HOME},
-            "goal": {"q": [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]},
+            "start": {"q": [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]},
+            "goal": {"q": _HOME},
             "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
             "points": 8,
         },

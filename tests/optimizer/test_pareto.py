@@ -31,7 +31,7 @@ TIME = 60.0
 
 
 def joints() -> Problem:
-    """A lift with a payload, which haste makes dearer."""
+    """A payload set down, which haste makes dearer."""
     return problem(HOME, HOME + np.array([0.5, -1.0, 1.0, 0.5, 0.5, 0.5]), payload=PAYLOAD, deadline=TIME)
 
 
