@@ -88,7 +88,7 @@ class WhatifRequest(Request):
 
 
 class WhatifBase(Response):
-    """The motion on the arm as it is."""
+    """What the changes are compared with."""
 
     answer: str = described("Path of the whole answer, as of `POST /optimize` or `POST /evaluate`.", None, _PATH)
     status: Literal["optimal", "feasible"] | None = described(
