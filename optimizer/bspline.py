@@ -22,6 +22,8 @@ REST_POINTS = 3
 # least number of nodes that a motion's cost is summed over, and of points where its peaks are looked for
 LEAST_NODES = 31
 GRID_POINTS = 512
+# points where limits along the path are held; what goes beyond them in between is found afterwards and repaired
+PATH_POINTS = 96
 # parts into which the anchors of speed, acceleration and jerk divide a span: these have degree 4, 3 and 2 there
 ANCHORS = (2, 4, 4)
 
@@ -120,6 +122,12 @@ class Basis:
     def fit(self, samples: Array, at: Array) -> Array:
         """Points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,) in [0, 1]."""
         return fit(samples, at, self.knots)
+
+    @cached_property
+    def at_path(self) -> Array:
+        """Basis and its first derivative (2, PATH_POINTS, n) where limits along the path are held, ends apart."""
+        points = np.linspace(0.0, 1.0, PATH_POINTS + 2)[1:-1]
+        return np.stack([basis_matrix(self.knots, points, d) for d in range(2)])
 
     @cached_property
     def quintic(self) -> Array:

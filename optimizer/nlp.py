@@ -12,7 +12,7 @@ linear model of such a row is never looser than the row, so a step that holds th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -21,11 +21,14 @@ import numpy.typing as npt
 from models.robot import Array, Limits
 from optimizer.bspline import Basis
 from optimizer.kernel import Kernel
+from optimizer.path_limits import PathLimits, Shares
 
 Index = npt.NDArray[np.intp]
 
 # travel below this counts as none where a shared time law is limited by the joints' own limits [rad]
 SHORTEST_TRAVEL = 1e-12
+# step of q [rad] and v [rad/s] by which gradients of limits along the path are differenced
+DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,16 @@ class Linearisation:
     tau: Array
     jacobian: Array
     rate: Array
+
+
+@dataclass(frozen=True)
+class PathRows:
+    """Limits along the path that come near: path point and column (rows,), room left, gradients (rows, n) by x."""
+
+    points: Index
+    columns: Index
+    room: Array
+    gradients: Array
 
 
 @dataclass(frozen=True)
@@ -107,6 +120,7 @@ class Programme:
     `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it. `constant`
     [J] is a part of the cost that nothing changes: it keeps relative changes of the cost in proportion. With `leeway`
     the goal is an unknown too: the last row of the free control points, at which the motion comes to rest.
+    Every share c of `path` stays within room (c,), 1 or a little less.
     """
 
     kernel: Kernel
@@ -117,6 +131,8 @@ class Programme:
     t_max: float
     constant: float = 0.0
     leeway: Leeway | None = None
+    path: PathLimits | None = None
+    room: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def r(self) -> int:
@@ -245,3 +261,63 @@ class Programme:
     def kinematics(self, free: Array) -> Array:
         """First to third derivative of s by τ on the fine grid, (3, M, r)."""
         return self.basis.at_grid @ self.points(free)
+
+    def shares(self, free: Array, T: float) -> Array:
+        """Shares of the limits along the path at the basis' path points, (M, c); none where there are no limits."""
+        if self.path is None:
+            return np.zeros((len(self.basis.at_path[0]), 0))
+        return self.path.shares(*self._passing(free, T))
+
+    def path_rows(self, free: Array, T: float, near: float) -> PathRows:
+        """The shares that use more than `near` of their room."""
+        if self.path is None:
+            none = np.zeros(0, dtype=np.intp)
+            return PathRows(none, none, np.zeros(0), np.zeros((0, self.free_count * self.r + 1)))
+        q, v = self._passing(free, T)
+        shares: Shares = self.path.linearised(q, v)
+        k, c = np.nonzero(shares.value > near * self.room)
+        Q, V = self._state_rows(v, T, k)
+        gradients = np.einsum("rj,rjn->rn", shares.by_q[k, c], Q) + np.einsum("rj,rjn->rn", shares.by_v[k, c], V)
+        return PathRows(k, c, self.room[c] - shares.value[k, c], gradients)
+
+    def path_hessian(self, free: Array, T: float, weights: Array) -> Array:
+        """Hessian (n, n) of Σ weights · shares, weights (M, c): that of the shares by finite differences of gradients."""
+        k = np.flatnonzero(weights.any(axis=1))
+        if self.path is None or not len(k):
+            return np.zeros((self.free_count * self.r + 1,) * 2)
+        nq = self.kernel.nq
+        q, v = self._passing(free, T)
+        y = np.hstack([q[k], v[k]])
+        stepped = np.concatenate([y[None], y + DIFFERENCE * np.eye(2 * nq)[:, None]]).reshape(-1, 2 * nq)
+        shares = self.path.linearised(stepped[:, :nq], stepped[:, nq:])
+        w = np.tile(weights[k], (2 * nq + 1, 1))[..., None]
+        slopes = np.hstack([(w * shares.by_q).sum(axis=1), (w * shares.by_v).sum(axis=1)]).reshape(-1, len(k), 2 * nq)
+        bent = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
+        Y = np.concatenate(self._state_rows(v, T, k), axis=1)
+        hessian: Array = np.einsum("kim,kij,kjn->mn", Y, bent, Y, optimize=True)
+        # v = s' / T bends by itself
+        by_v, V = slopes[0][:, nq:], Y[:, nq:]
+        mixed = -np.einsum("kj,kjn->n", by_v, V)[:-1] / T
+        hessian[:-1, -1] += mixed
+        hessian[-1, :-1] += mixed
+        hessian[-1, -1] += 2 * float((by_v * v[k]).sum()) / (T * T)
+        return hessian
+
+    def _state_rows(self, v: Array, T: float, k: Index) -> tuple[Array, Array]:
+        """Gradients of q and v (rows, nq, n) at the path points k."""
+        at, rising = self._path_free[:, k]
+        P, rows = self.coordinates.directions, (len(k), self.kernel.nq, self.free_count * self.r)
+        Q = np.einsum("km,jr->kjmr", at, P).reshape(rows)
+        V = np.einsum("km,jr->kjmr", rising / T, P).reshape(rows)
+        none = np.zeros((len(k), self.kernel.nq, 1))
+        return np.concatenate([Q, none], axis=2), np.concatenate([V, -v[k][..., None] / T], axis=2)
+
+    def _passing(self, free: Array, T: float) -> tuple[Array, Array]:
+        """q and v (M, nq) at the basis' path points."""
+        s, rising = self.basis.at_path @ self.points(free)
+        return self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
+
+    @cached_property
+    def _path_free(self) -> Array:
+        """Basis and first derivative of the free control points at the path points, (2, M, m)."""
+        return np.ascontiguousarray(self.free_columns(self.basis.at_path))

@@ -23,6 +23,7 @@ from optimizer.nlp import Linearisation, Programme
 # rows enter the QP when they use more than this share of their limit
 NEAR = 0.8
 NEAR_TORQUE = 0.5
+NEAR_PATH = 0.5
 # a programme counts as feasible when no row exceeds its limit by more than this share
 FEASIBILITY = 1e-4
 # relative decrease of cost that a further step must promise
@@ -65,7 +66,7 @@ class Result:
 
 @dataclass(frozen=True)
 class _Step:
-    """A QP's answer: the step in scaled unknowns, multipliers of kinematic and torque rows and where these are."""
+    """A QP's answer: the step in scaled unknowns, multipliers of the rows and where these are."""
 
     x: Array
     soft: bool
@@ -74,6 +75,8 @@ class _Step:
     nodes: tuple[Index, Index]  # node, joint
     signs: Array
     torque: Array
+    passed: tuple[Index, Index]  # path point, limit along the path
+    path: Array
 
 
 def _peaks(size: Array) -> npt.NDArray[np.bool_]:
@@ -105,11 +108,13 @@ class _Solver:
         """Limits of the derivatives by τ, (3, r)."""
         return np.asarray(self.p.rates * (T**self.orders)[:, None])
 
-    def violations(self, kinematics: Array, T: float, tau: Array) -> Array:
-        """Worst excess per derivative and coordinate, and per joint torque, as a share of the limit, (3 r + nq,)."""
+    def violations(self, kinematics: Array, T: float, tau: Array, shares: Array) -> Array:
+        """Worst excess as a share of the limit: per derivative and coordinate, joint torque, and limit along the path,
+        (3 r + nq + c,)."""
         kin: Array = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.rates(T)
         torque = np.abs(tau).max(axis=0) / self.tau_max
-        return np.asarray(np.maximum(np.concatenate([kin.ravel(), torque]) - 1, 0.0))
+        path = shares.max(axis=0) - self.p.room + 1
+        return np.asarray(np.maximum(np.concatenate([kin.ravel(), torque, path]) - 1, 0.0))
 
     def solve(self, free: Array, T: float, multiplier: Array | None) -> Result:
         p, r = self.p, self.p.r
@@ -120,8 +125,9 @@ class _Solver:
             scale[-1] = time_scale
         line, kin = p.derivatives(free, T, multiplier), p.kinematics(free)
         cost_scale = 1.0 / max(abs(line.cost), 1e-9)
-        violation = self.violations(kin, T, line.tau)
+        violation = self.violations(kin, T, line.tau, p.shares(free, T))
         penalty = np.full(len(violation), 0.1)
+        path_multiplier = np.zeros_like(p.shares(free, T))
         curvature, stationarity, iterations = 0.0, np.inf, 0
         status: Status = "stalled"
         for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
@@ -129,7 +135,7 @@ class _Solver:
                 status = "out of time"
                 break
             g = line.gradient[: self.n] * scale * cost_scale
-            H = line.hessian * cost_scale
+            H = (line.hessian + p.path_hessian(free, T, path_multiplier)) * cost_scale
             H[-1, -1] += curvature
             H = _convex(H[: self.n, : self.n] * np.outer(scale, scale))
             step = self._qp(H, g, line, free, T, time_scale, kin / self.rates(T)[:, None, :])
@@ -140,12 +146,15 @@ class _Solver:
             # torque rows bend with the dynamics, kinematic rows with T^d: their multipliers weigh that curvature
             multiplier = np.zeros_like(multiplier)
             np.add.at(multiplier, step.nodes, step.signs * step.torque / self.tau_max[step.nodes[1]] / cost_scale)
+            path_multiplier = np.zeros_like(path_multiplier)
+            path_multiplier[step.passed] = step.path / cost_scale
             d = step.places[0]
             curvature = -float((step.kinematic * (d + 1) * d).sum()) / (T * T)
             if not step.soft:
                 need = np.zeros_like(penalty)
                 np.add.at(need, d * r + step.places[2], step.kinematic)
                 np.add.at(need, 3 * r + step.nodes[1], step.torque)
+                np.add.at(need, 3 * r + p.kernel.nq + step.passed[1], step.path)
                 penalty = np.maximum(penalty, 2.0 * need)
             Hdx = H @ dx
             slope = float(g @ dx)
@@ -164,7 +173,7 @@ class _Solver:
                 trial_T = min(max(trial_T, p.t_min), p.t_max)  # rounding must not leave the bounds
                 trial_cost, trial_tau = p.value(trial, trial_T)
                 trial_kin = p.kinematics(trial)
-                trial_violation = self.violations(trial_kin, trial_T, trial_tau)
+                trial_violation = self.violations(trial_kin, trial_T, trial_tau, p.shares(trial, trial_T))
                 if trial_cost * cost_scale + float(penalty @ trial_violation) <= merit + 1e-4 * alpha * descent + 1e-12:
                     break
                 alpha *= 0.5
@@ -226,6 +235,9 @@ class _Solver:
         self, H: Array, g: Array, line: Linearisation, free: Array, T: float, time_scale: float, ratio: Array
     ) -> _Step | None:
         k, j, torque_sign, A_torque, b_torque = self._torque_rows(line, T, time_scale)
+        path_rows = self.p.path_rows(free, T, NEAR_PATH)
+        A_path = path_rows.gradients
+        A_path[:, -1] *= time_scale
         lower, upper = self._bounds(free, T, time_scale)
         size = np.abs(ratio)
         chosen = (size > NEAR) & (self.anchors | _peaks(size)) | self.active
@@ -235,10 +247,13 @@ class _Solver:
         # unknowns and the goal's rows come first, and never give way
         hard = self.n + len(A_goal)
         equal = self.n + np.flatnonzero(least_goal == most_goal)
-        A = np.concatenate([A_goal, A_torque, self._kinematic_rows(places, sign, T, time_scale)])
-        b = np.concatenate([b_torque, 1 - size[places]])
+        A = np.concatenate(
+            [A_goal, A_path[:, : self.n], A_torque, self._kinematic_rows(places, sign, T, time_scale)]
+        )
+        b = np.concatenate([path_rows.room, b_torque, 1 - size[places]])
+        before = len(path_rows.room) + len(k)
         soft = False
-        working = np.concatenate([np.zeros(hard + len(k), dtype=bool), self.active[places]])
+        working = np.concatenate([np.zeros(hard + before, dtype=bool), self.active[places]])
         for attempt in range(QP_ROUNDS):
             sense = np.zeros(hard + len(b), dtype=np.int32)
             if soft:
@@ -274,11 +289,11 @@ class _Solver:
             places = tuple(np.concatenate(both) for both in zip(places, fresh, strict=True))  # type: ignore[assignment]
             sign = np.concatenate([sign, fresh_sign])
         mu = np.maximum(info["lam"][hard:], 0.0)
-        torque, kinematic = mu[: len(k)], mu[len(k) :]
+        path, torque, kinematic = np.split(mu, [len(path_rows.room), before])
         self.active[...] = False
         held = kinematic > 0
         self.active[tuple(place[held] for place in places)] = True
-        return _Step(x, soft, places, kinematic, (k, j), torque_sign, torque)
+        return _Step(x, soft, places, kinematic, (k, j), torque_sign, torque, (path_rows.points, path_rows.columns), path)
 
 
 def _convex(H: Array) -> Array:
