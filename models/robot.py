@@ -155,6 +155,19 @@ class Robot:
         return link_names(self.model)
 
     @property
+    def T_last_flange(self) -> Array:
+        """Pose (4, 4) of the flange in the frame of the last link."""
+        return np.asarray(self.model.frames[self.model.getFrameId("flange")].placement.homogeneous)
+
+    @property
+    def elbow(self) -> LinkCapsule | None:
+        """The capsule around the elbow, the outermost of the upper arm's; None where no joint is named elbow."""
+        if "elbow_joint" not in self.joint_names:
+            return None
+        link = self.joint_names.index("elbow_joint")
+        return next((capsule for capsule in reversed(self.capsules) if capsule.link == link), None)
+
+    @property
     def friction(self) -> FrictionLaw:
         """The default friction law."""
         return next(iter(self.friction_laws.values()))

@@ -12,8 +12,11 @@ from models.registry import load_robot
 from models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from optimizer.bus import Bus
 from optimizer.exceptions import InvalidProblem, OutsideLimits
+from optimizer.path_limits import Cone, PathLimit, PointSpeed
 from optimizer.scene import Attachment, Scene
 
+# a limit on speed below this [m/s] would leave motions that last longer than any answer may
+LEAST_SPEED = 1e-3
 LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
 # most shapes that a tool is made of
 MOST_PARTS = 16
@@ -110,8 +113,9 @@ class Arm:
     `limits` replaces the robot's limits and may only tighten them. `gravity` (3,) [m/s²] is in the base frame.
     `friction` names one of the robot's friction laws (None: its default). `inverter` replaces figures of the robot's
     inverters, `bus` says where surplus power goes, `link_mass_scale` (nq,), or one number, multiplies mass and inertia
-    of every moving link, payload apart. `tool` is what the flange bears, for collisions
-    only, and `scene` what stands around the arm.
+    of every moving link, payload apart. `tool` is what the flange bears, for collisions only, and `scene` what stands
+    around the arm; with `collisions` false nothing is compared. `tool_cone` holds an axis of the tool near a direction,
+    `tcp_speed` and `elbow_speed` [m/s] limit how fast these points move.
 
     Raises InvalidProblem, with the field named, when the parts do not fit together.
     """
@@ -127,6 +131,10 @@ class Arm:
     link_mass_scale: Array = field(default_factory=lambda: np.array(1.0))
     tool: Sequence[Attachment] = ()
     scene: Scene = field(default_factory=Scene)
+    collisions: bool = True
+    tool_cone: Cone | None = None
+    tcp_speed: float | None = None
+    elbow_speed: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_flange_tcp", Pose(self.T_flange_tcp).T)
@@ -136,6 +144,12 @@ class Arm:
         if len(self.tool) > MOST_PARTS:
             raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_PARTS} capsules.")
         self._check_limits()
+        for name in ("tcp_speed", "elbow_speed"):
+            speed = getattr(self, name)
+            if speed is not None and not LEAST_SPEED <= speed < np.inf:
+                raise InvalidProblem(f"limits.{name}", f"limits.{name} must be at least {LEAST_SPEED:g} m/s.")
+        if self.elbow_speed is not None and self.robot.elbow is None:
+            raise InvalidProblem("limits.elbow_speed", "This robot has no elbow: leave limits.elbow_speed out.")
         if self.friction is not None and self.friction not in self.robot.friction_laws:
             known = ", ".join(self.robot.friction_laws)
             raise InvalidProblem("friction", f"There is no friction law of that name: use one of {known}.")
@@ -178,6 +192,20 @@ class Arm:
         if self.bus.mode == "recuperating":
             return self.bus.efficiency
         return 0.0 if self.bus.mode == "isolated" else self.robot.electronics.regeneration
+
+    @property
+    def path_limits(self) -> list[PathLimit]:
+        """Limits on where the tool points and how fast TCP and elbow move."""
+        limits: list[PathLimit] = []
+        last = self.robot.nq
+        T_last_tcp = self.robot.T_last_flange @ self.T_flange_tcp
+        if self.tool_cone is not None:
+            limits.append(self.tool_cone.seen_from(T_last_tcp[:3, :3]))
+        if self.tcp_speed is not None:
+            limits.append(PointSpeed("tcp_speed", last, T_last_tcp[None, :3, 3], self.tcp_speed))
+        if self.elbow_speed is not None and self.robot.elbow is not None:
+            limits.append(PointSpeed("elbow_speed", self.robot.elbow.link, self.robot.elbow.axis, self.elbow_speed))
+        return limits
 
     def loaded_model(self) -> pin.Model:
         """Pinocchio model with payload, gravity and the links' masses scaled."""

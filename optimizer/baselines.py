@@ -88,11 +88,13 @@ def baselines(
     ours: float,
     torques: Torques,
     potential: Callable[[Array], float],
+    keeps_path: Callable[[Array, Array], bool],
 ) -> list[Baseline]:
     """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the position limits.
 
     `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
-    (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J].
+    (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J]; `keeps_path`
+    says of samples q, v (k, nq) whether they hit nothing and hold the limits along the path.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks
@@ -113,7 +115,7 @@ def baselines(
                 duration=motion.duration,
                 electrical=energy.electrical.total,
                 mechanical=energy.mechanical.total,
-                within_limits=within_limits(problem, motion, tau),
+                within_limits=within_limits(problem, motion, tau) and keeps_path(motion.q, motion.v),
                 saving=saving(ours, theirs),
             )
         )

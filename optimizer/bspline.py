@@ -127,7 +127,11 @@ class Basis:
     def at_path(self) -> Array:
         """Basis and its first derivative (2, PATH_POINTS, n) where limits along the path are held, ends apart."""
         points = np.linspace(0.0, 1.0, PATH_POINTS + 2)[1:-1]
-        return np.stack([basis_matrix(self.knots, points, d) for d in range(2)])
+        return np.stack([self.matrix(points, d) for d in range(2)])
+
+    def matrix(self, points: Array, derivative: int = 0) -> Array:
+        """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+        return basis_matrix(self.knots, points, derivative)
 
     @cached_property
     def quintic(self) -> Array:

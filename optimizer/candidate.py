@@ -18,14 +18,15 @@ from optimizer.bounds import LONGEST_DURATION
 from optimizer.bspline import Basis
 from optimizer.motion import Task, fine_samples, peak_rates, sample, slowed, spline_of, stretch
 from optimizer.nlp import Coordinates, Programme
-from optimizer.solution import BaselineName, Spline
+from optimizer.path_limits import PathLimits
+from optimizer.solution import BaselineName, Clearance, Spline
 from optimizer.solve import FEASIBILITY, solve
 from optimizer.windows import Window, windows
 
 # the solver works within limits tightened by this share, so that its own tolerance does not break the real ones
 MARGIN = 2 * FEASIBILITY
 # times that limits are tightened where the motion breaks them between the nodes, and by how much beyond the excess
-REPAIRS = 6
+REPAIRS = 8
 REPAIR_MARGIN = 2e-4
 # torque is tightened by this multiple of its excess: the peak that is held down between two nodes comes up beside them
 TORQUE_REPAIR = 1.5
@@ -35,6 +36,8 @@ MOST_STRETCH = 1 + 5e-4
 STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # points per knot span at which torque is checked between the nodes
 TORQUE_POINTS = 4
+# samples of a motion at which limits along its path are looked at, and by which multiple of an excess they are tightened
+PATH_SAMPLES, PATH_REPAIR = 401, 1.5
 # samples of a motion that another is fitted to
 FIT_SAMPLES = 201
 
@@ -43,7 +46,8 @@ FIT_SAMPLES = 201
 class Attempt:
     """What came of a candidate: the spline if it is solved, and what was spent on it.
 
-    `iterations` are the method's own: of the SQP, generations, or energies evaluated.
+    `iterations` are the method's own: of the SQP, generations, or energies evaluated. `hit` is what the best motion
+    found runs into, where it does.
     """
 
     status: Literal["solved", "infeasible", "failed", "out of time"]
@@ -52,6 +56,7 @@ class Attempt:
     solves: int = 0
     spline: Spline | None = None
     stationarity: float | None = None
+    hit: Clearance | None = None
 
 
 @dataclass(frozen=True)
@@ -119,11 +124,14 @@ class Programmed(Solver):
     def improve(self, guess: Guess) -> Attempt:
         """Optimise from a guess, tightening the limits where the motion breaks them between the nodes."""
         window, kernel = self.window, self.task.kernel
-        programme = Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant)
+        programme = self._watched(
+            Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant),
+            self.task.path,
+        )
         limits = self.task.problem.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
         duration = self._first_duration(programme, free, guess.duration)
-        iterations, multiplier = 0, None
+        iterations, multiplier, hit = 0, None, None
         for solves in range(1, REPAIRS + 1):
             result = solve(programme, free, duration, multiplier, self.deadline)
             iterations += result.iterations
@@ -131,20 +139,40 @@ class Programmed(Solver):
                 return Attempt("out of time", "the deadline passed", iterations, solves)
             if result.violation > FEASIBILITY:
                 reason = f"found no motion of {guess.space.n} control points that holds the limits"
-                return Attempt("failed", reason, iterations, solves)
+                return Attempt("failed", reason if hit is None else f"found no way around: {hit.words}", iterations, solves, hit=hit)
             spline = spline_of(guess.space, programme.joint_points(result.free), result.duration)
             excess = self._excess(spline)
             if excess is not None:
                 spline = self._stretched(spline, excess)
                 excess = self._excess(spline)
-            if excess is None:
+            hit, beyond = self.task.hit(spline), self._beyond(spline, programme.path)
+            if excess is None and hit is None and not beyond.any():
                 return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)
-            limits = _tightened(limits, excess)
-            programme = replace(programme, coordinates=self._coordinates(limits))
+            if excess is not None:
+                limits = _tightened(limits, excess)
+                programme = replace(programme, coordinates=self._coordinates(limits))
+            if hit is not None and programme.path is not self.task.guarded:
+                # only now, since most motions hit nothing
+                programme = self._watched(programme, self.task.guarded)
+            else:
+                programme = replace(programme, room=programme.room - beyond)
             # the solver takes no step for positions alone: it bounds them
             free = np.clip(result.free, programme.limits.q_min, programme.limits.q_max)
             duration, multiplier = result.duration, result.multiplier
-        return Attempt("failed", "limits stay broken between the nodes", iterations, REPAIRS)
+        reason = "limits stay broken between the nodes" if hit is None else f"found no way around: {hit.words}"
+        return Attempt("failed", reason, iterations, REPAIRS, hit=hit)
+
+    def _watched(self, programme: Programme, path: PathLimits | None) -> Programme:
+        """The programme with limits along the path."""
+        return programme if path is None else replace(programme, path=path, room=np.full(len(path.names), 1 - MARGIN))
+
+    def _beyond(self, spline: Spline, path: PathLimits | None) -> Array:
+        """By how much each share of the limits along the path must shrink, (c,): they are broken between the points."""
+        if path is None:
+            return np.zeros(0)
+        q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
+        beyond = path.shares(q, v).max(axis=0) - 1
+        return np.where(beyond > -REPAIR_MARGIN / 4, PATH_REPAIR * np.maximum(beyond, 0.0) + REPAIR_MARGIN, 0.0)
 
     def _coordinates(self, limits: Limits) -> Coordinates:
         """What the space describes: every joint by itself."""

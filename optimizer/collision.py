@@ -292,7 +292,7 @@ class CollisionModel:
 def _bodies(arm: Arm) -> tuple[Body, ...]:
     """The robot's capsules, then what it carries, then what surrounds it."""
     robot, last = arm.robot, arm.robot.nq
-    T_last_flange = robot.model.frames[robot.model.getFrameId("flange")].placement.homogeneous
+    T_last_flange = robot.T_last_flange
     links = [
         Body(robot.link_names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
         for capsule in robot.capsules

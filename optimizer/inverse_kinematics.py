@@ -54,7 +54,7 @@ class InverseKinematics:
         self._limits = robot.limits
         self._closed_form = ClosedForm.of(robot.model)
         self._placements = joint_placements(robot.model)
-        self._T_last_flange = robot.model.frames[robot.model.getFrameId("flange")].placement.homogeneous
+        self._T_last_flange = robot.T_last_flange
 
     def label(self, q: Array) -> Label:
         """The branch of a configuration q (nq,). A full turn of a joint does not change it."""

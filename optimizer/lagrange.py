@@ -46,6 +46,10 @@ class PolynomialBasis(Basis):
         result[:REST_POINTS], result[-REST_POINTS:] = points[0], points[-1]
         return np.asarray(result)
 
+    def matrix(self, points: Array, derivative: int = 0) -> Array:
+        """Values (k, n) of the cardinal functions' derivative."""
+        return cardinals(self.knots, self.bernstein, points, derivative)
+
     def fit(self, samples: Array, at: Array) -> Array:
         """Points (m + 2, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1], ends exactly."""
         points = np.zeros((self.n, samples.shape[1]))

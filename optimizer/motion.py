@@ -14,11 +14,16 @@ from models.robot import Array, FrictionLaw
 from optimizer import bspline
 from optimizer.arm import Arm
 from optimizer.bus import charges, drawn_at
+from optimizer.clearance import clearance
+from optimizer.collision import CollisionModel, Contact
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown, power_flow
+from optimizer.keep_away import KeepAway
 from optimizer.kernel import Kernel, Parameters, kernel_for
+from optimizer.kinematics import joint_placements
+from optimizer.path_limits import PathLimits
 from optimizer.problem import Problem
-from optimizer.solution import Energy, Spline, Trajectory
+from optimizer.solution import Clearance, Energy, Spline, Trajectory
 
 # smoothing that the optimiser works with: friction's reversal [rad/s] and the corners of |power| [W]
 KNEE = 0.02
@@ -30,6 +35,8 @@ REPORT_NODES = 8
 LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 # points per knot span at which peaks of speed, acceleration and jerk are looked for
 RATE_POINTS = 33
+# samples of a motion at which contact is looked for where no proof is asked, and rounding of a share of a limit
+CONTACT_SAMPLES, SHARE_TOLERANCE = 200, 1e-6
 
 
 @dataclass(frozen=True)
@@ -167,6 +174,46 @@ class Task(Plant):
     def objective_parameters(self) -> Array:
         """Parameters of the problem's objective."""
         return self.parameters(**{self.problem.objective: 1.0})
+
+    @cached_property
+    def path(self) -> PathLimits | None:
+        """Limits along the path but for clearance, None where there are none."""
+        limits = self.problem.path_limits
+        return PathLimits(self._placements, limits) if limits else None
+
+    @cached_property
+    def guarded(self) -> PathLimits:
+        """Limits along the path, clearance too."""
+        return PathLimits(self._placements, [*self.problem.path_limits, KeepAway(self.collisions)])
+
+    @cached_property
+    def collisions(self) -> CollisionModel:
+        """What can hit what."""
+        return CollisionModel(self.problem)
+
+    @cached_property
+    def _placements(self) -> Array:
+        return joint_placements(self.problem.robot.model)
+
+    def contact(self, q: Array) -> Contact | None:
+        """What is nearest at q (nq,); None where nothing is compared."""
+        return self.collisions.contact(q) if self.problem.collisions else None
+
+    def hit(self, spline: Spline) -> Clearance | None:
+        """Where the motion comes nearest, if it is not proven to keep its margins there."""
+        if not self.problem.collisions:
+            return None
+        found = clearance(self.collisions, spline)
+        return found if found is not None and found.min_clearance < 0 else None
+
+    def keeps_path(self, q: Array, v: Array) -> bool:
+        """Whether samples q, v (k, nq) hold the limits along the path and, as far as samples tell, hit nothing."""
+        if self.path is not None and (self.path.shares(q, v) > 1 + SHARE_TOLERANCE).any():
+            return False
+        if not self.problem.collisions:
+            return True
+        few = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
+        return bool((self.collisions.distances(few, within=0.0)[0] >= 0).all())
 
     @cached_property
     def fastest_parameters(self) -> Array:

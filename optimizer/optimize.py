@@ -310,7 +310,8 @@ class Run:
         assert best.energy is not None
         q_goals = np.array([e.q_goal for e in self.entries if (e.q_start == best.q_start).all()])
         task = self.task
-        table = baselines(self.problem, best.q_start, q_goals, best.duration, best.energy, task.torques, task.potential)
+        oracle = task.torques, task.potential, task.keeps_path
+        table = baselines(self.problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
         return table, nearest(self.problem, best.q_start, q_goals)
 
     def adopt(self, entry: Entry, better: list[BaselineName]) -> None:

@@ -6,19 +6,21 @@ Each gives shares for configurations and speeds: 1 is on the limit, more breaks 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.arm import Arm
+from optimizer.exceptions import InvalidProblem
 from optimizer.jacobians import direction_jacobian, point_jacobian, velocity_gradient
-from optimizer.kinematics import joint_placements, link_frames
+from optimizer.kinematics import link_frames
 
 # below this a direction's deviation [rad] or a point's speed [m/s] has no gradient to speak of
 _AT_REST = 1e-9
+# a direction given shorter than this is none; a narrower cone than this [rad] cannot be kept in double precision
+LEAST_LENGTH, LEAST_HALF_ANGLE = 1e-6, 1e-3
 
 
 class Shares(NamedTuple):
@@ -48,15 +50,33 @@ class PathLimit(Protocol):
 
 @dataclass(frozen=True)
 class Cone:
-    """The tool's `axis` (3,), a unit vector in the frame of the last link, stays within `half_angle` [rad] of
-    `direction` (3,), a unit vector in the base frame. Its share is the angle between them over the half angle.
+    """The tool's `axis` (3,) stays within `half_angle` [rad] of `direction` (3,) in the base frame.
+
+    The axis is given in the TCP's frame, and looked at from the last link's (`seen_from`). Both are made unit vectors.
+    The share is the angle between them over the half angle. Raises InvalidProblem.
     """
 
     axis: Array
     direction: Array
     half_angle: float
 
-    names = ("tool_cone",)
+    names: ClassVar[tuple[str, ...]] = ("tool_cone",)
+
+    def __post_init__(self) -> None:
+        for name in ("axis", "direction"):
+            vector = np.array(getattr(self, name), dtype=float)
+            length = float(np.linalg.norm(vector)) if vector.shape == (3,) else 0.0
+            if not (np.isfinite(length) and length > LEAST_LENGTH):
+                raise InvalidProblem(f"tool_cone.{name}", f"tool_cone.{name} must be three numbers, not all zero.")
+            object.__setattr__(self, name, vector / length)
+        if not LEAST_HALF_ANGLE <= self.half_angle <= np.pi:
+            raise InvalidProblem(
+                "tool_cone.half_angle", f"tool_cone.half_angle must be between {LEAST_HALF_ANGLE} and pi rad."
+            )
+
+    def seen_from(self, R: Array) -> Cone:
+        """The cone with its axis in another frame, in which R (3, 3) turns it."""
+        return replace(self, axis=R @ self.axis)
 
     def shares(self, frames: Array, q: Array, v: Array) -> Array:
         """Shares (n, 1)."""
@@ -114,15 +134,10 @@ class PointSpeed:
 
 @dataclass(frozen=True)
 class PathLimits:
-    """All limits along the path of one arm."""
+    """All limits along the path of one arm whose joints are mounted at `placements` (nq, 4, 4)."""
 
     placements: Array
     limits: Sequence[PathLimit]
-
-    @staticmethod
-    def of(arm: Arm, limits: Sequence[PathLimit]) -> PathLimits:
-        """The limits of an arm."""
-        return PathLimits(joint_placements(arm.robot.model), tuple(limits))
 
     @cached_property
     def names(self) -> tuple[str, ...]:

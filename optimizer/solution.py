@@ -176,10 +176,32 @@ class Baseline:
 
 
 @dataclass(frozen=True)
+class Clearance:
+    """How far a motion keeps away from what it could hit, the margins asked for taken off [m].
+
+    `min_clearance` is proven for every instant; `sampled` is the least distance met, of `pair` at `time` [s]: the truth
+    lies between the two. Below zero they overlap.
+    """
+
+    min_clearance: float
+    sampled: float
+    pair: tuple[str, str]
+    time: float
+
+    @property
+    def words(self) -> str:
+        """What comes too near what."""
+        first, second = self.pair
+        return f"{first} and {second} are {max(-self.sampled, 0.0):.4f} m nearer each other than they may be"
+
+
+@dataclass(frozen=True)
 class Certificate:
     """The answer recomputed by Pinocchio on a 1 ms grid, apart from the solver.
 
-    `worst_ratio` maps position, velocity, acceleration, jerk, torque to the worst value / limit. `start_error` and
+    `worst_ratio` maps position, velocity, acceleration, jerk, torque, and of tool_cone, tcp_speed and elbow_speed those
+    that are limited, to the worst value / limit. `clearance` is proven over continuous time, None where nothing is
+    compared. `start_error` and
     `goal_error` are (position [m], rotation [rad]) of the TCP against the pose asked for (or the forward kinematics
     of the joints asked for). `rest_error` is the worst |v| / v_max and |a| / a_max at the two ends.
     `energy_error` is |fine quadrature - reported| / reported, `balance_error` |sum of parts - total| / total.
@@ -191,6 +213,7 @@ class Certificate:
     rest_error: float
     energy_error: float
     balance_error: float
+    clearance: Clearance | None
 
     RATIO_TOLERANCE = 1e-6
     POSITION_TOLERANCE = 1e-6
@@ -207,21 +230,8 @@ class Certificate:
             and self.rest_error <= self.REST_TOLERANCE
             and self.energy_error <= self.ENERGY_TOLERANCE
             and self.balance_error <= self.ENERGY_TOLERANCE
+            and (self.clearance is None or self.clearance.min_clearance >= 0)
         )
-
-
-@dataclass(frozen=True)
-class Clearance:
-    """How far a motion keeps away from what it could hit, the margins asked for taken off [m].
-
-    `min_clearance` is proven for every instant; `sampled` is the least distance met, of `pair` at `time` [s]: the truth
-    lies between the two. Below zero they overlap.
-    """
-
-    min_clearance: float
-    sampled: float
-    pair: tuple[str, str]
-    time: float
 
 
 @dataclass(frozen=True)

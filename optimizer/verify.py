@@ -13,6 +13,8 @@ from scipy.interpolate import BSpline
 
 from models.robot import Array, Limits
 from optimizer.arm import Pose
+from optimizer.clearance import clearance
+from optimizer.collision import CollisionModel
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown
 from optimizer.orientation import LoosePose
@@ -55,7 +57,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         energy = energy.with_dwell(problem.cycle.dwell(problem, hold, spline.duration))
     limits = problem.active_limits
     return Certificate(
-        worst_ratio=limit_ratios(limits, q, v, a, jerk, tau_motor),
+        worst_ratio=limit_ratios(limits, q, v, a, jerk, tau_motor) | _path_ratios(problem, model, data, q, v),
         start_error=_end_error(problem, single(problem.start), q_start, q[0], model, data),
         goal_error=_end_error(problem, single(problem.goal), q_goal, q[-1], model, data),
         rest_error=float(np.max([np.abs(v[[0, -1]]) / limits.v_max, np.abs(a[[0, -1]]) / limits.a_max])),
@@ -66,6 +68,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         balance_error=_worst(
             *(_relative(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
         ),
+        clearance=clearance(CollisionModel(problem), spline) if problem.collisions else None,
     )
 
 
@@ -88,6 +91,36 @@ def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor:
         "jerk": np.abs(jerk) / limits.j_max,
         "torque": np.abs(tau_motor) / limits.tau_max,
     }
+
+
+def _path_ratios(problem: Problem, model: pin.Model, data: pin.Data, q: Array, v: Array) -> dict[str, float]:
+    """The worst value / limit of where the tool points and how fast TCP and elbow move, of those that are limited."""
+    cone, elbow = problem.tool_cone, problem.robot.elbow
+    values: dict[str, list[float]] = {}
+    limited = [name for name in ("tool_cone", "tcp_speed", "elbow_speed") if getattr(problem, name) is not None]
+    if not limited:
+        return {}
+    for q_k, v_k in zip(q, v, strict=True):
+        pin.forwardKinematics(model, data, q_k, v_k)
+        T_base_tcp = data.oMi[model.njoints - 1].homogeneous @ problem.robot.T_last_flange @ problem.T_flange_tcp
+        if cone is not None:
+            pointing = T_base_tcp[:3, :3] @ cone.axis
+            angle = math.atan2(float(np.linalg.norm(np.cross(pointing, cone.direction))), pointing @ cone.direction)
+            values.setdefault("tool_cone", []).append(angle / cone.half_angle)
+        if problem.tcp_speed is not None:
+            speed = _speed(data, model.njoints - 1, T_base_tcp[:3, 3])
+            values.setdefault("tcp_speed", []).append(speed / problem.tcp_speed)
+        if problem.elbow_speed is not None and elbow is not None:
+            points = elbow.axis @ data.oMi[elbow.link].rotation.T + data.oMi[elbow.link].translation
+            speed = max(_speed(data, elbow.link, point) for point in points)
+            values.setdefault("elbow_speed", []).append(speed / problem.elbow_speed)
+    return {name: float(np.max(each)) for name, each in values.items()}
+
+
+def _speed(data: pin.Data, joint: int, x: Array) -> float:
+    """Speed [m/s] of a point at x (3,) in the base frame that a joint's link carries."""
+    motion = data.oMi[joint].act(data.v[joint])
+    return float(np.linalg.norm(motion.linear + np.cross(motion.angular, x)))
 
 
 def grid(duration: float) -> Array:

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from models.robot import Limits
 from optimizer import bspline, profile, shortest_line
+from optimizer.baselines import quintic_spline
 from optimizer.candidate import Attempt, Guess
 from optimizer.methods.free_spline import COARSE, EXACT, FreeSpline
 from optimizer.nlp import Coordinates
@@ -24,6 +25,9 @@ class TimeScaling(FreeSpline):
 
     def solve(self) -> Attempt:
         """From toppra's law on."""
+        hit = self.task.hit(quintic_spline(self.q_start, self.q_goal, 1.0))
+        if hit is not None:
+            return Attempt("infeasible", f"on the straight line, {hit.words}", hit=hit)
         law = shortest_line.shortest_law(self.task, self.q_start, self.q_goal)
         if law is None:
             return Attempt("infeasible", "the straight line needs more torque than the joints have")

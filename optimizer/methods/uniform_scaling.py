@@ -39,6 +39,7 @@ class UniformScaling(Solver):
         super().__init__(task, q_start, q_goal, deadline, window)
         self.given = time_optimal_spline(task.problem.active_limits, q_start, q_goal)
         q, self._v, a = sample(self.given, grid(self.given.duration))
+        self._q = q
         still = np.zeros_like(q)
         # rigid-body torque is that of holding still plus a part quadratic in speed: a factor divides that by its square
         self._holding = task.torques(q, still, still)
@@ -48,6 +49,9 @@ class UniformScaling(Solver):
     def solve(self) -> Attempt:
         """The factor of least energy (or the least factor, in haste) at which limits, torque and duration hold."""
         limits, length = self.task.problem.active_limits, self.given.duration
+        hit = self.task.hit(self.given)
+        if hit is not None:
+            return Attempt("infeasible", f"the given motion hits something: {hit.words}", hit=hit)
         needed = stretch(peak_rates(self.given) / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD))
         least, most = max(needed, self.t_min / length), self.t_max / length
         if least > most:
@@ -76,10 +80,12 @@ class UniformScaling(Solver):
         return replace(self.given, knots=self.given.knots / self.given.duration * duration)
 
     def _cost(self, factor: float) -> float:
-        """What is minimised; infinite where torque breaks its limit."""
+        """What is minimised; infinite where torque, or a limit along the path, is broken."""
         self._evaluations += 1
         tau = self._holding + self._moving / factor**2 + self.task.friction.torque(self._v / factor)
         if (np.abs(tau) > self.task.problem.active_limits.tau_max * TORQUE_HELD).any():
+            return np.inf
+        if self.task.path is not None and (self.task.path.shares(self._q, self._v / factor) > TORQUE_HELD).any():
             return np.inf
         spline = self._slowed(factor)
         return spline.duration if self.window.hurried else self.task.objective_of(self.task.energy(spline))

@@ -56,14 +56,15 @@ def limits(**given: float | list[float] | Array) -> Limits:
     return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
 
 
-def oracle(task: Problem) -> tuple[Callable[[Array, Array, Array], Array], Callable[[Array], float]]:
-    """Torques and potential energy by Pinocchio."""
+def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Callable[[Array, Array], bool]]:
+    """Torques and potential energy by Pinocchio, and a path without limits."""
     load = task.payload
     model = task.robot.loaded_model(load.mass, load.com, load.inertia, task.gravity)
     data = model.createData()
     return (
         lambda q, v, a: np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]),
         lambda q: float(pin.computePotentialEnergy(model, data, q)),
+        lambda q, v: True,
     )
 
 

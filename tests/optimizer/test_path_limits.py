@@ -6,10 +6,11 @@ import pytest
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer.arm import Arm
+from optimizer.kinematics import joint_placements
 from optimizer.path_limits import Cone, PathLimits, PointSpeed
 
 ROBOT = load_robot("ur5e")
+PLACEMENTS = joint_placements(ROBOT.model)
 AXIS, DIRECTION = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.28, -0.96])
 POINTS = np.array([[0.05, -0.02, 0.2], [0.0, 0.1, 0.0]])
 LIMITS = {
@@ -30,7 +31,7 @@ def states() -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_gradients_are_those_of_finite_differences(name: str, states: tuple[Array, Array]) -> None:
-    path = PathLimits.of(Arm(), [LIMITS[name]])
+    path = PathLimits(PLACEMENTS, [LIMITS[name]])
     q, v = states
     found = path.linearised(q, v)
     np.testing.assert_array_equal(found.value, path.shares(q, v))
@@ -43,7 +44,7 @@ def test_gradients_are_those_of_finite_differences(name: str, states: tuple[Arra
 
 
 def test_shares_are_what_pinocchio_says(states: tuple[Array, Array]) -> None:
-    path = PathLimits.of(Arm(), list(LIMITS.values()))
+    path = PathLimits(PLACEMENTS, list(LIMITS.values()))
     assert path.names == ("tool_cone", "tcp_speed", "tcp_speed", "elbow_speed")
     data = ROBOT.model.createData()
     for q, v, shares in zip(*states, path.shares(*states), strict=True):
@@ -61,7 +62,7 @@ def speed_of(data: pin.Data, joint: int, point: Array) -> float:
 
 
 def test_a_tool_along_the_cones_axis_uses_nothing_of_it() -> None:
-    path = PathLimits.of(Arm(), [Cone(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), 0.1)])
+    path = PathLimits(PLACEMENTS, [Cone(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), 0.1)])
     q = np.array([[0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]])
     found = path.linearised(q, np.zeros((1, 6)))
     # the sum of rounding of six turns
