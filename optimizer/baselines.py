@@ -93,8 +93,8 @@ def baselines(
     """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the position limits.
 
     `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
-    (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J]; `keeps_path`
-    says of samples q, v (k, nq) whether they hit nothing and hold the limits along the path.
+    (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
+    `keeps_path` says of samples q, v (k, nq) whether they hit nothing and hold the limits along the path.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks

@@ -36,7 +36,7 @@ MOST_STRETCH = 1 + 5e-4
 STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # points per knot span at which torque is checked between the nodes
 TORQUE_POINTS = 4
-# samples of a motion at which limits along its path are looked at, and by which multiple of an excess they are tightened
+# samples at which limits along the path are looked at, and the multiple of an excess by which they are tightened
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
 # samples of a motion that another is fitted to
 FIT_SAMPLES = 201
@@ -139,7 +139,8 @@ class Programmed(Solver):
                 return Attempt("out of time", "the deadline passed", iterations, solves)
             if result.violation > FEASIBILITY:
                 reason = f"found no motion of {guess.space.n} control points that holds the limits"
-                return Attempt("failed", reason if hit is None else f"found no way around: {hit.words}", iterations, solves, hit=hit)
+                reason = reason if hit is None else f"found no way around: {hit.words}"
+                return Attempt("failed", reason, iterations, solves, hit=hit)
             spline = spline_of(guess.space, programme.joint_points(result.free), result.duration)
             excess = self._excess(spline)
             if excess is not None:

@@ -15,7 +15,7 @@ from optimizer import bspline
 from optimizer.arm import Arm
 from optimizer.bus import charges, drawn_at
 from optimizer.clearance import clearance
-from optimizer.collision import CollisionModel, Contact
+from optimizer.collision import CollisionModel
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown, power_flow
 from optimizer.keep_away import KeepAway
@@ -194,10 +194,6 @@ class Task(Plant):
     @cached_property
     def _placements(self) -> Array:
         return joint_placements(self.problem.robot.model)
-
-    def contact(self, q: Array) -> Contact | None:
-        """What is nearest at q (nq,); None where nothing is compared."""
-        return self.collisions.contact(q) if self.problem.collisions else None
 
     def hit(self, spline: Spline) -> Clearance | None:
         """Where the motion comes nearest, if it is not proven to keep its margins there."""

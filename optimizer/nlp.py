@@ -281,7 +281,7 @@ class Programme:
         return PathRows(k, c, self.room[c] - shares.value[k, c], gradients)
 
     def path_hessian(self, free: Array, T: float, weights: Array) -> Array:
-        """Hessian (n, n) of Σ weights · shares, weights (M, c): that of the shares by finite differences of gradients."""
+        """Hessian (n, n) of Σ weights · shares, weights (M, c), by finite differences of the shares' gradients."""
         k = np.flatnonzero(weights.any(axis=1))
         if self.path is None or not len(k):
             return np.zeros((self.free_count * self.r + 1,) * 2)

@@ -247,9 +247,7 @@ class _Solver:
         # unknowns and the goal's rows come first, and never give way
         hard = self.n + len(A_goal)
         equal = self.n + np.flatnonzero(least_goal == most_goal)
-        A = np.concatenate(
-            [A_goal, A_path[:, : self.n], A_torque, self._kinematic_rows(places, sign, T, time_scale)]
-        )
+        A = np.concatenate([A_goal, A_path[:, : self.n], A_torque, self._kinematic_rows(places, sign, T, time_scale)])
         b = np.concatenate([path_rows.room, b_torque, 1 - size[places]])
         before = len(path_rows.room) + len(k)
         soft = False
@@ -293,7 +291,9 @@ class _Solver:
         self.active[...] = False
         held = kinematic > 0
         self.active[tuple(place[held] for place in places)] = True
-        return _Step(x, soft, places, kinematic, (k, j), torque_sign, torque, (path_rows.points, path_rows.columns), path)
+        return _Step(
+            x, soft, places, kinematic, (k, j), torque_sign, torque, (path_rows.points, path_rows.columns), path
+        )
 
 
 def _convex(H: Array) -> Array:
