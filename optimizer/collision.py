@@ -140,6 +140,11 @@ class CollisionModel:
         gradient = self.gradients(frames, configuration, pair, found)
         return found.distance.reshape(n, p), gradient.reshape(n, p, self.nq)
 
+    def least(self, q: Array, within: float) -> float:
+        """The least distance [m] over all pairs at q (n, nq), or, where it exceeds `within`, something above that."""
+        configuration, pair = np.divmod(np.arange(len(q) * len(self.pairs)), max(len(self.pairs), 1))
+        return float(self.nearest(self.frames(q), configuration, pair, within).distance.min(initial=np.inf))
+
     def contacts(self, q: Sequence[Array] | Array) -> list[Contact]:
         """The nearest pair at each of q (n, nq): none at all where nothing is compared."""
         if not (len(self.pairs) and len(q)):

@@ -35,8 +35,10 @@ REPORT_NODES = 8
 LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 # points per knot span at which peaks of speed, acceleration and jerk are looked for
 RATE_POINTS = 33
-# samples of a motion at which contact is looked for where no proof is asked, and rounding of a share of a limit
-CONTACT_SAMPLES, SHARE_TOLERANCE = 200, 1e-6
+# samples at which contact is looked for, and a distance [m] there that leaves no doubt until the certificate
+CONTACT_SAMPLES, CLEAR = 96, 0.02
+# rounding of a share of a limit
+SHARE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -199,6 +201,9 @@ class Task(Plant):
         """Where the motion comes nearest, if it is not proven to keep its margins there."""
         if not self.problem.collisions:
             return None
+        q, _, _ = sample(spline, np.linspace(0.0, spline.duration, CONTACT_SAMPLES))
+        if self.collisions.least(q, CLEAR) >= CLEAR:
+            return None
         found = clearance(self.collisions, spline)
         return found if found is not None and found.min_clearance < 0 else None
 
@@ -208,8 +213,7 @@ class Task(Plant):
             return False
         if not self.problem.collisions:
             return True
-        few = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
-        return bool((self.collisions.distances(few, within=0.0)[0] >= 0).all())
+        return self.collisions.least(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0) >= 0
 
     @cached_property
     def fastest_parameters(self) -> Array:

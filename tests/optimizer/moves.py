@@ -28,7 +28,8 @@ CEILING = np.array([0.0, 0.0, 9.81])
 
 
 def problem(start: Any = START, goal: Any = GOAL, **given: Any) -> Problem:
-    return Problem(**{"start": start, "goal": goal} | given)
+    """A problem in which nothing hits anything: moves are drawn without regard to it."""
+    return Problem(**{"start": start, "goal": goal, "collisions": False} | given)
 
 
 def fixed(duration: float) -> dict[str, Any]:

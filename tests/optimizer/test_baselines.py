@@ -222,7 +222,7 @@ def test_energies_balance() -> None:
     """total = sum of parts for every baseline, with payload and tilted gravity."""
     payload = Payload(mass=3.0, com=np.array([0.0, 0.05, 0.1]), inertia=np.diag([0.01, 0.01, 0.01]))
     task = problem(payload=payload, gravity=np.array([3.0, -5.0, -7.9]))
-    torques, potential = oracle(task)
+    torques, potential, _ = oracle(task)
     for motion in guesses(task, START, GOAL, DURATION).values():
         energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential).electrical
         assert energy.parts_sum == pytest.approx(energy.total, rel=BALANCE)
@@ -232,7 +232,7 @@ def test_energies_balance() -> None:
 def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
     """Each law's own loss, ∫ v · friction(v) dt, from the motion's samples."""
     task = problem(friction=friction)
-    torques, potential = oracle(task)
+    torques, potential, _ = oracle(task)
     motion = quintic(START, GOAL, DURATION)
     energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential)
     loss = motion.weights @ (motion.v * ROBOT.friction_laws[friction].torque(motion.v))
@@ -285,7 +285,7 @@ def test_within_limits_in_time() -> None:
 def test_within_limits_of_torque() -> None:
     """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it is in."""
     free = problem()
-    torques, _ = oracle(free)
+    torques, *_ = oracle(free)
     motion = time_optimal(free.active_limits, START, GOAL)
     tau = torques(motion.q, motion.v, motion.a)
     peaks = np.abs(tau + ROBOT.friction.torque(motion.v)).max(axis=0)
@@ -306,7 +306,7 @@ def test_no_travel() -> None:
     """Where the arm already is: those in our duration hold it there, the others are done at once for nothing."""
     task = problem(goal=START)
     report = compare(task)
-    torques, _ = oracle(task)
+    torques, *_ = oracle(task)
     none = np.zeros((1, 6))
     current = torques(START[None], none, none)[0] / ROBOT.drives.torque_constant
     holding = DURATION * (36.7 + ROBOT.drives.copper @ current**2)

@@ -14,7 +14,7 @@ from models.robot import Array
 from optimizer.arm import Payload, Pose
 from optimizer.energy import breakdown
 from optimizer.problem import Problem
-from optimizer.solution import Certificate, Energy, Spline
+from optimizer.solution import Certificate, Clearance, Energy, Spline
 from optimizer.verify import certify
 
 ROUNDING = 1e-9  # relative; values met exactly on the grid, up to double precision through a few thousand operations
@@ -274,8 +274,11 @@ def test_nothing_undefined_passes(energy: Energy, broken: str) -> None:
 @pytest.mark.parametrize("name", ["position", "velocity", "acceleration", "jerk", "torque"])
 def test_a_certificate_with_nan_is_not_valid(name: str) -> None:
     ratios = dict.fromkeys(["position", "velocity", "acceleration", "jerk", "torque"], 0.5)
-    good = Certificate(ratios, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0)
+    good = Certificate(ratios, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, Clearance(0.01, 0.01, ("base", "tool"), 0.0))
     assert good.valid
     assert not replace(good, worst_ratio=ratios | {name: math.nan}).valid
     assert not replace(good, goal_error=(0.0, math.nan)).valid
     assert not replace(good, energy_error=math.nan).valid
+    assert good.clearance is not None
+    assert not replace(good, clearance=replace(good.clearance, min_clearance=-1e-9)).valid
+    assert not replace(good, clearance=replace(good.clearance, min_clearance=math.nan)).valid
