@@ -33,7 +33,9 @@ def measure(count: int, seed: int) -> dict[Method, list[tuple[float, float]]]:
         for method, rows in table.items():
             began = time.process_time()
             try:
-                energy = optimize(Problem(start, goal, method=method, deadline=DEADLINE)).energy.electrical.total
+                energy = optimize(
+                    Problem(start, goal, method=method, deadline=DEADLINE, collisions=False)
+                ).energy.electrical.total
             except JoulepathError:
                 energy = np.nan
             rows.append((energy, time.process_time() - began))

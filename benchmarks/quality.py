@@ -34,7 +34,7 @@ def main() -> None:
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(Problem(task.q_start, task.q_goal, robot=robot)).energy.electrical.total
+            energy = optimize(Problem(task.q_start, task.q_goal, robot=robot, collisions=False)).energy.electrical.total
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")

@@ -63,7 +63,7 @@ class Search:
     """One task's best motion so far, by the exact energy [J]."""
 
     def __init__(self, task: Move) -> None:
-        self.move, self.task = task, Task(Problem(task.q_start, task.q_goal))
+        self.move, self.task = task, Task(Problem(task.q_start, task.q_goal, collisions=False))
         self.best: Spline | None = None
         self.energy = np.inf
 

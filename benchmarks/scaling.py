@@ -41,7 +41,9 @@ def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
         for task in (move(seed, 0), *moves(seed, count)):
             points = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
             began = time.perf_counter()
-            solver = FreeSpline(Task(Problem(task.q_start, task.q_goal)), task.q_start, task.q_goal, began + PATIENCE)
+            solver = FreeSpline(
+                Task(Problem(task.q_start, task.q_goal, collisions=False)), task.q_start, task.q_goal, began + PATIENCE
+            )
             outcome = solver.improve(Guess(space, points, 0.0))
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
@@ -60,7 +62,7 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
         walls, iterations, solved = [], [], 0
         for task in (move(seed, 0, robot), *moves(seed, count, robot)):
             began = time.perf_counter()
-            problem = Problem(task.q_start, task.q_goal, robot=robot)
+            problem = Problem(task.q_start, task.q_goal, robot=robot, collisions=False)
             outcome = FreeSpline(Task(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
@@ -87,7 +89,9 @@ def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
             branch = _branch(robot, task.T_goal) if one_branch else None
             began = time.perf_counter()
             try:
-                solution = optimize(Problem(q_start, goal, robot=robot, branch=branch, windings=windings))
+                solution = optimize(
+                    Problem(q_start, goal, robot=robot, branch=branch, windings=windings, collisions=False)
+                )
             except JoulepathError:
                 continue
             walls.append(time.perf_counter() - began)

@@ -11,6 +11,9 @@ import pinocchio as pin
 
 from models.registry import load_robot
 from models.robot import Array, Robot
+from optimizer.arm import Arm
+from optimizer.collision import CollisionModel
+from optimizer.keep_away import RESERVE
 
 Kind = Literal["joint to pose", "pose to pose"]
 KINDS: tuple[Kind, ...] = ("joint to pose", "pose to pose")
@@ -19,7 +22,10 @@ MOUNTS = {"floor": [0.0, 0.0, -9.81], "wall": [9.81, 0.0, 0.0], "ceiling": [0.0,
 
 @dataclass(frozen=True)
 class Move:
-    """A motion between two configurations (nq,) [rad], each joint drawn evenly from one turn within its limits."""
+    """A motion between two configurations (nq,) [rad], each joint drawn evenly from one turn within its limits.
+
+    What the arm could hit is left out: the peers do not know of it.
+    """
 
     seed: int
     index: int
@@ -56,20 +62,30 @@ def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
 def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -> Ask:
     """Task `index` of a seed: a request with default settings between targets that the arm reaches.
 
-    A target is the pose, or the joints, of a configuration drawn evenly from the whole joint range. Kinds alternate
+    A target is the pose, or the joints, of a configuration drawn evenly from the whole joint range, and drawn again
+    where the arm would be in itself. Kinds alternate
     unless one is asked for. `varied` adds what else a request may hold: payload, mount, tighter limits, another
     objective, a duration, no windings; such a request may well be infeasible.
     """
     robot = load_robot("ur5e")
     rng = np.random.default_rng([seed, index])
     kind = KINDS[index % len(KINDS)] if kind is None else kind
-    q_start, q_goal = rng.uniform(robot.limits.q_min, robot.limits.q_max, (2, robot.nq))
+    q_start, q_goal = _apart(rng, robot), _apart(rng, robot)
     T_start, T_goal = flange(robot, q_start), flange(robot, q_goal)
     start = {"q": q_start.tolist()} if kind == "joint to pose" else {"pose": as_pose(T_start)}
     body: dict[str, Any] = {"robot": robot.name, "start": start, "goal": {"pose": as_pose(T_goal)}}
     if varied:
         body |= _variation(rng, robot)
     return Ask(seed, index, kind, body, T_start, T_goal)
+
+
+def _apart(rng: np.random.Generator, robot: Robot) -> Array:
+    """A configuration (nq,) in which no link touches another."""
+    model = CollisionModel(Arm(robot=robot))
+    while True:
+        q = rng.uniform(robot.limits.q_min, robot.limits.q_max)
+        if model.least(q[None], RESERVE) > RESERVE:
+            return np.asarray(q)
 
 
 def asks(seed: int, count: int, kind: Kind | None = None, varied: bool = False) -> Iterator[Ask]:

@@ -30,7 +30,7 @@ class Candidate:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
-        task = Task(Problem(q_start, q_goal, robot=self.robot))
+        task = Task(Problem(q_start, q_goal, robot=self.robot, collisions=False))
         return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
 
 
@@ -48,7 +48,7 @@ class Answer:
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
         try:
-            return _motion(optimize(Problem(q_start, q_goal, robot=self.robot)).trajectory.spline)
+            return _motion(optimize(Problem(q_start, q_goal, robot=self.robot, collisions=False)).trajectory.spline)
         except JoulepathError:
             return None
 
@@ -66,7 +66,7 @@ class Line:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
-        task = Task(Problem(q_start, q_goal, robot=self.robot, method="time_scaling"))
+        task = Task(Problem(q_start, q_goal, robot=self.robot, method="time_scaling", collisions=False))
         return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
 
 
