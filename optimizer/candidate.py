@@ -121,19 +121,23 @@ class Programmed(Solver):
         super().__init__(task, q_start, q_goal, deadline, window)
         self.coordinates = self._coordinates(task.problem.active_limits.scaled(1 - MARGIN))
 
-    def improve(self, guess: Guess) -> Attempt:
-        """Optimise from a guess, tightening the limits where the motion breaks them between the nodes."""
-        window, kernel = self.window, self.task.kernel
+    def improve(self, guess: Guess, guarded: bool = False, deadline: float = np.inf) -> Attempt:
+        """Optimise from a guess, tightening the limits where the motion breaks them between the nodes.
+
+        With `guarded`, for a guess that hits nothing, it keeps clear from the first step on. `deadline` is one earlier
+        than the candidate's.
+        """
+        window, kernel, deadline = self.window, self.task.kernel, min(deadline, self.deadline)
         programme = self._watched(
             Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant),
-            self.task.path,
+            self.task.guarded if guarded else self.task.path,
         )
         limits = self.task.problem.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
         duration = self._first_duration(programme, free, guess.duration)
         iterations, multiplier, hit = 0, None, None
         for solves in range(1, REPAIRS + 1):
-            result = solve(programme, free, duration, multiplier, self.deadline)
+            result = solve(programme, free, duration, multiplier, deadline)
             iterations += result.iterations
             if result.status == "out of time":
                 return Attempt("out of time", "the deadline passed", iterations, solves)

@@ -6,20 +6,30 @@ use; Pinocchio and Coal answer yes or no in tens of microseconds.
 
 from __future__ import annotations
 
+import math
+
 import coal
 import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
+from optimizer.arm import Arm
 from optimizer.collision import CollisionModel
 from optimizer.convex import coal_shape
 
 
 class FreeSpace:
-    """Where an arm's bodies are apart by their margins and `reserve` [m] more."""
+    """Where an arm's bodies are apart by their margins and `reserve` [m] more, and its tool is within its cone.
 
-    def __init__(self, robot: pin.Model, model: CollisionModel, reserve: float = 0.0) -> None:
-        self._robot, self._data = robot, robot.createData()
+    `model` is the arm's own.
+    """
+
+    def __init__(self, arm: Arm, model: CollisionModel, reserve: float = 0.0) -> None:
+        self._robot = arm.robot.model
+        self._data = self._robot.createData()
+        self._cone = arm.tool_cone
+        if self._cone is not None:
+            self._cone = self._cone.seen_from((arm.robot.T_last_flange @ arm.T_flange_tcp)[:3, :3])
         self._geometry = pin.GeometryModel()
         skins = []
         for number, body in enumerate(model.bodies):
@@ -43,4 +53,11 @@ class FreeSpace:
 
     def free(self, q: Array) -> bool:
         """Whether q (nq,) [rad] is clear."""
-        return not pin.computeCollisions(self._robot, self._data, self._geometry, self._found, q, True)
+        if pin.computeCollisions(self._robot, self._data, self._geometry, self._found, q, True):
+            return False
+        # the collisions left the links' places in the data
+        cone = self._cone
+        if cone is None:
+            return True
+        pointing = self._data.oMi[self._robot.nq].rotation @ cone.axis
+        return bool(pointing @ cone.direction >= math.cos(cone.half_angle))

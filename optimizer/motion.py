@@ -24,6 +24,7 @@ from optimizer.kinematics import joint_placements
 from optimizer.path_limits import PathLimits
 from optimizer.problem import Problem
 from optimizer.solution import Clearance, Energy, Spline, Trajectory
+from optimizer.way_around import ways_around
 
 # smoothing that the optimiser works with: friction's reversal [rad/s] and the corners of |power| [W]
 KNEE = 0.02
@@ -37,6 +38,8 @@ LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 RATE_POINTS = 33
 # samples at which contact is looked for, and a distance [m] there that leaves no doubt until the certificate
 CONTACT_SAMPLES, CLEAR = 96, 0.02
+# nearer to something than this beyond the margins [m], a motion is taken to be held off by it
+GRAZING = 5e-3
 # rounding of a share of a limit
 SHARE_TOLERANCE = 1e-6
 
@@ -196,6 +199,25 @@ class Task(Plant):
     @cached_property
     def _placements(self) -> Array:
         return joint_placements(self.problem.robot.model)
+
+    def ways(self, q_start: Array, q_goal: Array, deadline: float) -> list[Array]:
+        """Joint paths from q_start to q_goal (nq,) that hit nothing, found before `deadline`; looked for once."""
+        key = q_start.tobytes() + q_goal.tobytes()
+        if key not in self._ways:
+            self._ways[key] = ways_around(self.problem, q_start, q_goal, deadline, model=self.collisions)
+        return self._ways[key]
+
+    def has_ways(self, q_start: Array, q_goal: Array) -> bool:
+        """Whether ways from q_start to q_goal have been looked for and found."""
+        return bool(self._ways.get(q_start.tobytes() + q_goal.tobytes()))
+
+    @cached_property
+    def _ways(self) -> dict[bytes, list[Array]]:
+        return {}
+
+    def grazes(self, q: Array) -> bool:
+        """Whether q (k, nq) come so near to something that it is likely to keep them from being better."""
+        return self.problem.collisions and self.collisions.least(q, GRAZING) < GRAZING
 
     def hit(self, spline: Spline) -> Clearance | None:
         """Where the motion comes nearest, if it is not proven to keep its margins there."""

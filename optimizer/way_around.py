@@ -33,16 +33,24 @@ SAME = 0.5
 SAMPLES, ROUNDING = 201, 0.06
 
 
-def ways_around(arm: Arm, q_start: Array, q_goal: Array, deadline: float, most: int = 3, seed: int = 1) -> list[Array]:
+def ways_around(
+    arm: Arm,
+    q_start: Array,
+    q_goal: Array,
+    deadline: float,
+    most: int = 3,
+    seed: int = 1,
+    model: CollisionModel | None = None,
+) -> list[Array]:
     """Up to `most` joint paths (k, nq) [rad] from q_start to q_goal (nq,) that hit nothing, the shortest first.
 
-    Straight between their points and within the arm's limits; looked at every STEP, which proves nothing. None where
-    an end itself is not clear or nothing is found before `deadline` (of `time.perf_counter`). The seed decides what is
-    found, as long as the deadline does not.
+    Straight between their points, within the arm's limits and its tool's cone; looked at every STEP, which proves
+    nothing. None where an end itself is not clear or nothing is found before `deadline` (of `time.perf_counter`). The
+    seed decides what is found, as long as the deadline does not. `model` is the arm's own, where it is at hand.
     """
-    model = CollisionModel(arm)
+    model = CollisionModel(arm) if model is None else model
     for reserve in RESERVE:
-        space = FreeSpace(arm.robot.model, model, reserve)
+        space = FreeSpace(arm, model, reserve)
         if space.free(q_start) and space.free(q_goal):
             break
     else:
@@ -60,7 +68,7 @@ def ways_around(arm: Arm, q_start: Array, q_goal: Array, deadline: float, most: 
         # the straight line is free, or no room is wide enough
         if (found and len(found[0]) == 2) or (not found and run + 1 == len(ROOMS)):
             break
-    return sorted(found, key=lambda path: float(_lengths(path, arm.active_limits.v_max)[-1]))
+    return sorted(found, key=lambda path: length(path, arm.active_limits.v_max))
 
 
 def along(path: Array, duration: float, v_max: Array) -> tuple[Array, Array]:
@@ -132,8 +140,13 @@ def _state(states: ob.RealVectorStateSpace, q: Array) -> ob.RealVectorStateType:
     return state
 
 
+def length(path: Array, v_max: Array) -> float:
+    """Length [s] of a way: the time that it takes at least, were the joints' speeds added by squares."""
+    return float(_lengths(path, v_max)[-1])
+
+
 def _lengths(path: Array, v_max: Array) -> Array:
-    """Length (k,) [s] up to each point: the time that it takes at least, were the joints' speeds added by squares."""
+    """The length (k,) [s] up to each point."""
     steps = np.linalg.norm(np.diff(path, axis=0) / v_max, axis=1)
     return np.append(0.0, np.cumsum(steps))
 

@@ -7,6 +7,7 @@ guess, are this project's.
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import ClassVar
 
@@ -17,6 +18,7 @@ from optimizer.bounds import LEAST_DURATION
 from optimizer.bspline import Basis
 from optimizer.candidate import Attempt, Guess, Programmed
 from optimizer.solution import BaselineName, Spline
+from optimizer.way_around import along, length
 
 # control points of a first attempt with evenly spaced knots
 COARSE = 13
@@ -24,6 +26,12 @@ COARSE = 13
 TIGHT = 1.12
 # how often knots are repeated where jerk switches: it bends there in a refined motion, and jumps in the finest
 REFINED, EXACT = 2, 3
+# shares of the time left that a candidate's ways around may take, looking for them and in all
+PLANNING, PATIENCE = 0.1, 0.3
+# a way longer than the shortest by more than this is not tried
+DETOUR = 1.3
+# said of what came of one
+LED = ", led around what is in the way"
 
 
 class FreeSpline(Programmed):
@@ -41,14 +49,33 @@ class FreeSpline(Programmed):
     def solve(self) -> Attempt:
         """From the ground up; over knots made for haste where time is short or evenly spaced ones find nothing."""
         shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        first = Attempt("failed", "not tried")
+        tried: list[Attempt] = []
         if not self.window.hurried and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
-            first = self.improve(Guess(space, self._smoothed(space), 0.0))
-            if first.status in ("solved", "out of time"):
-                return first
-        second = self.improve(self.in_haste())
-        return replace(second, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
+            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0)))
+        if not tried or (tried[-1].status == "failed" and tried[-1].hit is None):
+            tried.append(self.improve(self.in_haste()))
+        if tried[-1].status == "failed" and tried[-1].hit is not None:
+            tried.append(self.around(tried[-1]))
+        return replace(tried[-1], iterations=sum(a.iterations for a in tried), solves=sum(a.solves for a in tried))
+
+    def around(self, stuck: Attempt) -> Attempt:
+        """From ways that hit nothing, the cheapest motion that comes of them; `stuck` itself where none does."""
+        task, space = self.task, bspline.uniform(COARSE)
+        v_max, now = task.problem.active_limits.v_max, time.perf_counter()
+        left = max(self.deadline - now, 0.0)
+        ways = task.ways(self.q_start, self.q_goal, now + PLANNING * left)
+        found: list[Attempt] = []
+        for way in ways:
+            if time.perf_counter() > now + PATIENCE * left or length(way, v_max) > DETOUR * length(ways[0], v_max):
+                break
+            q, t = along(way, 1.0, v_max)
+            points = space.fit(self.coordinates.from_joints(q), t)
+            outcome = self.improve(Guess(space, points, 0.0), guarded=True, deadline=now + PATIENCE * left)
+            found.append(replace(outcome, reason=f"{outcome.reason}{LED}"))
+        solved = [(task.objective_of(task.energy(a.spline)), k) for k, a in enumerate(found) if a.spline is not None]
+        best = found[min(solved)[1]] if solved else stuck
+        return replace(best, iterations=sum(a.iterations for a in found), solves=sum(a.solves for a in found))
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
@@ -59,7 +86,11 @@ class FreeSpline(Programmed):
         """From samples q (k, nq) at times t (k,), over knots where jerk bends, or jumps if `fine`."""
         duration = float(t[-1])
         space = self.graded(duration, EXACT if fine else REFINED)
-        return self.improve(Guess(space, space.fit(self.coordinates.from_joints(q), t / duration), duration))
+        guess = Guess(space, space.fit(self.coordinates.from_joints(q), t / duration), duration)
+        # what was led around something would otherwise go back to where it is stuck
+        outcome = self.improve(guess, guarded=self.task.grazes(q))
+        led = outcome.status == "solved" and self.task.has_ways(self.q_start, self.q_goal)
+        return replace(outcome, reason=f"{outcome.reason}{LED}") if led else outcome
 
     def in_haste(self) -> Guess:
         """The fastest motion under limits on speed, acceleration and jerk, in a space that holds its jerk's jumps."""

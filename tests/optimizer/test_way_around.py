@@ -11,18 +11,28 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.robot import Array
+from optimizer import optimize
 from optimizer.arm import Arm
 from optimizer.collision import CollisionModel
+from optimizer.exceptions import NoTrajectory
 from optimizer.free_space import FreeSpace
 from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.kinematics import joint_placements
+from optimizer.methods.free_spline import LED
+from optimizer.motion import sample
+from optimizer.path_limits import Cone, PathLimits
+from optimizer.problem import Problem
 from optimizer.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
-from optimizer.way_around import ROOMS, along, ways_around
+from optimizer.way_around import ROOMS, STEP, along, ways_around
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 
 # s: ample, so that a seed and not the machine's load decides what is found
 AMPLE = 60.0
 DENSE = 0.003  # rad between the configurations at which a way is checked
 DOWN = Rotation.from_euler("x", np.pi).as_matrix()
+REPLAY = 1e-4  # s
+# tasks in which the straight line leads nowhere
+STUCK = ("post", "trap")
 FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
@@ -103,7 +113,7 @@ def test_free_space_agrees_with_the_distances(seed: int) -> None:
     q = np.random.default_rng(seed).uniform(limits.q_min, limits.q_max, (400, arm.robot.nq))
     distance = model.distances(q)[0].min(axis=1)
     for reserve in (0.0, 0.005):
-        space = FreeSpace(arm.robot.model, model, reserve)
+        space = FreeSpace(arm, model, reserve)
         free = np.array([space.free(x) for x in q])
         # Coal ends its search within 1e-6 m
         clear = np.abs(distance - reserve) > 1e-5
@@ -158,18 +168,44 @@ def test_no_way_to_a_goal_that_hits_something() -> None:
     assert ways_around(blocked, q_start, q_goal, time.perf_counter() + AMPLE) == []
 
 
-def test_no_way_to_a_goal_that_is_walled_in_and_an_answer_by_the_deadline() -> None:
+def walled_in() -> tuple[Arm, Array, Array]:
+    """The task of the post with walls across all that the arm reaches, but for where it stands."""
     arm, q_start, q_goal = task("post")
-    # a wall across all that the arm reaches, but for where it stands
     wall = Obstacle("wall", Box(np.array([3.0, 0.02, 3.0])), at(1.77, 0.0, 1.0))
     behind = Obstacle("behind", Box(np.array([3.0, 0.02, 3.0])), at(-1.65, 0.0, 1.0))
     over = Obstacle("over", Box(np.array([0.6, 0.02, 2.0])), at(0.0, 0.0, 1.7))
-    closed = Arm(scene=Scene([*arm.scene.obstacles, wall, behind, over]), tool=arm.tool, T_flange_tcp=arm.T_flange_tcp)
+    return replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over])), q_start, q_goal
+
+
+def test_no_way_to_a_goal_that_is_walled_in_and_an_answer_by_the_deadline() -> None:
+    closed, q_start, q_goal = walled_in()
     assert least(closed, q_start[None]) > 0 and least(closed, q_goal[None]) > 0
     begin = time.perf_counter()
     assert ways_around(closed, q_start, q_goal, begin + 0.3) == []
     # a run ends within a few checks of the deadline
     assert time.perf_counter() - begin < 1.0
+
+
+def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
+    given = {"scene": arm.scene, "tool": arm.tool, "T_flange_tcp": arm.T_flange_tcp}
+    return Problem(q_start, q_goal, windings=False, **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_motions_get_past_what_is_in_the_way(name: str) -> None:
+    arm, q_start, q_goal = task(name)
+    found = optimize(problem(arm, q_start, q_goal))
+    q = sample(found.trajectory.spline, np.arange(0.0, found.duration, REPLAY))[0]
+    assert least(arm, q) >= 0
+    assert (found.candidates[0].reason == f"converged{LED}") == (name in STUCK)
+
+
+def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
+    with pytest.raises(NoTrajectory) as raised:
+        optimize(problem(*walled_in()))
+    (candidate,) = raised.value.candidates
+    assert candidate.status == "failed"
+    assert any(name in candidate.reason for name in ("wall", "post", "over"))
 
 
 def test_limits_tightened_are_kept() -> None:
@@ -183,6 +219,21 @@ def test_limits_tightened_are_kept() -> None:
     )
     for way in ways_around(replace(arm, limits=tight), q_start, q_goal, time.perf_counter() + AMPLE):
         assert (way >= tight.q_min).all() and (way <= tight.q_max).all()
+
+
+def test_ways_keep_the_tool_within_its_cone() -> None:
+    arm, q_start, q_goal = task("post")
+    cone = Cone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 0.6)
+    held = replace(arm, tool_cone=cone)
+    tilt = PathLimits(joint_placements(arm.robot.model), held.path_limits)
+
+    def widest(ways: list[Array]) -> float:
+        return max(float(tilt.shares(q := between(way), np.zeros_like(q)).max()) for way in ways)
+
+    free, within = (ways_around(a, q_start, q_goal, time.perf_counter() + AMPLE) for a in (arm, held))
+    assert within
+    assert widest(within) <= 1 + STEP / cone.half_angle
+    assert widest(free) > 1.2
 
 
 def test_samples_along_a_way_rest_at_its_ends_and_round_its_corners() -> None:
