@@ -233,6 +233,8 @@ class _Search:
         for node in self.nodes:
             if node.answer is None:
                 dropped.append(Dropped(node.duration, None, node.reason))
+            elif points and (node.duration, node.energy) == (points[-1].duration, least):
+                continue  # the same motion, found again
             elif node.energy >= least:
                 reason = f"the motion of {points[-1].duration:.4f} s is no slower and needs no more"
                 dropped.append(Dropped(node.duration, node.energy, reason))
