@@ -252,12 +252,16 @@ class Run:
         """The fastest motion of one candidate, whatever the problem allows."""
         return self.count(self.solver(entry, fastest(self.task)).solve()).spline
 
-    def learn(self, entry: Entry, q: Array, t: Array, fine: bool, credit: float | None = None) -> None:
+    def learn(
+        self, entry: Entry, q: Array, t: Array, fine: bool, credit: float | None = None, duration: float | None = None
+    ) -> None:
         """Optimise the entry from samples q (k, nq) at times t (k,), and keep the outcome if it spends less.
 
-        `credit` [1] is what surplus is taken to be worth where there is a store.
+        `credit` [1] is what surplus is taken to be worth where there is a store; `duration` [s] is kept to, if given.
         """
         for window in windows(self.task, entry.q_goal, credit):
+            if duration is not None:
+                window = replace(window, t_min=duration, t_max=duration)
             outcome = self.count(self.solver(entry, window).learn(q, t, fine))
             if outcome.spline is not None:
                 self.keep(entry, outcome, self.task.energy(outcome.spline))
@@ -279,6 +283,11 @@ class Run:
                     worth = self.problem.regeneration
                     credit = worth + share * max(self.problem.bus.efficiency - worth, 0.0)
                     self.learn(entry, *sampled(entry.attempt.spline), fine=False, credit=credit)
+        longest, spline = self.problem.duration_max or 0.0, entry.attempt.spline
+        slower = self.problem.objective == "mechanical" and spline.duration < longest * (1 - SLACK)
+        if slower and self.method.learns and time.perf_counter() < self.deadline:
+            # the smoothed corners of |tau v| charge for time, as the work does not: a free duration ends too soon
+            self.learn(entry, *sampled(slowed(spline, longest / spline.duration)), fine=False, duration=longest)
 
     def compared(self, best: Entry) -> list[Baseline]:
         """The baselines; where one of them is feasible and better, it becomes the first guess of a finer attempt.

@@ -114,6 +114,15 @@ def test_what_lies_between_passes_within_the_rectangles(asked_and_found: tuple[P
         assert objective(asked, between) >= objective(asked, right) * (1 - LOCAL)
 
 
+def test_ends_at_the_longest_duration_where_that_costs_least() -> None:
+    """Mechanical work has no idle power: the smoothed cost must not end it early."""
+    asked = replace(mechanical(), method="time_scaling")
+    longest = optimize(replace(asked, **fixed(3.0)))
+    assert objective(asked, longest) < 0.97 * objective(asked, optimize(replace(asked, **fixed(1.65))))
+    assert objective(asked, optimize(asked)) <= objective(asked, longest) * (1 + LOCAL)
+    assert objective(asked, pareto(asked, 3).points[-1]) <= objective(asked, longest) * (1 + LOCAL)
+
+
 def test_jumps_are_found_where_they_are() -> None:
     """A candidate that is slower to reach and far cheaper takes over at its own fastest motion."""
     front = pareto(jumping(), 12)
