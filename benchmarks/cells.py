@@ -1,0 +1,213 @@
+"""Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls, cages of bars.
+
+Task `index` of a seed is the first of the draws of (seed, index) that can be solved: neither end hits anything, and a
+planner with ample time finds a way between them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import count
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from models.robot import Array
+from optimizer.arm import Arm
+from optimizer.collision import CollisionModel
+from optimizer.exceptions import SingularPose, UnreachablePose
+from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
+from optimizer.way_around import ways_around
+
+Cell = Literal["table", "shelf", "bin", "cage"]
+CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")
+# kept away from everything that is drawn [m], and how long a way is looked for [s]
+MARGIN, AMPLE = 0.01, 5.0
+# a gripper 10 cm long, and where it grips
+TOOL = capsule_between(np.zeros(3), np.array([0.0, 0.0, 0.1]), 0.03)
+GRIP = 0.15
+
+
+@dataclass(frozen=True)
+class CellTask:
+    """From q_start (nq,) to a TCP pose T_goal (4, 4), one configuration of which is q_goal; `draws` until it was found.
+
+    `blocked`: the straight line between the configurations hits something.
+    """
+
+    seed: int
+    index: int
+    cell: Cell
+    arm: Arm
+    q_start: Array
+    q_goal: Array
+    T_goal: Array
+    draws: int
+    blocked: bool
+
+    @property
+    def name(self) -> str:
+        """Where to find it again."""
+        return f"seed {self.seed} index {self.index} ({self.cell})"
+
+
+def cell_task(seed: int, index: int) -> CellTask:
+    """Task `index` of a seed; the kinds of cells take turns."""
+    cell = CELLS[index % len(CELLS)]
+    table = Obstacle("table", Box(np.array([2.0, 2.0, 0.04])), _at(0, 0, -0.03))
+    for draw in count():
+        rng = np.random.default_rng([seed, index, draw])
+        obstacles, starts, goals = _DRAWS[cell](rng)
+        arm = Arm(scene=Scene([table, *obstacles]), tool=(TOOL,), T_flange_tcp=_at(0, 0, GRIP))
+        model = CollisionModel(arm)
+        T_start, T_goal = starts(), goals()
+        from_, to = (_clear(arm, model, T) for T in (T_start, T_goal))
+        if not from_ or not to:
+            continue
+        q_start = from_[int(rng.integers(len(from_)))]
+        # the nearest configuration of the goal that can be come to
+        for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
+            if ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE, 1, model=model):
+                blocked = model.least(np.linspace(q_start, q_goal, 200), 0.0) < 0
+                return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
+    raise AssertionError
+
+
+def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
+    """The first tasks of a seed."""
+    return (cell_task(seed, index) for index in range(number))
+
+
+def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
+    """Configurations (nq,) of a TCP pose that hit nothing."""
+    kinematics = inverse_kinematics_for(arm.robot)
+    try:
+        found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal")
+    except (UnreachablePose, SingularPose):
+        return []
+    return [solution.q for solution in found if model.least(solution.q[None], 0.0) > 0]
+
+
+Draw = tuple[list[Obstacle], Callable[[], Array], Callable[[], Array]]
+
+
+def _on_table(rng: np.random.Generator) -> Draw:
+    """Three to nine things of any shape that stand or lie on the table."""
+    things = []
+    for number in range(int(rng.integers(3, 10))):
+        size, kind = rng.uniform([0.05, 0.05, 0.1], [0.2, 0.2, 0.5]), int(rng.integers(4))
+        shape: Shape = (
+            Box(size),
+            Cylinder(size[0] / 2, size[2]),
+            Capsule(size[0] / 2, size[2]),
+            Sphere(size[2] / 4),
+        )[kind]
+        x, y = _around(rng, 0.3, 0.8)
+        things.append(_thing(f"thing {number}", shape, _at(x, y, size[2] / 2, _yaw(rng.uniform(-np.pi, np.pi)))))
+    return things, lambda: _above(rng, 0.1, 0.4), lambda: _above(rng, 0.1, 0.4)
+
+
+def _shelf(rng: np.random.Generator) -> Draw:
+    """Three boards between two sides, and a back; the goal is between two boards, the start in front."""
+    turn, distance = _yaw(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.55, 0.7))
+    low, gap, width = float(rng.uniform(0.05, 0.3)), float(rng.uniform(0.28, 0.38)), float(rng.uniform(0.6, 0.9))
+    depth, height = 0.3, 0.02 + 2 * gap
+
+    def board(name: str, size: list[float], middle: tuple[float, float, float]) -> Obstacle:
+        return _thing(name, Box(np.array(size)), turn @ _at(*middle))
+
+    x = distance + depth / 2
+    boards = [board(f"board {k}", [depth, width, 0.02], (x, 0, low + k * gap)) for k in range(3)]
+    sides = [board(f"side {s}", [depth, 0.02, height], (x, s * width / 2, low + gap)) for s in (-1, 1)]
+    back = board("back", [0.02, width, height], (distance + depth + 0.01, 0, low + gap))
+
+    def inside() -> Array:
+        floor = low + gap * int(rng.integers(2))
+        y = float(rng.uniform(-0.3, 0.3)) * width
+        return np.asarray(turn @ _at(distance + rng.uniform(0.02, 0.12), y, floor + gap / 2, _FORWARD))
+
+    return [*boards, *sides, back], lambda: _above(rng, 0.1, 0.5), inside
+
+
+def _bin(rng: np.random.Generator) -> Draw:
+    """Two boxes open above, their four walls each; from the inside of one to the inside of the other."""
+    walls, middles = [], []
+    first = rng.uniform(-np.pi, np.pi)
+    for number, angle in enumerate((first, first + rng.uniform(0.9, 2.5))):
+        T = _yaw(angle) @ _at(float(rng.uniform(0.45, 0.6)), 0, 0)
+        length, width, height = rng.uniform([0.3, 0.3, 0.1], [0.4, 0.5, 0.25])
+        middles.append((T, height))
+        for side in (-1, 1):
+            across, along = [length, 0.02, height], [0.02, width, height]
+            walls.append(
+                _thing(f"wall {number} {2 * side}", Box(np.array(across)), T @ _at(0, side * width / 2, height / 2))
+            )
+            walls.append(
+                _thing(f"wall {number} {side}", Box(np.array(along)), T @ _at(side * length / 2, 0, height / 2))
+            )
+
+    def inside(which: int) -> Array:
+        T, height = middles[which]
+        x, y = rng.uniform(-0.06, 0.06, 2)
+        return np.asarray(T @ _at(x, y, rng.uniform(0.05, 0.5 * height + 0.03), _DOWN @ _yaw(rng.uniform(-1, 1))))
+
+    return walls, lambda: inside(0), lambda: inside(1)
+
+
+def _cage(rng: np.random.Generator) -> Draw:
+    """Eight upright bars around the arm, and two that lie above."""
+    bars = []
+    for number in range(8):
+        angle = 2 * np.pi * (number + rng.uniform(-0.25, 0.25)) / 8
+        T = _yaw(angle) @ _at(rng.uniform(0.35, 0.75), 0, 0.4)
+        bars.append(_thing(f"bar {number}", Capsule(float(rng.uniform(0.01, 0.03)), 0.8), T))
+    for number in range(2):
+        lying = np.eye(4)
+        lying[:3, :3] = Rotation.from_euler("x", np.pi / 2).as_matrix()
+        T = _yaw(rng.uniform(-np.pi, np.pi)) @ _at(rng.uniform(0.3, 0.6), 0, rng.uniform(0.7, 1.0)) @ lying
+        bars.append(_thing(f"beam {number}", Capsule(0.02, 1.0), T))
+    return bars, lambda: _above(rng, 0.1, 0.6), lambda: _above(rng, 0.1, 0.6)
+
+
+_DRAWS: dict[Cell, Callable[[np.random.Generator], Draw]] = {
+    "table": _on_table,
+    "shelf": _shelf,
+    "bin": _bin,
+    "cage": _cage,
+}
+
+
+def _thing(name: str, shape: Shape, T: Array) -> Obstacle:
+    return Obstacle(name, shape, T, MARGIN)
+
+
+def _above(rng: np.random.Generator, least: float, most: float) -> Array:
+    """The TCP above the table, pointing down."""
+    x, y = _around(rng, 0.35, 0.65)
+    return _at(x, y, rng.uniform(least, most), _DOWN @ _yaw(rng.uniform(-np.pi, np.pi)))
+
+
+def _around(rng: np.random.Generator, nearest: float, furthest: float) -> tuple[float, float]:
+    angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(nearest, furthest)
+    return float(distance * np.cos(angle)), float(distance * np.sin(angle))
+
+
+def _at(x: float, y: float, z: float, turned: Array | None = None) -> Array:
+    T = np.eye(4) if turned is None else turned.copy()
+    T[:3, 3] = x, y, z
+    return T
+
+
+def _yaw(angle: float) -> Array:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("z", angle).as_matrix()
+    return T
+
+
+# the TCP's z axis points down, or outwards along x
+_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
+_FORWARD = np.array([[0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
