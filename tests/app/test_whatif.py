@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app import kept as kept_answers
+from app.errors import InvalidRequest
+from app.kept import Shelf
 from app.schemas.evaluate import EvaluateResponse
 from app.schemas.response import OptimizeResponse
 from app.schemas.whatif import WhatifResponse
@@ -261,6 +264,15 @@ def test_refuses_what_cannot_be_asked(client: TestClient, fields: dict[str, Any]
 def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
     answer = client.post("/whatif", json=body(optimize=LIFT | {"duration": 0.01}))
     assert answer.json()["type"] == "/problems/duration-too-short"
+
+
+def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kept_answers, "MOST_BYTES", 25)
+    shelf = Shelf()
+    marks = [shelf.add({"v": 1.5}) for _ in range(2)]
+    assert len(set(marks)) == len(shelf.kept()) == 2
+    with pytest.raises(InvalidRequest):
+        shelf.add({"v": 1.5})
 
 
 @pytest.mark.parametrize("name", WHATIF_EXAMPLES)
