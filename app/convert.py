@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from app.convert_arm import arm_fields
+from app.convert_pose import to_matrix, to_rotation
 from app.schemas import request as asked
-from app.schemas.common import Pose as PoseSchema
-from app.schemas.common import WithQuaternion, WithRotvec, WithRpy
 from app.schemas.compare import ROW_FIELDS, CompareRequest
 from app.schemas.ik import IKRequest
 from app.schemas.orientation import InCone
 from app.schemas.orientation import LoosePose as LoosePoseSchema
-from models.registry import load_robot, robot_names
-from models.robot import Array, Limits, Robot
-from optimizer.arm import INVERTER_PARTS, LIMIT_NAMES, Inverter, Payload, Pose
-from optimizer.bus import Bus
+from app.schemas.response import Clearance
+from optimizer.arm import Pose
 from optimizer.collision import Contact
 from optimizer.dwell import Cycle
-from optimizer.exceptions import InvalidProblem, UnknownRobot
 from optimizer.inverse_kinematics import IKSolution
 from optimizer.orientation import LoosePose
 from optimizer.problem import BranchFilter, Method, Problem
 from optimizer.solution import Candidate, Certificate, ElectricalEnergy, Energy, Solution, StorageUse, UnreachableTarget
 from optimizer.targets import AnyOf, Single, Target
-
-
-def robot_named(name: str) -> Robot:
-    """The robot of that name. Raises UnknownRobot."""
-    if name not in robot_names():
-        raise UnknownRobot(robot_names())
-    return load_robot(name)
 
 
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
@@ -59,72 +48,11 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     )
 
 
-def arm_fields(request: asked.ArmRequest) -> dict[str, Any]:
-    """Keyword arguments of an `Arm`. Raises UnknownRobot or InvalidProblem."""
-    robot = robot_named(request.robot)
-    return {
-        "robot": robot,
-        "T_flange_tcp": to_matrix(request.tcp),
-        "payload": _payload(request.payload),
-        "gravity": np.array(request.gravity),
-        "limits": _limits(request.limits, robot),
-        "friction": request.friction,
-        "inverter": Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}),
-        "bus": _bus(request.bus),
-        "link_mass_scale": request.link_mass_scale,
-    }
-
-
-def _bus(bus: asked.Bus) -> Bus:
-    if isinstance(bus, asked.RecuperatingBus):
-        return Bus("recuperating", efficiency=bus.efficiency)
-    if isinstance(bus, asked.StorageBus):
-        power = math.inf if bus.power is None else bus.power
-        return Bus("storage", bus.efficiency, bus.capacity, power, bus.initial)
-    return Bus(bus.mode)
-
-
 def cycle(asked_for: asked.Cycle | None) -> Cycle | None:
     """The optimizer's cycle. Raises InvalidProblem."""
     if asked_for is None:
         return None
     return Cycle(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
-
-
-def to_matrix(pose: PoseSchema) -> Array:
-    """Homogeneous matrix (4, 4) of a pose."""
-    T = np.eye(4)
-    T[:3, 3] = pose.position
-    T[:3, :3] = to_rotation(pose)
-    return T
-
-
-def to_rotation(orientation: WithQuaternion | WithRpy | WithRotvec) -> Array:
-    """Rotation matrix (3, 3) of what holds one of `quaternion`, `rpy` and `rotvec`."""
-    if isinstance(orientation, WithQuaternion):
-        return _from_quaternion(np.array(orientation.quaternion))
-    if isinstance(orientation, WithRpy):
-        roll, pitch, yaw = (_from_rotvec(angle * axis) for angle, axis in zip(orientation.rpy, np.eye(3), strict=True))
-        return np.asarray(yaw @ pitch @ roll)
-    return _from_rotvec(np.array(orientation.rotvec))
-
-
-def _from_quaternion(quaternion: Array) -> Array:
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def _from_rotvec(rotvec: Array) -> Array:
-    angle = float(np.linalg.norm(rotvec))
-    # sinc keeps the quaternion exact through zero
-    half = 0.5 * rotvec * np.sinc(0.5 * angle / np.pi)
-    return _from_quaternion(np.array([*half, math.cos(0.5 * angle)]))
 
 
 def to_target(target: asked.Target) -> Target:
@@ -152,14 +80,6 @@ def _loose(pose: LoosePoseSchema) -> LoosePose:
     return LoosePose.about(Pose(T), np.array(orientation.free_about))
 
 
-def _payload(payload: asked.Payload | None) -> Payload:
-    if payload is None:
-        return Payload()
-    ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6
-    inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    return Payload(payload.mass, np.array(payload.com), inertia)
-
-
 def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]:
     """Bounds on the duration. An open end is closed for the electrical objective: an answer has to end some time."""
     if isinstance(request.duration, float | int):
@@ -168,24 +88,6 @@ def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]
     if given.max is None and request.objective == "electrical":
         return given.min, min(asked.MAX_DURATION, request.sample_period * asked.MAX_SAMPLES)
     return given.min, given.max
-
-
-def _limits(limits: asked.Limits, robot: Robot) -> Limits:
-    tighter = {
-        name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq) for public, name in LIMIT_NAMES.items()
-    }
-    if limits.position is not None:
-        tighter["q_min"] = _per_joint("limits.position.lower", limits.position.lower, robot.nq)
-        tighter["q_max"] = _per_joint("limits.position.upper", limits.position.upper, robot.nq)
-    return robot.limits.tightened(**tighter)
-
-
-def _per_joint(field: str, value: float | list[float] | None, nq: int) -> Array | None:
-    if value is None:
-        return None
-    if isinstance(value, list) and len(value) != nq:
-        raise InvalidProblem(field, f"{field} must be one number or a list of {nq}, one per joint.")
-    return np.full(nq, value, dtype=float)
 
 
 def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
@@ -302,11 +204,13 @@ def energy_fields(energy: Energy) -> dict[str, Any]:
 
 def certificate_fields(certificate: Certificate) -> dict[str, Any]:
     """A certificate as every answer lays it out."""
+    clearance = certificate.clearance
     return {
         "worst_ratio": certificate.worst_ratio,
         "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
         "goal_error": dict(zip(("position", "rotation"), certificate.goal_error, strict=True)),
         **fields(certificate, "energy_error", "balance_error"),
+        "clearance": None if clearance is None else fields(clearance, *Clearance.model_fields),
     }
 
 

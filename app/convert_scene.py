@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from app.convert import to_matrix
+from app.convert_pose import to_matrix
 from app.schemas import scene as asked
 from app.schemas.ik import IKRequest
 from models.robot import Robot

@@ -24,7 +24,7 @@ from typing import Any
 
 import orjson
 
-from app.convert import candidate_fields, unreachable_fields
+from app.convert import candidate_fields, fields, unreachable_fields
 from app.schemas import problems
 from app.schemas.common import KEY_HEADER
 from app.schemas.common import Request as RequestModel
@@ -182,8 +182,11 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,
     optimizer_errors.NoReachableTarget: problems.UnreachableTargets,
+    optimizer_errors.StartInCollision: problems.StartInCollision,
+    optimizer_errors.GoalInCollision: problems.GoalInCollision,
     optimizer_errors.DurationTooShort: problems.DurationTooShort,
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
+    optimizer_errors.NoCollisionFreeTrajectory: problems.NoCollisionFreeTrajectory,
     optimizer_errors.NoTrajectory: problems.NoTrajectory,
     optimizer_errors.DeadlineExceeded: problems.DeadlineExceeded,
     Busy: problems.Busy,
@@ -245,4 +248,6 @@ def _own_field(error: Exception, name: str) -> Any:
     value = getattr(error, name)
     if name == "unreachable":
         return [unreachable_fields(target) for target in value]
+    if name == "branches":
+        return [fields(branch, *problems.CollidingBranch.model_fields) for branch in value]
     return [candidate_fields(candidate) for candidate in value] if name == "candidates" else value

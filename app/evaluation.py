@@ -12,10 +12,11 @@ import numpy as np
 import orjson
 from pydantic import ValidationError
 
-from app.convert import arm_fields, energy_fields, fields
+from app.convert import energy_fields, fields
+from app.convert_arm import arm_fields
 from app.errors import InvalidRequest, Reply
 from app.motion_csv import FIRST_ROW, MotionCsv
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
+from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, Nearest
 from app.tasks import answer, json_reply
 from optimizer.arm import Arm
 from optimizer.evaluate import Evaluation, Samples, Stretch, evaluate
@@ -111,7 +112,7 @@ def _configurations(settings: EvaluateSettings, q: Any, first_row: int) -> Confi
 
 def to_evaluate_response(request_id: str, robot: str, result: Evaluation) -> dict[str, Any]:
     """The answer of `POST /evaluate`."""
-    samples = result.samples
+    samples, nearest = result.samples, result.nearest
     return {
         "id": request_id,
         "robot": robot,
@@ -124,6 +125,8 @@ def to_evaluate_response(request_id: str, robot: str, result: Evaluation) -> dic
             {"worst_ratio": report.ratio, **fields(report, "limit", "held", "joint", "t", "value", "bound")}
             for report in result.limits
         ],
+        "collides": None if nearest is None else nearest.distance < 0,
+        "nearest": None if nearest is None else fields(nearest, *Nearest.model_fields),
         "samples": None if samples is None else fields(samples, *Samples.__dataclass_fields__),
     }
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.convert import fields, robot_named, to_matrix
+from app.convert import fields
+from app.convert_arm import robot_named
+from app.convert_pose import to_matrix
 from app.errors import Reply
 from app.schemas.ik_path import IKPathRequest
 from app.tasks import answer, json_reply

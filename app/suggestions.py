@@ -12,8 +12,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.convert import robot_named, to_matrix
-from app.schemas.request import MAX_DURATION, ArmRequest, OptimizeRequest
+from app.convert_arm import robot_named
+from app.convert_pose import to_matrix
+from app.schemas.arm import ArmRequest
+from app.schemas.request import MAX_DURATION, OptimizeRequest
 from optimizer.turned import turned_poses
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]

@@ -9,7 +9,8 @@ from typing import Any, TypeVar
 
 import orjson
 
-from app.convert import arm_fields, certificate_fields, fields, to_problem, to_response
+from app.convert import certificate_fields, fields, to_problem, to_response
+from app.convert_arm import arm_fields
 from app.errors import Reply, problem_reply
 from app.evaluation import to_evaluate_response, to_motion
 from app.kept import Shelf
@@ -214,7 +215,8 @@ def _check(solution: Solution) -> None:
 
 
 def _holds(result: Evaluation) -> bool:
-    return all(report.held for report in result.limits)
+    free = result.nearest is None or result.nearest.distance >= 0
+    return free and all(report.held for report in result.limits)
 
 
 def _figures(energy: Energy, duration: float) -> dict[str, Any]:

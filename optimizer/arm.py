@@ -12,7 +12,8 @@ from models.registry import load_robot
 from models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from optimizer.bus import Bus
 from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.path_limits import Cone, PathLimit, PointSpeed
+from optimizer.kinematics import joint_placements
+from optimizer.path_limits import Cone, PathLimit, PathLimits, PointSpeed
 from optimizer.scene import Attachment, Scene
 
 # a limit on speed below this [m/s] would leave motions that last longer than any answer may
@@ -206,6 +207,12 @@ class Arm:
         if self.elbow_speed is not None and self.robot.elbow is not None:
             limits.append(PointSpeed("elbow_speed", self.robot.elbow.link, self.robot.elbow.axis, self.elbow_speed))
         return limits
+
+    @property
+    def path(self) -> PathLimits | None:
+        """These limits together, None where there are none."""
+        limits = self.path_limits
+        return PathLimits(joint_placements(self.robot.model), limits) if limits else None
 
     def loaded_model(self) -> pin.Model:
         """Pinocchio model with payload, gravity and the links' masses scaled."""

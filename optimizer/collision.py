@@ -145,23 +145,22 @@ class CollisionModel:
         configuration, pair = np.divmod(np.arange(len(q) * len(self.pairs)), max(len(self.pairs), 1))
         return float(self.nearest(self.frames(q), configuration, pair, within).distance.min(initial=np.inf))
 
-    def contacts(self, q: Sequence[Array] | Array) -> list[Contact]:
-        """The nearest pair at each of q (n, nq): none at all where nothing is compared."""
+    def contacts(self, q: Sequence[Array] | Array, within: float = np.inf) -> list[Contact]:
+        """The nearest pair at each of q (n, nq): none at all where nothing is compared.
+
+        Where nothing is nearer than `within` [m], only a lower bound on the distance is found, and not always the pair.
+        """
         if not (len(self.pairs) and len(q)):
             return []
         frames, p = self.frames(np.asarray(q)), len(self.pairs)
         # many of them differ by full turns alone, which move nothing
-        seen: dict[bytes, Contact] = {}
-        result = []
-        for n, turned in enumerate(np.round(frames[:, 1:, :3], 9) + 0.0):
-            key = turned.tobytes()
-            if key not in seen:
-                pair: Indices = np.arange(p)
-                distance = self.nearest(frames, np.full(p, n), pair).distance
-                nearest = int(distance.argmin())
-                seen[key] = Contact(self.names(nearest), float(distance[nearest]))
-            result.append(seen[key])
-        return result
+        moved = (np.round(frames[:, 1:, :3], 9) + 0.0).reshape(len(frames), -1)
+        _, first, which = np.unique(moved, axis=0, return_index=True, return_inverse=True)
+        configuration, pair = np.divmod(np.arange(len(first) * p), p)
+        distance = self.nearest(frames[first], configuration, pair, within).distance.reshape(-1, p)
+        nearest = distance.argmin(axis=1)
+        contacts = [Contact(self.names(int(k)), float(d[k])) for k, d in zip(nearest, distance, strict=True)]
+        return [contacts[k] for k in which.ravel()]
 
     def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: Nearest) -> Array:
         """Derivatives (k, nq) of distances by the joints: n · (axis × (point - origin)) of every joint in between.

@@ -21,6 +21,7 @@ from models.robot import Array
 from optimizer.arm import Arm
 from optimizer.baselines import LOBATTO, LOBATTO_WEIGHTS
 from optimizer.bus import charges, drawn_at
+from optimizer.contact_watch import ContactWatch, Nearest
 from optimizer.energy import breakdown, power_flow
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from optimizer.given_motion import BLOCK, Configurations, Log
@@ -91,7 +92,8 @@ class Samples:
 class Evaluation:
     """What a given motion costs. `segments` is empty where there are more than MOST_SEGMENTS of `segment_count`.
 
-    `speed_jumps` counts the instants inside the motion at which speed jumps.
+    `speed_jumps` counts the instants inside the motion at which speed jumps. `nearest` is None where nothing is
+    compared.
     """
 
     total: Stretch
@@ -100,6 +102,7 @@ class Evaluation:
     speed_jumps: int
     limits: list[LimitReport]
     samples: Samples | None
+    nearest: Nearest | None
 
 
 def evaluate(
@@ -119,6 +122,7 @@ class _Evaluator:
         self._arm, self._charge = plant.arm, plant.arm.bus.initial
         self._data = plant.model.createData()
         self._watch = LimitWatch(plant.arm)
+        self._contact = ContactWatch(plant.arm) if plant.arm.collisions else None
         self._count = motion.segments if isinstance(motion, Configurations) else 1
         self._stretches: dict[int, Stretch] = {}
         self._samples: list[Samples] = []
@@ -143,6 +147,7 @@ class _Evaluator:
             speed_jumps=self._jumps,
             limits=self._watch.report(),
             samples=_concatenated(self._samples) if self._samples else None,
+            nearest=None if self._contact is None else self._contact.nearest,
         )
 
     def _account(self, stretch: Pieces, before: Pieces | None) -> None:
@@ -159,6 +164,8 @@ class _Evaluator:
         tau = self._plant.torques(q, v, a)
         self._watch.see(stretch.breaks[piece] + x, q, v, a, jerk, tau)
 
+        if self._contact is not None:
+            self._contact.see(stretch)
         jumps = self._watch.see_breaks(stretch, before)
         self._jumps += len(jumps)
         joints = power_flow(tau, v, self._arm.drives, self._arm.friction_law).joints

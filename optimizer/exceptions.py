@@ -8,19 +8,28 @@ JoulepathError
 ├── UnreachablePose         no inverse kinematics solution
 ├── SingularPose            every solution is singular
 ├── NoReachableTarget       none of several targets has a solution
+├── InCollision             every arm configuration at an end hits something
+│   ├── StartInCollision
+│   └── GoalInCollision
 ├── DurationTooShort
 ├── TorqueInfeasible        the arm cannot hold or move the load
 ├── NoTrajectory            every candidate failed
+│   └── NoCollisionFreeTrajectory
 └── DeadlineExceeded        nothing verified in time
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
-    from optimizer.solution import Candidate, UnreachableTarget
+    from models.robot import Array
+    from optimizer.solution import Candidate, Clearance, UnreachableTarget
+
+# arm configurations that an error lists at most: an end of free orientation has hundreds
+MOST_BRANCHES = 64
 
 
 class JoulepathError(Exception):
@@ -76,6 +85,17 @@ class UnknownRobot(JoulepathError):
         self.known = list(known)
 
 
+@dataclass(frozen=True)
+class CollidingBranch:
+    """An arm configuration q (nq,) [rad] in which the bodies of `pair` are `depth` [m] nearer than they may be."""
+
+    label: str
+    target: int
+    q: Array
+    pair: tuple[str, str]
+    depth: float
+
+
 class UnreachablePose(JoulepathError):
     """A pose has no inverse kinematics solution within the limits.
 
@@ -109,6 +129,35 @@ class NoReachableTarget(JoulepathError):
         self.target, self.unreachable = target, list(unreachable)
 
 
+class InCollision(JoulepathError):
+    """Every arm configuration at an end hits something; `branches` are those, the least deep first.
+
+    `pair` is what the first of them brings together, `depth` [m] how far it would have to part.
+    """
+
+    target: ClassVar[str]
+
+    def __init__(self, branches: Sequence[CollidingBranch]) -> None:
+        self.branches = sorted(branches, key=lambda branch: branch.depth)[:MOST_BRANCHES]
+        self.pair, self.depth = self.branches[0].pair, self.branches[0].depth
+        ways = "" if len(branches) == 1 else f"in each of {len(branches)} arm configurations, "
+        super().__init__(
+            f"The {self.target} is in collision, {ways}by {self.depth:.4f} m at least: move it, or what is in the way."
+        )
+
+
+class StartInCollision(InCollision):
+    """The motion would begin in a collision."""
+
+    target = "start"
+
+
+class GoalInCollision(InCollision):
+    """The motion would end in a collision."""
+
+    target = "goal"
+
+
 class DurationTooShort(JoulepathError):
     """No motion is that fast; `shortest` [s] is the least feasible duration."""
 
@@ -134,6 +183,20 @@ class NoTrajectory(JoulepathError):
     def __init__(self, candidates: Sequence[Candidate]) -> None:
         super().__init__("No candidate gave a motion within the limits: relax a limit or allow a longer duration.")
         self.candidates = list(candidates)
+
+
+class NoCollisionFreeTrajectory(NoTrajectory):
+    """Every candidate failed, some for what is in the way. `best` is what the motion that came nearest to none runs
+    into, `start` and `goal` are its ends' branches; `depth` [m] is how far these bodies would have to part."""
+
+    def __init__(self, candidates: Sequence[Candidate], best: Clearance, start: str, goal: str) -> None:
+        super().__init__(candidates)
+        self.args = (
+            "No motion was found that hits nothing: clear what `pair` names out of the way, move the start or the "
+            "goal, or leave the branch free.",
+        )
+        self.pair, self.time, self.start, self.goal = best.pair, best.time, start, goal
+        self.depth = max(-best.min_clearance, 0.0)
 
 
 class DeadlineExceeded(JoulepathError):

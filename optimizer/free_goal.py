@@ -20,7 +20,7 @@ from models.robot import Array
 from optimizer import bspline
 from optimizer.bspline import REST_POINTS
 from optimizer.candidate import Attempt, Guess
-from optimizer.exceptions import TorqueInfeasible
+from optimizer.exceptions import JoulepathError
 from optimizer.inverse_kinematics import SINGULAR, inverse_kinematics_for
 from optimizer.methods import solver_for
 from optimizer.methods.free_spline import COARSE, FreeSpline
@@ -91,13 +91,13 @@ def _distance(a: Array, b: Array) -> float:
 
 
 def _turned(task: Task, entry: Entry, q_goal: Array) -> Entry | None:
-    """The entry with another of its goal's configurations, bounded; None where the arm cannot hold it."""
+    """The entry with another of its goal's configurations, bounded; None where the arm cannot be there."""
     label = str(inverse_kinematics_for(task.problem.robot).label(q_goal))
     goal = replace(entry.goal, label=label, q=q_goal, choices=[[value] for value in q_goal.tolist()], fixed=True)
     fresh = Entry(entry.start, goal, entry.q_start, q_goal)
     try:
         bound(task, [fresh])
-    except TorqueInfeasible:
+    except JoulepathError:
         return None
     return fresh
 

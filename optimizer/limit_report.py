@@ -14,7 +14,7 @@ from optimizer.baselines import RATIO_TOLERANCE
 from optimizer.pieces import Pieces
 from optimizer.verify import ratios
 
-LimitName = Literal["position", "velocity", "acceleration", "jerk", "torque"]
+LimitName = Literal["position", "velocity", "acceleration", "jerk", "torque", "tool_cone", "tcp_speed", "elbow_speed"]
 
 # What counts as a jump where pieces meet, as a share of the limit: far above rounding, far below what an arm would feel
 SPEED_JUMP, ACCELERATION_JUMP = 1e-6, 1e-4
@@ -24,13 +24,14 @@ SPEED_JUMP, ACCELERATION_JUMP = 1e-6, 1e-4
 class LimitReport:
     """Where a motion comes nearest to a limit, or breaks it most: `ratio` = |value| / limit of `joint` at time `t` [s].
 
+    `joint` is None for limits on the tool and the elbow: angle [rad] and speeds [m/s].
     Position: `ratio` is the distance from the middle of the range over half of it. `value` and `ratio` are infinite
     where the acceleration (speed jumps) or the jerk (acceleration jumps) is.
     """
 
     limit: LimitName
     ratio: float
-    joint: str
+    joint: str | None
     t: float
     value: float
     bound: float
@@ -47,6 +48,16 @@ class LimitWatch:
     def __init__(self, arm: Arm) -> None:
         self._limits, self._joints, self._friction = arm.active_limits, arm.robot.joint_names, arm.friction_law
         self._worst: dict[LimitName, LimitReport] = {}
+        self._path = arm.path
+        self._path_bounds: dict[str, float] = {
+            name: bound
+            for name, bound in {
+                "tool_cone": arm.tool_cone.half_angle if arm.tool_cone else None,
+                "tcp_speed": arm.tcp_speed,
+                "elbow_speed": arm.elbow_speed,
+            }.items()
+            if bound is not None
+        }
 
     def see(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
         """Samples: t (k,) [s], the others (k, nq); tau is rigid body and rotor torque [N·m]."""
@@ -62,6 +73,12 @@ class LimitWatch:
             k, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             bound = nearer[k, j] if name == "position" else bounds[name][j]
             self._note(name, float(ratio[k, j]), int(j), float(t[k]), float(values[name][k, j]), float(bound))  # type: ignore[arg-type]
+
+        if self._path is not None:
+            shares = self._path.shares(q, v)
+            for path_name, share, at in zip(self._path.names, shares.max(axis=0), shares.argmax(axis=0), strict=True):
+                bound = self._path_bounds[path_name]
+                self._note(path_name, float(share), None, float(t[at]), float(share) * bound, bound)  # type: ignore[arg-type]
 
     def see_breaks(self, pieces: Pieces, before: Pieces | None) -> npt.NDArray[np.int64]:
         """Where pieces meet. Returns those of the pieces (indices) at whose start the speed jumps."""
@@ -90,7 +107,9 @@ class LimitWatch:
             k, j = np.argwhere(jumps)[0].tolist()
             self._note(name, np.inf, j, float(t[k]), np.inf, float(bounds[j]))
 
-    def _note(self, name: LimitName, ratio: float, joint: int, t: float, value: float, bound: float) -> None:
+    def _note(self, name: LimitName, ratio: float, joint: int | None, t: float, value: float, bound: float) -> None:
         known = self._worst.get(name)
         if known is None or ratio > known.ratio:
-            self._worst[name] = LimitReport(name, ratio, self._joints[joint], t, value, bound)
+            self._worst[name] = LimitReport(
+                name, ratio, None if joint is None else self._joints[joint], t, value, bound
+            )

@@ -183,8 +183,7 @@ class Task(Plant):
     @cached_property
     def path(self) -> PathLimits | None:
         """Limits along the path but for clearance, None where there are none."""
-        limits = self.problem.path_limits
-        return PathLimits(self._placements, limits) if limits else None
+        return self.problem.path
 
     @cached_property
     def guarded(self) -> PathLimits:

@@ -22,6 +22,7 @@ from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
     InvalidProblem,
+    NoCollisionFreeTrajectory,
     NoTrajectory,
 )
 from optimizer.family_bound import family_bound_of
@@ -58,7 +59,8 @@ def optimize(problem: Problem) -> Solution:
     """Find the motion of least energy between the problem's targets, certified against every limit.
 
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
-    DurationTooShort, NoTrajectory, DeadlineExceeded, or InvalidProblem for a payload beyond the robot's rating.
+    StartInCollision, GoalInCollision, DurationTooShort, NoTrajectory, NoCollisionFreeTrajectory, DeadlineExceeded, or
+    InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
     """
     with one_thread():
         return Run(problem).solution()
@@ -135,7 +137,16 @@ class Run:
             self.explore()
         if any(entry.status == "unvisited" for entry in self.entries):
             raise DeadlineExceeded([entry.report() for entry in self.entries])
-        raise NoTrajectory([entry.report() for entry in self.entries])
+        raise self.no_trajectory()
+
+    def no_trajectory(self) -> NoTrajectory:
+        """Why no candidate has a motion: what is in the way, where that is what stopped the best of them."""
+        candidates = [entry.report() for entry in self.entries]
+        hits = [(entry, entry.attempt.hit) for entry in self.entries if entry.attempt and entry.attempt.hit]
+        if not hits:
+            return NoTrajectory(candidates)
+        entry, hit = max(hits, key=lambda each: each[1].min_clearance)
+        return NoCollisionFreeTrajectory(candidates, hit, entry.start.label, entry.goal.label)
 
     @property
     def has_store(self) -> bool:

@@ -14,12 +14,12 @@ from models.robot import Array
 from optimizer.arm import Pose
 from optimizer.bounds import lower_bounds
 from optimizer.candidate import Attempt
+from optimizer.end_checks import raise_if_none_is_left, rulings
 from optimizer.exceptions import (
     InvalidProblem,
     NoReachableTarget,
     OutsideLimits,
     SingularPose,
-    TorqueInfeasible,
     UnreachablePose,
 )
 from optimizer.inverse_kinematics import inverse_kinematics_for, turns
@@ -210,34 +210,33 @@ def _joint_options(starts: list[float], goals: list[float], fixed: bool, winding
 
 
 def bound(task: Task, entries: Sequence[Entry]) -> None:
-    """Rule out the pairs whose ends the arm cannot hold, and give every entry its lower bound and least duration.
+    """Rule out the pairs at whose ends the arm cannot be, and give every entry its lower bound and least duration.
 
-    Raises TorqueInfeasible when the arm can hold no pair at all.
+    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible when no pair is left.
     """
-    tau_max, joints = task.problem.active_limits.tau_max, task.problem.robot.joint_names
-    potential: dict[int, float] = {}
-    overload: dict[int, TorqueInfeasible] = {}
-    for end in {id(end): end for entry in entries for end in (entry.start, entry.goal)}.values():
-        potential[id(end)] = task.potential(end.q)
-        still = np.zeros((1, len(end.q)))
-        needed = np.abs(task.torques(end.q[None], still, still)[0])
-        j = int((needed / tau_max).argmax())
-        if needed[j] > tau_max[j]:
-            overload[id(end)] = TorqueInfeasible(joints[j], float(needed[j]), float(tau_max[j]))
+    sides = {
+        name: list({id(end): end for end in (getattr(entry, name) for entry in entries)}.values())
+        for name in ("start", "goal")
+    }
+    ruled = {name: rulings(task, np.array([end.q for end in ends])) for name, ends in sides.items()}
+    ruled_out = {id(end): ruling for name in sides for end, ruling in zip(sides[name], ruled[name], strict=True)}
+    potential = {id(end): task.potential(end.q) for ends in sides.values() for end in ends}
     travel = np.array([entry.q_goal - entry.q_start for entry in entries])
     climb = np.array([potential[id(entry.goal)] - potential[id(entry.start)] for entry in entries])
     hold = task.holding_power(np.array([entry.q_goal for entry in entries])) if task.problem.cycle else None
     bounds, shortest = lower_bounds(task, travel, climb, hold)
     for entry, value, least in zip(entries, bounds.tolist(), shortest.tolist(), strict=True):
         entry.lower_bound, entry.shortest = value, least
-        error = overload.get(id(entry.start)) or overload.get(id(entry.goal))
-        if error is not None:
-            entry.status, entry.reason = "infeasible", f"{error.joint} cannot hold the load at an end of the motion"
-            entry.lower_bound, entry.holdable = np.inf, False
-        elif not np.isfinite(value):
+        for name in ("start", "goal"):
+            ruling = ruled_out[id(getattr(entry, name))]
+            if ruling is not None:
+                entry.status, entry.reason = "infeasible", f"at the {name}, {ruling.reason}"
+                entry.lower_bound, entry.holdable = np.inf, False
+                break
+        if entry.holdable and not np.isfinite(value):
             entry.status, entry.reason = "infeasible", f"takes at least {least:.4f} s"
-    if not any(entry.holdable for entry in entries):
-        raise min(overload.values(), key=lambda error: error.needed / error.available)
+    for name, ends in sides.items():
+        raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in ends], ruled[name])
 
 
 def explore(

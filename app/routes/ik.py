@@ -5,7 +5,9 @@ from __future__ import annotations
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from app.convert import robot_named, to_ik_response, to_matrix
+from app.convert import to_ik_response
+from app.convert_arm import robot_named
+from app.convert_pose import to_matrix
 from app.convert_scene import to_arm
 from app.documentation import problem_responses
 from app.schemas import problems

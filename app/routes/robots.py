@@ -7,7 +7,7 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from app.convert import robot_named
+from app.convert_arm import robot_named
 from app.documentation import problem_responses
 from app.schemas import problems
 from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary

@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Body, Header, Path, Query, Request, Response
 from sqlalchemy.exc import IntegrityError
 
-from app.convert import robot_named
+from app.convert_arm import robot_named
 from app.documentation import problem_responses
 from app.schemas import problems
 from app.schemas.common import KEY_HEADER

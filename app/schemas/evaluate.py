@@ -7,9 +7,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from app.schemas.arm import ArmRequest, by_shape
 from app.schemas.common import JointPositions, Request, Response, described, part
-from app.schemas.request import MAX_SAMPLES, ArmRequest, Seconds, by_shape
+from app.schemas.request import MAX_SAMPLES, Seconds
 from app.schemas.response import ElectricalEnergy, JointEnergy, JointSamples, MechanicalEnergy, Samples, Storage
+from optimizer.limit_report import LimitName
 
 MAX_ROWS = 100_000
 """Most rows of a motion sent as JSON; a CSV holds more."""
@@ -148,7 +150,7 @@ class Stretch(Response):
 class LimitCheck(Response):
     """Where the motion comes nearest to a limit, or breaks it most."""
 
-    limit: Literal["position", "velocity", "acceleration", "jerk", "torque"] = described("Which.", None, "velocity")
+    limit: LimitName = described("Which; of the last three those that were asked for.", None, "velocity")
     held: bool = described("Whether the motion holds it.", None, True)
     worst_ratio: float | None = described(
         "|value| / limit; for positions the distance from the middle of the range over half of it. Null where the "
@@ -156,15 +158,26 @@ class LimitCheck(Response):
         "1",
         0.42,
     )
-    joint: str = described("Joint.", None, "wrist_2_joint")
+    joint: str | None = described("Joint; null for tool_cone, tcp_speed and elbow_speed.", None, "wrist_2_joint")
     t: float = described("When, from the motion's start.", "s", 0.75)
     value: float | None = described(
-        "Its value, in the limit's unit: rad, rad/s, rad/s², rad/s³, N·m. Null where it is not finite: acceleration "
-        "where speed jumps, jerk where acceleration jumps.",
+        "Its value, in the limit's unit: rad, rad/s, rad/s², rad/s³, N·m, m/s. Null where it is not finite: "
+        "acceleration where speed jumps, jerk where acceleration jumps.",
         "SI",
         1.31,
     )
     bound: float = described("The limit, in the same unit.", "SI", 3.1416)
+
+
+class Nearest(Response):
+    """What came nearest to what, by samples: no proof, between two of them the arm may come nearer."""
+
+    distance: float = described(
+        "Least distance met, less the obstacle's margin; below zero they overlap by that much.", "m", 0.031
+    )
+    pair: list[str] = described("Which: links, `tool`, `payload`, obstacles.", None, ["table", "tool"])
+    time: float = described("When, from the motion's start.", "s", 0.62)
+    spacing: float = described("Greatest time between two samples.", "s", 0.01)
 
 
 class EvaluatedSamples(Response):
@@ -206,4 +219,6 @@ class EvaluateResponse(Response):
     )
     within_limits: bool = described("Whether every limit is held.", None, False)
     limits: list[LimitCheck] = part("Every limit, one entry each.")
+    collides: bool | None = described("Whether two bodies overlap at a sample; null without comparison.", None, False)
+    nearest: Nearest | None = part("What came nearest to what; null where `collisions` is false.")
     samples: EvaluatedSamples | None = part("Samples, where `sample_period` was given; else null.")

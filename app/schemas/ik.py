@@ -2,45 +2,26 @@
 
 from __future__ import annotations
 
-from app.schemas.common import IDENTITY, Pose, Request, Response, RobotName, described, part
-from app.schemas.scene import Carried, Scene, Tool
+from app.schemas.common import Pose, Response, described, part
+from app.schemas.scene import Carried, CellRequest
 
 _Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 
 
-class IKRequest(Request):
+class IKRequest(CellRequest):
     """A pose whose arm configurations are wanted."""
 
-    robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
     pose: Pose = described(
         "Pose of the TCP in the robot's base frame.", None, {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
     )
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
-        None,
-        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
-    )
     windings: bool = described(
         "Whether to also give solutions a full turn away, where the joint range allows.", None, True, default=True
-    )
-    tool: Tool = described(
-        "The tool at the flange, for collisions with it.",
-        None,
-        {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]},
-        default=Tool(),
     )
     payload: Carried | None = described(
         "What the flange carries, for collisions. Null: nothing.",
         None,
         {"shape": {"shape": "box", "size": [0.1, 0.1, 0.2]}},
         default=None,
-    )
-    scene: Scene = described(
-        "What surrounds the arm.",
-        None,
-        {"obstacles": [{"name": "post", "shape": "cylinder", "radius": 0.05, "length": 1.0}]},
-        default=Scene(),
     )
 
 

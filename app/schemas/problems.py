@@ -133,6 +133,46 @@ class InvalidTable(Problem):
     column: str | None = described("Column, as a CSV's header names it; null where no single one is.", None, "q3")
 
 
+_PAIR = "Names of the two bodies: links, `tool`, `payload`, or an obstacle."
+_DEPTH = "How far they would have to part to be allowed."
+
+
+class CollidingBranch(Response):
+    """An arm configuration in which the arm hits something."""
+
+    label: str = described("Branch: shoulder/elbow/wrist.", None, "left/up/no_flip")
+    target: int = described("Which target of `any_of` it reaches, counted from 0; 0 for a single target.", None, 0)
+    q: list[float] = described("Joint positions.", "rad", [0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+    pair: list[str] = described(_PAIR, None, ["table", "forearm"])
+    depth: float = described(_DEPTH, "m", 0.031)
+
+
+class _InCollision(Problem):
+    pair: list[str] = described(f"{_PAIR} Of the least bad arm configuration.", None, ["table", "forearm"])
+    depth: float = described(_DEPTH, "m", 0.031)
+    branches: list[CollidingBranch] = part(
+        "Every arm configuration and what it hits, the least bad first; of more than 64, the first ones."
+    )
+
+
+class StartInCollision(_InCollision):
+    """In every arm configuration at the start, the arm hits itself, its tool, its payload or an obstacle, or is nearer
+    to it than its margin. Move the start or the obstacle, or set `collisions` to false if the shapes are too coarse."""
+
+    type: Literal["/problems/start-in-collision"] = _fixed("/problems/start-in-collision", "type")
+    title: Literal["Start in collision"] = _fixed("Start in collision", "title")
+    status: Literal[422] = _fixed(422, "status")
+
+
+class GoalInCollision(_InCollision):
+    """In every arm configuration at the goal, the arm hits itself, its tool, its payload or an obstacle, or is nearer
+    to it than its margin. Move the goal or the obstacle, or set `collisions` to false if the shapes are too coarse."""
+
+    type: Literal["/problems/goal-in-collision"] = _fixed("/problems/goal-in-collision", "type")
+    title: Literal["Goal in collision"] = _fixed("Goal in collision", "title")
+    status: Literal[422] = _fixed(422, "status")
+
+
 class DurationTooShort(Problem):
     """No motion within the limits is as fast as `duration` demands. Allow at least `shortest`, or leave the duration to
     the optimiser."""
@@ -166,6 +206,20 @@ class NoTrajectory(_SearchProblem):
     type: Literal["/problems/no-trajectory"] = _fixed("/problems/no-trajectory", "type")
     title: Literal["No trajectory found"] = _fixed("No trajectory found", "title")
     status: Literal[422] = _fixed(422, "status")
+
+
+class NoCollisionFreeTrajectory(_SearchProblem):
+    """No motion was found that hits nothing. That is no proof that there is none: the search goes from several first
+    guesses. Make room at what `pair` names, move the start or the goal, leave the branch free, or go in two moves."""
+
+    type: Literal["/problems/no-collision-free-trajectory"] = _fixed("/problems/no-collision-free-trajectory", "type")
+    title: Literal["No collision-free trajectory found"] = _fixed("No collision-free trajectory found", "title")
+    status: Literal[422] = _fixed(422, "status")
+    pair: list[str] = described(f"{_PAIR} Of the best attempt.", None, ["table", "forearm"])
+    depth: float = described(_DEPTH, "m", 0.031)
+    time: float = described("When, from the attempt's start.", "s", 0.62)
+    start: str = described("Branch at the attempt's start.", None, "left/up/no_flip")
+    goal: str = described("Branch at its goal.", None, "left/up/no_flip")
 
 
 class DeadlineExceeded(_SearchProblem):
@@ -302,9 +356,12 @@ PROBLEMS: tuple[type[Problem], ...] = (
     UnreachableTargets,
     OutsideLimits,
     InvalidTable,
+    StartInCollision,
+    GoalInCollision,
     DurationTooShort,
     TorqueInfeasible,
     NoTrajectory,
+    NoCollisionFreeTrajectory,
     DeadlineExceeded,
     Busy,
     NotReady,

@@ -171,13 +171,16 @@ class UnreachableTarget(Response):
 
 
 class WorstRatio(Response):
-    """Greatest value / limit over the motion: at most 1 + 1e-6."""
+    """Greatest value / limit over the motion: at most 1 + 1e-6. The last three only where they were asked for."""
 
     position: float = described("Joint position within its range.", "1", 0.61)
     velocity: float = described("Joint speed.", "1", 0.74)
     acceleration: float = described("Joint acceleration.", "1", 1.0)
     jerk: float = described("Joint jerk.", "1", 0.66)
     torque: float = described("Motor torque.", "1", 0.55)
+    tool_cone: float | None = described("Angle of the tool's axis in its cone.", "1", 0.93, default=None)
+    tcp_speed: float | None = described("Speed of the TCP.", "1", 1.0, default=None)
+    elbow_speed: float | None = described("Speed of the elbow.", "1", 0.71, default=None)
 
 
 class EndError(Response):
@@ -185,6 +188,15 @@ class EndError(Response):
 
     position: float = described("Distance.", "m", 2e-12)
     rotation: float = described("Angle.", "rad", 4e-12)
+
+
+class Clearance(Response):
+    """How far the arm keeps from itself and from the scene, the obstacles' margins taken off."""
+
+    min_clearance: float = described("No two bodies are ever nearer: proven for every instant.", "m", 0.0141)
+    sampled: float = described("Least distance met: the truth lies between the two.", "m", 0.0142)
+    pair: list[str] = described("What is nearest there: links, `tool`, `payload`, obstacles.", None, ["table", "tool"])
+    time: float = described("When, from the motion's start.", "s", 0.62)
 
 
 class Certificate(Response):
@@ -195,6 +207,7 @@ class Certificate(Response):
     goal_error: EndError = part("At the goal.")
     energy_error: float = described("Fine quadrature against the reported total, relative.", "1", 1e-6)
     balance_error: float = described("Sum of the parts against the total, relative.", "1", 1e-6)
+    clearance: Clearance | None = part("How far the arm keeps from everything; null where `collisions` is false.")
 
 
 class Solver(Response):

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import IDENTITY, Pose, Request, Vector3, described
+from app.schemas.common import IDENTITY, Pose, Request, RobotName, Vector3, described
 
 # the optimizer refuses more; here so that the schema says so
 MOST_OBSTACLES, MOST_VERTICES, MOST_CAPSULES = 64, 256, 16
@@ -171,4 +171,28 @@ class Tool(Request):
         None,
         [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}],
         default=[],
+    )
+
+
+class CellRequest(Request):
+    """The robot, its tool, and what surrounds it."""
+
+    robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
+    tcp: Pose = described(
+        "Pose of the TCP in the flange frame.",
+        None,
+        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
+        default=IDENTITY,
+    )
+    tool: Tool = described(
+        "The tool at the flange, for collisions with it.",
+        None,
+        {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]},
+        default=Tool(),
+    )
+    scene: Scene = described(
+        "What surrounds the arm.",
+        None,
+        {"obstacles": [{"name": "post", "shape": "cylinder", "radius": 0.05, "length": 1.0}]},
+        default=Scene(),
     )

@@ -8,9 +8,10 @@ from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.answers import KeptAnswer
+from app.schemas.arm import ArmRequest
 from app.schemas.common import Request, Response, described, part
 from app.schemas.evaluate import EvaluateRequest
-from app.schemas.request import MAX_DURATION, ArmRequest, OptimizeRequest
+from app.schemas.request import MAX_DURATION, OptimizeRequest
 from app.schemas.response import Certificate, ElectricalEnergy
 from app.schemas.studies import Name
 

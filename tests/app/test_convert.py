@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 from pydantic import TypeAdapter
 
-from app.convert import to_matrix, to_problem
+from app.convert import to_problem
+from app.convert_pose import to_matrix
 from app.schemas.common import Pose
 from app.schemas.request import OptimizeRequest
 from models.registry import load_robot

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert import to_matrix
+from app.convert_pose import to_matrix
 from app.schemas.common import QuaternionPose
 from app.schemas.ik import IKResponse
 from app.schemas.robots import RobotDetail, RobotList

@@ -171,7 +171,12 @@ def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
     error = refusal.value
     assert error.joint == ROBOT.joint_names[1] and error.available == 5 and error.needed > 5
     some = Task(
-        problem(goal=tcp_pose(GOAL), payload=Payload(mass=5), limits=limits(tau_max=[150, 80, 150, 28, 28, 28]))
+        problem(
+            goal=tcp_pose(GOAL),
+            payload=Payload(mass=5),
+            collisions=False,
+            limits=limits(tau_max=[150, 80, 150, 28, 28, 28]),
+        )
     )
     found = entries(some.problem)
     search.bound(some, found)
