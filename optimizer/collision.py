@@ -227,6 +227,11 @@ class CollisionModel:
         return np.asarray(least + np.einsum("ki,ki->k", T[:, :3, 3], normal))
 
     def _ends(self, frames: Array, configuration: Indices, body: Indices) -> Array:
+        if len(body) > len(frames) * len(self.bodies):
+            # each body is in many pairs: placed once per configuration, not once per pair
+            T = frames[:, self.links]
+            placed = self._points[:, :2] @ T[..., :3, :3].swapaxes(-1, -2) + T[..., None, :3, 3]
+            return np.asarray(placed[configuration, body])
         T = frames[configuration, self.links[body]]
         return np.asarray(self._points[body, :2] @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3])
 
