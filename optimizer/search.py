@@ -35,6 +35,8 @@ SAMPLES, LEAST_SAMPLES = 96, 12
 MOST_PAIRS = 32768
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
+# share of the tool's cone that a goal of free orientation may use: on the edge nothing would be left for the motion
+INSIDE = 0.999
 UNVISITED = "not reached before the deadline"
 HELD_BACK = "other orientations promise more"
 PRUNED = "its lower bound is not below the best energy found"
@@ -139,7 +141,8 @@ def _ends_of(task: Task, name: str, target: Single, index: int, samples: int) ->
 
 
 def _ends_of_samples(task: Task, name: str, pose: LoosePose, index: int, samples: int) -> list[End]:
-    """The branches of orientations spread over those that the pose allows."""
+    """The branches of orientations spread over those that the pose, and the tool's cone, allow."""
+    pose = _within_cone(task, pose)
     found: list[End] = []
     errors: list[UnreachablePose | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
@@ -160,6 +163,18 @@ def _ends_of_samples(task: Task, name: str, pose: LoosePose, index: int, samples
         f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to where the arm can "
         "go, widen limits.position or leave `branch` out.",
     )
+
+
+def _within_cone(task: Task, pose: LoosePose) -> LoosePose:
+    """The pose with no more freedom than the tool's cone leaves, where both are about the same axes: few orientations
+    of a free pose would be in a narrow cone."""
+    cone = task.problem.tool_cone
+    if cone is None:
+        return pose
+    free = pose.half_angle == np.pi
+    if not free and not (np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)):
+        return pose
+    return LoosePose(pose.position, cone.axis, cone.direction, min(pose.half_angle, INSIDE * cone.half_angle))
 
 
 def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry]:

@@ -6,6 +6,12 @@ from fastapi.openapi.models import Example
 
 _HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 
+
+def _at(x: float, y: float, z: float) -> dict[str, list[float]]:
+    """A pose that is not turned."""
+    return {"position": [x, y, z], "rotvec": [0.0, 0.0, 0.0]}
+
+
 OPTIMIZE_EXAMPLES: dict[str, Example] = {
     "joint_to_pose": {
         "summary": "From joints to a pose",
@@ -107,6 +113,56 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
             "payload": {"mass": 3.0, "com": [0.0, 0.0, 0.06]},
             "cycle": {"time": 4.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 15.0},
             "link_mass_scale": 0.8,
+        },
+    },
+    "over_a_post": {
+        "summary": "A gripper with a part, past a post on a table",
+        "description": "Every instant is proven to keep the obstacles' margins: see the certificate's `clearance`.",
+        "value": {
+            "start": {"q": [-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]},
+            "goal": {"q": [0.66, -1.4, 1.2, -1.37, -1.57, -0.91]},
+            "tcp": {"position": [0.0, 0.0, 0.12], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+            "tool": {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.1], "radius": 0.04}]},
+            "payload": {
+                "mass": 0.8,
+                "com": [0.0, 0.0, 0.13],
+                "shape": {
+                    "shape": "box",
+                    "size": [0.06, 0.06, 0.06],
+                    "pose": {"position": [0.0, 0.0, 0.14], "rotvec": [0.0, 0.0, 0.0]},
+                },
+            },
+            "scene": {
+                "obstacles": [
+                    {"name": "table", "shape": "half_space", "pose": _at(0.0, 0.0, -0.02)},
+                    {
+                        "name": "post",
+                        "shape": "cylinder",
+                        "radius": 0.03,
+                        "length": 0.4,
+                        "margin": 0.01,
+                        "pose": _at(-0.52, 0.0, 0.2),
+                    },
+                ]
+            },
+        },
+    },
+    "glass_upright": {
+        "summary": "A glass kept upright",
+        "description": "The tool's z axis stays within 0.02 rad of straight down, all along.",
+        "value": {
+            "start": {"q": [-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]},
+            "goal": {"q": [0.66, -1.4, 0.75, -0.92, -1.57, -0.91]},
+            "tool_cone": {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.02},
+        },
+    },
+    "collaborative_speeds": {
+        "summary": "Beside people",
+        "description": "Neither the tool nor the elbow moves faster than a collaborative cell allows.",
+        "value": {
+            "start": {"q": [-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]},
+            "goal": {"q": [0.66, -1.4, 1.2, -1.37, -1.57, -0.91]},
+            "limits": {"tcp_speed": 0.25, "elbow_speed": 0.2},
         },
     },
 }
