@@ -1,0 +1,217 @@
+"""Obstacles, tool and cone over HTTP: what is avoided, what is refused, and what the certificate says of it."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+from starlette.testclient import TestClient
+
+from app.convert_arm import arm_fields
+from app.schemas import problems
+from app.schemas.request import OptimizeRequest
+from optimizer.arm import Arm
+from optimizer.collision import CollisionModel
+from optimizer.keep_away import RESERVE
+from tests.app.requests import EXAMPLES, HOME, move
+from tests.app.test_examples import EXAMPLES as FILES
+from tests.app.test_problems import DOWN, refused
+
+# a far obstacle may cost no more than this share of the energy
+FAR = 1e-3
+# forearm folded onto the upper arm
+FOLDED = [0.3, -1.4, 3.0, -1.5, -1.57, 0.2]
+CONE = {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.1}
+
+
+def at(*position: float) -> dict[str, list[float]]:
+    return {"position": list(position), "rotvec": [0.0, 0.0, 0.0]}
+
+
+def floor(height: float, **fields: Any) -> dict[str, Any]:
+    return {"obstacles": [{"name": "floor", "shape": "half_space", "pose": at(0, 0, height), **fields}]}
+
+
+def answered(client: TestClient, request: dict[str, Any], path: str = "/optimize") -> dict[str, Any]:
+    answer = client.post(path, json=request)
+    assert answer.status_code == 200, answer.text
+    content: dict[str, Any] = answer.json()
+    return content
+
+
+def least_distance(request: dict[str, Any], spline: dict[str, Any]) -> float:
+    """The least distance [m] of a motion on a 0.1 ms grid."""
+    model = CollisionModel(Arm(**arm_fields(OptimizeRequest.model_validate_json(json.dumps(request)))))
+    curve = BSpline(np.array(spline["knots"]), np.array(spline["control_points"]), spline["degree"])
+    q = curve(np.linspace(0, spline["knots"][-1], int(spline["knots"][-1] * 1e4) + 1))
+    return min(contact.distance for contact in model.contacts(q, within=0.01))
+
+
+def test_goes_around_a_post(client: TestClient) -> None:
+    request = EXAMPLES["over_a_post"]
+    content = answered(client, request)
+    clearance = content["certificate"]["clearance"]
+    assert 0 <= clearance["min_clearance"] <= clearance["sampled"]
+    assert 0 <= clearance["time"] <= content["duration"]
+    assert least_distance(request, content["trajectory"]["spline"]) >= clearance["min_clearance"]
+    through = answered(client, request | {"collisions": False})
+    assert through["certificate"]["clearance"] is None
+    assert least_distance(request, through["trajectory"]["spline"]) < 0, "without looking, it goes through the post"
+    assert content["energy"]["electrical"]["total"] > through["energy"]["electrical"]["total"]
+
+
+def test_out_of_a_bin_onto_a_shelf(client: TestClient) -> None:
+    request = json.loads((FILES / "optimize" / "bin_to_shelf.json").read_text())
+    content = answered(client, request)
+    assert least_distance(request, content["trajectory"]["spline"]) >= 0
+
+
+def test_far_obstacles_cost_nothing(client: TestClient) -> None:
+    alone, with_floor = (
+        answered(client, move(**fields))
+        for fields in ({}, {"scene": floor(-1.0), "tool": EXAMPLES["over_a_post"]["tool"]})
+    )
+    ours, theirs = (content["energy"]["electrical"]["total"] for content in (alone, with_floor))
+    assert ours == pytest.approx(theirs, rel=FAR)
+    assert "floor" not in with_floor["certificate"]["clearance"]["pair"]
+
+
+def test_start_and_goal_in_collision(client: TestClient) -> None:
+    start = refused(client.post("/optimize", json=move(start={"q": FOLDED})), problems.StartInCollision)
+    goal = refused(client.post("/optimize", json=move(goal={"q": FOLDED})), problems.GoalInCollision)
+    assert start["pair"] == goal["pair"] == ["upper_arm", "wrist_1"]
+    assert start["branches"] == goal["branches"] and goal["branches"][0]["q"] == FOLDED
+    arm = Arm()
+    found = CollisionModel(arm).contacts([np.array(FOLDED)])[0].distance
+    assert goal["depth"] == pytest.approx(RESERVE - found)
+    assert answered(client, move(goal={"q": FOLDED}, collisions=False))["certificate"]["clearance"] is None
+
+
+def test_every_branch_in_collision_is_listed(client: TestClient) -> None:
+    position = [-0.35, 0.4, 0.05]
+    block = {"name": "block", "shape": "box", "size": [0.2, 0.2, 0.4], "pose": at(*position)}
+    goal = {"pose": {"position": position, "quaternion": DOWN}}
+    request = {"start": {"q": HOME}, "goal": goal, "scene": {"obstacles": [block]}}
+    content = refused(client.post("/optimize", json=request), problems.GoalInCollision)
+    labels = [branch["label"] for branch in content["branches"]]
+    assert len(set(labels)) == len(labels) == 8
+    depths = [branch["depth"] for branch in content["branches"]]
+    assert depths == sorted(depths) and content["depth"] == depths[0] > 0
+    assert content["pair"] == content["branches"][0]["pair"]
+
+
+def test_margin_counts_at_the_ends(client: TestClient) -> None:
+    lowest = answered(client, move(scene=floor(-0.1)))
+    assert lowest["certificate"]["clearance"]["min_clearance"] > 0
+    content = refused(client.post("/optimize", json=move(scene=floor(-0.1, margin=0.9))), problems.StartInCollision)
+    assert content["pair"][0] == "floor" and 0.5 < content["depth"] < 0.9
+
+
+def test_some_branches_in_collision_are_candidates_ruled_out(client: TestClient) -> None:
+    goal = {"pose": {"position": [-0.35, 0.4, 0.1], "quaternion": DOWN}}
+    content = answered(client, {"start": {"q": HOME}, "goal": goal, "windings": False, "scene": floor(-0.01)})
+    out = [c for c in content["candidates"] if c["status"] == "infeasible"]
+    assert out and all("at the goal, floor and" in c["reason"] and c["lower_bound"] is None for c in out)
+    assert content["branch"]["goal"]["label"] not in {c["goal"] for c in out}
+
+
+def test_no_way(client: TestClient) -> None:
+    # the straight line in joint space leads through the post, and the method knows no other
+    request = EXAMPLES["over_a_post"] | {"method": "time_scaling"}
+    content = refused(client.post("/optimize", json=request), problems.NoCollisionFreeTrajectory)
+    assert "post" in content["pair"] and content["depth"] > 0 and content["time"] > 0
+    assert content["candidates"][0]["status"] == "infeasible" and "post and" in content["candidates"][0]["reason"]
+    assert content["start"] == content["candidates"][0]["start"]
+
+
+def test_ends_outside_the_cone(client: TestClient) -> None:
+    q = [*HOME[:4], -1.57 + 0.5, 0.0]
+    for end in ("start", "goal"):
+        answer = client.post("/optimize", json=move(**{end: {"q": q}}, tool_cone=CONE))
+        content = refused(answer, problems.Validation)
+        assert content["errors"][0]["loc"] == ["body", "tool_cone"]
+        # the wrist turned by 0.5 rad tilts the tool by as much
+        assert "0.4" in content["detail"] and end in content["detail"]
+
+
+def test_a_free_goal_keeps_within_the_cone(client: TestClient) -> None:
+    request = {
+        "start": {"q": HOME},
+        "goal": {"pose": {"position": [-0.35, 0.4, 0.3], "orientation": "free"}},
+        "tool_cone": CONE | {"half_angle": 0.05},
+    }
+    assert answered(client, request)["certificate"]["worst_ratio"]["tool_cone"] <= 1 + 1e-6
+
+
+@pytest.mark.parametrize(
+    ("fields", "where"),
+    [
+        ({"tool_cone": CONE | {"axis": [0.0, 0.0, 0.0]}}, ["body", "tool_cone", "axis"]),
+        ({"tool_cone": CONE | {"half_angle": 0.0}}, ["body", "tool_cone", "half_angle"]),
+        ({"limits": {"tcp_speed": 0.0}}, ["body", "limits", "tcp_speed"]),
+        ({"limits": {"elbow_speed": -1.0}}, ["body", "limits", "elbow_speed"]),
+        ({"collisions": 1}, ["body", "collisions"]),
+        ({"scene": {"obstacles": floor(0)["obstacles"] * 2}}, ["body", "scene", "obstacles"]),
+    ],
+)
+def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:
+    for path, request in (
+        ("/optimize", move(**fields)),
+        ("/evaluate", {"configurations": [HOME, HOME[::-1]], "time_per_segment": 2.0, **fields}),
+    ):
+        errors = refused(client.post(path, json=request), problems.Validation)["errors"]
+        assert errors[0]["loc"][: len(where)] == where
+
+
+def test_compare_and_pareto_keep_clear_too(client: TestClient) -> None:
+    request = EXAMPLES["over_a_post"]
+    compared = answered(client, request | {"methods": ["bspline", "time_scaling"]}, "/compare")["methods"]
+    assert compared[0]["valid"]
+    assert compared[1]["problem"]["type"] == "/problems/no-collision-free-trajectory", "the straight line hits the post"
+    front = answered(client, request | {"points": 2, "duration": {"max": 1.5}}, "/pareto")
+    kept = client.get(front["points"][0]["answer"]).json()["answer"]
+    assert kept["certificate"]["clearance"]["min_clearance"] >= 0
+
+
+def test_evaluate_tells_what_comes_nearest(client: TestClient) -> None:
+    request = EXAMPLES["over_a_post"]
+    through = answered(client, request | {"collisions": False})
+    cell = {name: request[name] for name in ("tcp", "tool", "payload", "scene")}
+    log = {name: through["trajectory"][name] for name in ("t", "q")}
+    limits = {"limits": {"tcp_speed": 0.25}, "tool_cone": CONE}
+    content = answered(client, {"trajectory": log, **cell, **limits}, "/evaluate")
+    assert content["collides"] and "post" in content["nearest"]["pair"]
+    held = {report["limit"]: report["held"] for report in content["limits"]}
+    assert held["tcp_speed"] is False and "elbow_speed" not in held and "tool_cone" in held
+    off = answered(client, {"trajectory": log, **cell, "collisions": False}, "/evaluate")
+    assert off["collides"] is off["nearest"] is None
+
+
+def test_evaluate_samples_the_least_distance(client: TestClient) -> None:
+    request = move(scene=floor(0.02), goal={"q": [1.0, -1.0, 1.9, -1.57, -1.57, 0.0]}, collisions=False)
+    spline = (trajectory := answered(client, request)["trajectory"])["spline"]
+    given = {"trajectory": {name: trajectory[name] for name in ("t", "q")}, "scene": request["scene"]}
+    nearest = answered(client, given, "/evaluate")["nearest"]
+    assert nearest["spacing"] <= 0.01
+    # the arm moves at two metres per second at most: half a spacing is a centimetre
+    assert nearest["distance"] == pytest.approx(least_distance(request, spline), abs=0.01)
+
+
+def test_evaluate_takes_a_scene_as_a_query(client: TestClient) -> None:
+    rows = "q1,q2,q3,q4,q5,q6\n" + "\n".join(",".join(map(str, q)) for q in (HOME, [1.2, *HOME[1:]])) + "\n"
+    settings = {
+        "time_per_segment": "1.5",
+        "scene": json.dumps(floor(-0.1)),
+        "tool_cone": json.dumps(CONE),
+        "limits": json.dumps({"tcp_speed": 0.2, "elbow_speed": 0.2}),
+        "collisions": "true",
+    }
+    answer = client.post("/evaluate", content=rows, headers={"Content-Type": "text/csv"}, params=settings)
+    assert answer.status_code == 200, answer.text
+    limits = {report["limit"]: report for report in answer.json()["limits"]}
+    assert limits["tcp_speed"]["value"] / limits["tcp_speed"]["bound"] == limits["tcp_speed"]["worst_ratio"]
+    assert limits["tool_cone"]["held"] and limits["tool_cone"]["joint"] is None
+    assert not answer.json()["collides"]
