@@ -17,6 +17,7 @@ from optimizer.optimize import optimize
 
 Json = dict[str, Any]
 ENERGY_ERROR = 1e-4  # relative, between Simpson's rule on 1 ms and the optimiser's quadrature
+ROUNDING = 1e-12  # rad
 RATIO_ERROR = 2e-3  # between the certificate's grid and this one
 
 
@@ -108,7 +109,7 @@ def test_replay_agrees_with_the_certificate(task: Ask, answered: Json) -> None:
     points = np.array(spline["control_points"])
     problem = to_problem(OptimizeRequest.model_validate(task.body), 10.0)
     motion = replay(problem, SplineMotion(np.array(spline["knots"]), points, spline["degree"]), points[0], points[-1])
-    assert motion.end_error == 0
+    assert motion.end_error < ROUNDING
     assert motion.energy.electrical.total == pytest.approx(answered["energy"]["electrical"]["total"], rel=ENERGY_ERROR)
     for name, ratio in answered["certificate"]["worst_ratio"].items():
         assert motion.shares[name] == pytest.approx(ratio, abs=RATIO_ERROR)
