@@ -27,7 +27,7 @@ serve: $(VENV)/.runtime kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
 test: lint kernels
-	$(PY) -m pytest $(PYTEST_ARGS)
+	$(PY) -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
 
 lint: $(VENV)/.dev
 	$(PY) -m ruff check $(SOURCES)

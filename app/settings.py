@@ -32,7 +32,7 @@ class Settings(BaseSettings):
         description="Worker processes, each solving one request at a time. Default: the CPUs this process may use.",
     )
     queue_size: int = Field(default=16, ge=0, description="Requests that may wait for a worker; more are refused.")
-    max_body_bytes: int = Field(default=65_536, ge=1024, description="Largest request body [byte].")
+    max_body_bytes: int = Field(default=4_194_304, ge=1024, description="Largest request body [byte].")
     max_upload_bytes: int = Field(
         default=67_108_864, ge=1024, description="Largest body of `POST /evaluate`, which goes to a file [byte]."
     )

@@ -82,7 +82,8 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
+    # appended to: reading moves the place that the process would otherwise write at
+    with tempfile.TemporaryFile("a+b") as log, tempfile.TemporaryDirectory() as folder:
         settings = {"database_url": f"sqlite:///{folder}/joulepath.db", **settings}
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
