@@ -16,6 +16,7 @@ from app.schemas.response import OptimizeResponse
 from app.schemas.whatif import WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from tests.app.requests import HOME, NEAR, move
+from tests.optimizer.moves import tcp_pose
 
 # the same computation on another route: sums in another order
 SAME = 1e-12
@@ -135,6 +136,18 @@ def test_a_tighter_limit_breaks_the_same_motion_only(optimized: dict[str, Any]) 
     assert not several["same_motion"]["holds"]
     assert several["same_motion"]["certificate"]["worst_ratio"]["velocity"] > 1
     assert several["reoptimised"]["status"] == "optimal"
+
+
+def test_an_obstacle_in_the_way_breaks_the_same_motion(client: TestClient, optimized: dict[str, Any]) -> None:
+    """A ball where the flange passes half-way."""
+    trajectory = kept(client, optimized["base"]["answer"], "optimize")["trajectory"]
+    position = tcp_pose(np.array(trajectory["q"][len(trajectory["q"]) // 2])).T[:3, 3].tolist()
+    pose = {"position": position, "rotvec": [0.0, 0.0, 0.0]}
+    scene = {"obstacles": [{"name": "ball", "shape": "sphere", "radius": 0.03, "pose": pose}]}
+    row = ask(client, {"optimize": LIFT}, ball={"scene": scene})["changes"]["ball"]
+    assert not row["same_motion"]["holds"]
+    assert row["same_motion"]["certificate"]["clearance"]["min_clearance"] < 0
+    assert row["same_motion"]["electrical"]["total"]["difference"] == 0
 
 
 def test_is_the_difference_of_two_evaluations(client: TestClient, evaluated: dict[str, Any]) -> None:
