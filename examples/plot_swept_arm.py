@@ -1,0 +1,163 @@
+"""Draws where an arm passes: its capsules at some instants of the motion, the scene, and the path of the TCP.
+
+    python examples/plot_swept_arm.py examples/optimize/bin_to_shelf.json docs/bin_to_shelf.png
+
+Solves the request with the library, from the repository's folder. Needs matplotlib.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+from scipy.interpolate import BSpline
+from scipy.spatial import ConvexHull
+
+from app.convert import to_problem
+from app.schemas.request import OptimizeRequest
+from models.robot import Array
+from optimizer.collision import TOOL, Body, CollisionModel
+from optimizer.optimize import optimize
+
+# Okabe and Ito's blue to orange, which colour-blind readers can tell apart
+OVER_TIME = LinearSegmentedColormap.from_list("over time", ["#0072B2", "#56B4E9", "#F0E442", "#E69F00", "#D55E00"])
+OBSTACLE, LIGHT = "#9A9A9A", np.array([-0.4, -0.5, 0.77])
+AROUND, ALONG = 14, 4
+# what is drawn: its middle, and half its extent along x and y [m]
+MIDDLE, HALF = np.array([-0.3, -0.15]), np.array([0.62, 0.75])
+
+
+def capsule(a: Array, b: Array, radius: float) -> list[Array]:
+    """Polygons (4, 3) of a capsule's surface."""
+    along = b - a
+    length = float(np.linalg.norm(along))
+    z = along / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    turn = np.linspace(0, 2 * np.pi, AROUND + 1)
+    ring = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
+    rise = np.linspace(0, np.pi / 2, ALONG)
+    lower = [a + radius * (np.cos(u) * ring - np.sin(u) * z) for u in rise[::-1]]
+    upper = [b + radius * (np.cos(u) * ring + np.sin(u) * z) for u in rise]
+    return quads(np.array(lower + upper))
+
+
+def quads(rings: Array) -> list[Array]:
+    """Polygons between neighbouring points of a grid (n, m, 3)."""
+    n, m, _ = rings.shape
+    return [rings[[i, i, i + 1, i + 1], [j, j + 1, j + 1, j]] for i in range(n - 1) for j in range(m - 1)]
+
+
+def hull(points: Array) -> list[Array]:
+    """Triangles (3, 3) of a convex hull, each cut into smaller ones, so that they can be sorted by depth."""
+    triangles = list(points[ConvexHull(points).simplices])
+    for _ in range(4):
+        longest = [max(np.linalg.norm(t - np.roll(t, 1, axis=0), axis=1)) for t in triangles]
+        if max(longest) < 0.12:
+            break
+        triangles = [part for t in triangles for part in quartered(t)]
+    return triangles
+
+
+def quartered(t: Array) -> list[Array]:
+    """Four triangles that make up one."""
+    ab, bc, ca = (t + np.roll(t, -1, axis=0)) / 2
+    return [np.array(part) for part in ([t[0], ab, ca], [ab, t[1], bc], [ca, bc, t[2]], [ab, bc, ca])]
+
+
+def surface(body: Body, T: Array) -> list[Array]:
+    """Polygons of a body whose link is at T (4, 4)."""
+    points = body.points @ T[:3, :3].T + T[:3, 3]
+    if body.core.plane:
+        x, y = (np.linspace(m - h, m + h, 15) for m, h in zip(MIDDLE, HALF, strict=True))
+        grid = np.stack([*np.meshgrid(x, y), np.zeros((15, 15))], axis=-1)
+        R = (T @ body.T_link_core)[:3, :3]
+        return quads(grid @ R.T + points[0])
+    if body.is_segment:
+        return capsule(points[0], points[-1], body.core.radius)
+    if body.core.ring:
+        axis = (T @ body.T_link_core)[:3, :3]
+        turn = np.linspace(0, 2 * np.pi, 2 * AROUND)
+        circle = body.core.ring * (np.cos(turn)[:, None] * axis[:, 0] + np.sin(turn)[:, None] * axis[:, 1])
+        return hull(np.concatenate([point + circle for point in points]))
+    return hull(points)
+
+
+def shaded(polygons: list[Array], colour: str, alpha: float) -> list[tuple[float, ...]]:
+    """A colour for every polygon, lighter the more it faces the light."""
+    colours = []
+    for polygon in polygons:
+        normal = np.cross(polygon[1] - polygon[0], polygon[2] - polygon[0])
+        facing = abs(float(normal @ LIGHT)) / max(float(np.linalg.norm(normal)), 1e-12)
+        colours.append((*(np.asarray(to_rgb(colour), dtype=float) * (0.62 + 0.38 * facing)), alpha))
+    return colours
+
+
+def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float, float]) -> None:
+    """Solves the request and draws its motion into a file."""
+    problem = to_problem(request, request.deadline)
+    solution = optimize(problem)
+    spline = solution.trajectory.spline
+    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    model = CollisionModel(problem)
+    frames = model.frames(curve(np.linspace(0, spline.duration, instants)))
+    polygons: list[Array] = []
+    colours: list[tuple[float, ...]] = []
+
+    def add(body: Body, T: Array, colour: str, alpha: float) -> None:
+        fresh = surface(body, T)
+        polygons.extend(fresh)
+        colours.extend(shaded(fresh, colour, alpha))
+
+    obstacles = {obstacle.name for obstacle in problem.scene.obstacles}
+    for body in model.bodies:
+        if body.name in obstacles:
+            add(body, np.eye(4), OBSTACLE, 0.18 if body.core.plane else 0.4)
+            continue
+        # what does not move is drawn once
+        shown = range(instants) if body.link > 1 else [0]
+        for k in shown:
+            colour = "#666666" if body.link <= 1 else to_hex(OVER_TIME(k / (instants - 1)))
+            at_end = k in (0, instants - 1) or body.link <= 1
+            add(
+                body, frames[k, body.link], "#333333" if body.name == TOOL and at_end else colour, 1 if at_end else 0.22
+            )
+
+    figure = plt.figure(figsize=(9, 7.2))
+    axes = figure.add_subplot(projection="3d", computed_zorder=False)
+    axes.add_collection3d(Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average"))
+    T_last_tcp = problem.robot.T_last_flange @ problem.T_flange_tcp
+    path = (model.frames(curve(np.linspace(0, spline.duration, 200)))[:, -1] @ T_last_tcp)[:, :3, 3]
+    axes.plot(*path.T, color="black", linewidth=1.6, zorder=10, label="path of the TCP")
+    for point, share, name in ((path[0], 0.0, "start"), (path[-1], 1.0, "goal")):
+        axes.scatter(*point, color=to_hex(OVER_TIME(share)), edgecolors="black", s=45, zorder=11, label=name)
+    (x_low, y_low), (x_high, y_high) = MIDDLE - HALF, MIDDLE + HALF
+    axes.set(xlim=(x_low, x_high), ylim=(y_low, y_high), zlim=(-0.02, 0.88))
+    axes.set_box_aspect((*(2 * HALF), 0.9), zoom=1.25)
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+    axes.view_init(*view)
+    axes.legend(loc="upper left", frameon=False)
+    clearance = solution.certificate.clearance
+    proven = "" if clearance is None else f", every margin kept by {1e3 * clearance.min_clearance:.2f} mm or more"
+    figure.suptitle(f"{solution.energy.electrical.total:.1f} J in {spline.duration:.2f} s{proven}", y=0.93)
+    figure.savefig(file, dpi=110, bbox_inches="tight")
+
+
+def main() -> None:
+    """Reads the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("request", type=Path, help="a request for POST /optimize")
+    parser.add_argument("picture", type=Path, help="where to write the picture")
+    parser.add_argument("--instants", type=int, default=10, help="how many arms to draw")
+    parser.add_argument("--view", type=float, nargs=2, default=(24.0, 160.0), help="elevation and azimuth [degrees]")
+    given = parser.parse_args()
+    request = OptimizeRequest.model_validate_json(given.request.read_text())
+    draw(request, given.picture, given.instants, tuple(given.view))
+
+
+if __name__ == "__main__":
+    main()
