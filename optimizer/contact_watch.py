@@ -11,9 +11,11 @@ from optimizer.collision import CollisionModel
 from optimizer.pieces import Pieces
 
 # between samples at most [s], if a block of pieces is not so long that it would take more than MOST
-PERIOD, MOST = 0.01, 4096
+PERIOD, MOST = 0.01, 16384
 # samples of a block that are looked at first
 COARSE = 16
+# pairs of bodies at instants that are looked at together
+CHECKS = 100_000
 
 
 @dataclass(frozen=True)
@@ -42,15 +44,15 @@ class ContactWatch:
         t = np.linspace(begin, end, min(int(np.ceil((end - begin) / PERIOD)), MOST) + 1)
         piece = np.clip(np.searchsorted(pieces.breaks, t, side="right") - 1, 0, len(pieces.segment) - 1)
         q = pieces.at(piece, t - pieces.breaks[piece])[0]
-        known = self.nearest
+        spacing = max((end - begin) / (len(t) - 1), 0.0 if self.nearest is None else self.nearest.spacing)
         # most of the work is saved by what is far from everything: its bounding balls are enough then
         within = min((c.distance for c in self._model.contacts(q[:: max(len(q) // COARSE, 1)])), default=np.inf)
-        contacts = self._model.contacts(q, within if known is None else min(within, known.distance))
-        if not contacts:
-            return
-        spacing = max((end - begin) / (len(t) - 1), 0.0 if known is None else known.spacing)
-        k = min(range(len(contacts)), key=lambda k: contacts[k].distance)
-        if known is None or contacts[k].distance < known.distance:
-            self.nearest = Nearest(contacts[k].distance, contacts[k].pair, float(t[k]), spacing)
-        else:
-            self.nearest = replace(known, spacing=spacing)
+        at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
+        for low in range(0, len(q), at_once):
+            contacts = self._model.contacts(q[low : low + at_once], within)
+            for k, contact in enumerate(contacts, low):
+                if self.nearest is None or contact.distance < self.nearest.distance:
+                    self.nearest = Nearest(contact.distance, contact.pair, float(t[k]), spacing)
+            within = within if self.nearest is None else min(within, self.nearest.distance)
+        if self.nearest is not None:
+            self.nearest = replace(self.nearest, spacing=spacing)
