@@ -16,6 +16,8 @@ from models.robot import Array, Limits
 from optimizer import verify
 from optimizer.bounds import LONGEST_DURATION
 from optimizer.bspline import Basis
+from optimizer.collision import Indices
+from optimizer.keep_away import CLEARANCE, RESERVE, SCALE
 from optimizer.motion import Task, fine_samples, peak_rates, sample, slowed, spline_of, stretch
 from optimizer.nlp import Coordinates, Programme
 from optimizer.path_limits import PathLimits
@@ -128,10 +130,12 @@ class Programmed(Solver):
         than the candidate's.
         """
         window, kernel, deadline = self.window, self.task.kernel, min(deadline, self.deadline)
-        programme = self._watched(
-            Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant),
-            self.task.guarded if guarded else self.task.path,
-        )
+        programme = Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant)
+        pairs: Indices = np.zeros(0, dtype=np.intp)
+        if guarded:
+            guessed = spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
+            pairs = self.task.near(guessed)
+        programme = self._watched(programme, self.task.guarded(pairs) if guarded else self.task.path)
         limits = self.task.problem.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
         duration = self._first_duration(programme, free, guess.duration)
@@ -156,10 +160,15 @@ class Programmed(Solver):
             if excess is not None:
                 limits = _tightened(limits, excess)
                 programme = replace(programme, coordinates=self._coordinates(limits))
-            if hit is not None and programme.path is not self.task.guarded:
+            nearby = pairs if hit is None else np.union1d(pairs, self.task.near(spline))
+            if len(nearby) > len(pairs):
                 # only now, since most motions hit nothing
-                programme = self._watched(programme, self.task.guarded)
-            else:
+                pairs = nearby
+                programme = self._watched(programme, self.task.guarded(pairs))
+            elif programme.path is not None:
+                if hit is not None and not beyond.any():
+                    # met nowhere, but not proven either: a hair more between the points that are held
+                    beyond = np.where(np.array(programme.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
                 programme = replace(programme, room=programme.room - beyond)
             # the solver takes no step for positions alone: it bounds them
             free = np.clip(result.free, programme.limits.q_min, programme.limits.q_max)

@@ -140,10 +140,14 @@ class CollisionModel:
         gradient = self.gradients(frames, configuration, pair, found)
         return found.distance.reshape(n, p), gradient.reshape(n, p, self.nq)
 
+    def gaps(self, q: Array, within: float) -> Array:
+        """Signed distances (n, pairs) [m] at q (n, nq); where one exceeds `within`, something above that."""
+        configuration, pair = np.divmod(np.arange(len(q) * len(self.pairs)), max(len(self.pairs), 1))
+        return self.nearest(self.frames(q), configuration, pair, within).distance.reshape(len(q), -1)
+
     def least(self, q: Array, within: float) -> float:
         """The least distance [m] over all pairs at q (n, nq), or, where it exceeds `within`, something above that."""
-        configuration, pair = np.divmod(np.arange(len(q) * len(self.pairs)), max(len(self.pairs), 1))
-        return float(self.nearest(self.frames(q), configuration, pair, within).distance.min(initial=np.inf))
+        return float(self.gaps(q, within).min(initial=np.inf))
 
     def contacts(self, q: Sequence[Array] | Array, within: float = np.inf) -> list[Contact]:
         """The nearest pair at each of q (n, nq): none at all where nothing is compared.

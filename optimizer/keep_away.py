@@ -11,6 +11,7 @@ from models.robot import Array
 from optimizer.collision import CollisionModel, Indices
 from optimizer.path_limits import Shares
 
+CLEARANCE = "clearance"
 # kept beyond the margins [m]: twice the gap that the proof leaves between what it proves and what is met
 RESERVE = 2e-4
 # distance [m] over which a share falls from 1 to 0; bodies further apart than that do not count
@@ -19,19 +20,20 @@ SCALE = 0.1
 
 @dataclass(frozen=True)
 class KeepAway:
-    """The pairs of a collision model. The share is 1 where a pair is RESERVE beyond its margin, 0 where it is SCALE
+    """Pairs (k,) of a collision model. The share is 1 where a pair is RESERVE beyond its margin, 0 where it is SCALE
     further: linear in the signed distance.
     """
 
     model: CollisionModel
+    pairs: Indices
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The same name for every pair."""
-        return ("clearance",) * len(self.model.pairs)
+        return (CLEARANCE,) * len(self.pairs)
 
     def shares(self, frames: Array, q: Array, v: Array) -> Array:
-        """Shares (n, pairs)."""
+        """Shares (n, k)."""
         return _share(self.model.nearest(frames, *self._every(len(q)), RESERVE + SCALE).distance).reshape(len(q), -1)
 
     def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
@@ -43,8 +45,7 @@ class KeepAway:
 
     def _every(self, count: int) -> tuple[Indices, Indices]:
         """Every pair at every configuration."""
-        pairs = len(self.model.pairs)
-        return np.repeat(np.arange(count), pairs), np.tile(np.arange(pairs), count)
+        return np.repeat(np.arange(count), len(self.pairs)), np.tile(self.pairs, count)
 
 
 def _share(distance: Array) -> Array:

@@ -15,7 +15,7 @@ from optimizer import bspline
 from optimizer.arm import Arm
 from optimizer.bus import charges, drawn_at
 from optimizer.clearance import clearance
-from optimizer.collision import CollisionModel
+from optimizer.collision import CollisionModel, Indices
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown, power_flow
 from optimizer.keep_away import KeepAway
@@ -38,6 +38,8 @@ LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
 RATE_POINTS = 33
 # samples at which contact is looked for, and a distance [m] there that leaves no doubt until the certificate
 CONTACT_SAMPLES, CLEAR = 96, 0.02
+# pairs further apart than that [m] are left out of the programme until a motion brings them nearer
+WATCHED = 0.15
 # nearer to something than this beyond the margins [m], a motion is taken to be held off by it
 GRAZING = 5e-3
 # rounding of a share of a limit
@@ -185,10 +187,18 @@ class Task(Plant):
         """Limits along the path but for clearance, None where there are none."""
         return self.problem.path
 
-    @cached_property
-    def guarded(self) -> PathLimits:
-        """Limits along the path, clearance too."""
-        return PathLimits(self._placements, [*self.problem.path_limits, KeepAway(self.collisions)])
+    def guarded(self, pairs: Indices) -> PathLimits:
+        """Limits along the path, clearance of these pairs of the collision model too."""
+        return PathLimits(self._placements, [*self.problem.path_limits, KeepAway(self.collisions, pairs)])
+
+    def near(self, spline: Spline) -> Indices:
+        """The pairs that come so near each other in a motion that they are worth watching."""
+        gaps = self.collisions.gaps(self._seen(spline), WATCHED)
+        return np.flatnonzero(gaps.min(axis=0) < WATCHED)
+
+    def _seen(self, spline: Spline) -> Array:
+        """Samples (CONTACT_SAMPLES, nq) of a motion at which contact is looked for."""
+        return sample(spline, np.linspace(0.0, spline.duration, CONTACT_SAMPLES))[0]
 
     @cached_property
     def collisions(self) -> CollisionModel:
@@ -222,9 +232,14 @@ class Task(Plant):
         """Where the motion comes nearest, if it is not proven to keep its margins there."""
         if not self.problem.collisions:
             return None
-        q, _, _ = sample(spline, np.linspace(0.0, spline.duration, CONTACT_SAMPLES))
-        if self.collisions.least(q, CLEAR) >= CLEAR:
+        gaps = self.collisions.gaps(self._seen(spline), CLEAR)
+        least = float(gaps.min(initial=np.inf))
+        if least >= CLEAR:
             return None
+        if least < 0:
+            k, pair = np.unravel_index(int(gaps.argmin()), gaps.shape)
+            when = spline.duration * float(k) / (CONTACT_SAMPLES - 1)
+            return Clearance(least, least, self.collisions.names(int(pair)), when)
         found = clearance(self.collisions, spline)
         return found if found is not None and found.min_clearance < 0 else None
 

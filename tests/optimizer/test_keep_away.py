@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
 from optimizer.collision import CollisionModel
@@ -14,6 +15,7 @@ from optimizer.problem import Problem
 from optimizer.scene import Box, Obstacle, Scene, Sphere
 from optimizer.solution import Solution
 
+ROBOT = load_robot("ur5e")
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([1.8, -1.1, 1.9, -2.4, -1.57, 0.4])
 # of the motion between the two without anything in the way: where the flange passes
@@ -69,9 +71,13 @@ def test_what_is_far_away_changes_nothing() -> None:
     assert with_ball == pytest.approx(without, rel=SAME_ENERGY)
 
 
+def every_pair(model: CollisionModel) -> PathLimits:
+    return PathLimits(joint_placements(ROBOT.model), [KeepAway(model, np.arange(len(model.pairs)))])
+
+
 def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     problem = Problem(HOME, GOAL, scene=Scene((low_post(), Obstacle("ball", Sphere(0.1), at(0.3, -0.3, 0.4)))))
-    path = PathLimits(joint_placements(problem.robot.model), [KeepAway(CollisionModel(problem))])
+    path = every_pair(CollisionModel(problem))
     q = np.linspace(HOME, GOAL, 9)
     v = np.zeros_like(q)
     found = path.linearised(q, v)
@@ -86,7 +92,9 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     problem = Problem(HOME, GOAL)
     model = CollisionModel(problem)
-    shares = PathLimits(joint_placements(problem.robot.model), [KeepAway(model)]).shares(HOME[None], np.zeros((1, 6)))
+    shares = PathLimits(joint_placements(problem.robot.model), [KeepAway(model, np.arange(len(model.pairs)))]).shares(
+        HOME[None], np.zeros((1, 6))
+    )
     distance = model.distances(HOME[None], RESERVE + SCALE)[0]
     np.testing.assert_allclose(1 - shares, (distance - RESERVE) / SCALE)
 
