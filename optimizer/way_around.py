@@ -38,7 +38,7 @@ def ways_around(
     q_start: Array,
     q_goal: Array,
     deadline: float,
-    most: int = 3,
+    most: int = 2,
     seed: int = 1,
     model: CollisionModel | None = None,
 ) -> list[Array]:
