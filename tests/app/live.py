@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import httpx2
 
@@ -31,7 +31,7 @@ class Server:
 
     process: subprocess.Popen[bytes]
     url: str
-    log: IO[bytes]
+    log: Path
 
     def get(self, path: str) -> httpx2.Response:
         return httpx2.get(self.url + path, timeout=30)
@@ -40,9 +40,9 @@ class Server:
         return httpx2.post(self.url + path, json=body, timeout=60, **options)
 
     def logged(self) -> list[dict[str, Any]]:
-        """Every line logged so far: each must be JSON."""
-        self.log.seek(0)
-        return [json.loads(line) for line in self.log]
+        """Every line logged so far: each must be JSON. A line that is still being written is left for the next time."""
+        finished, _, _ = self.log.read_bytes().rpartition(b"\n")
+        return [json.loads(line) for line in finished.splitlines()]
 
     def descendants(self) -> set[int]:
         """Process ids of the server's children, theirs, and so on."""
@@ -82,12 +82,15 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    # appended to: reading moves the place that the process would otherwise write at
-    with tempfile.TemporaryFile("a+b") as log, tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder, "log")
         settings = {"database_url": f"sqlite:///{folder}/joulepath.db", **settings}
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
         environment |= {"JOULEPATH_LOG_LEVEL": "debug", "JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
-        process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=log)
+        with log.open("ab") as appended:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=appended
+            )
         server = Server(process, f"http://127.0.0.1:{port}", log)
         try:
             if warm:

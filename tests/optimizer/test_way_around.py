@@ -223,7 +223,7 @@ def test_limits_tightened_are_kept() -> None:
 
 def test_ways_keep_the_tool_within_its_cone() -> None:
     arm, q_start, q_goal = task("post")
-    cone = Cone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 0.6)
+    cone = Cone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 0.4)
     held = replace(arm, tool_cone=cone)
     tilt = PathLimits(joint_placements(arm.robot.model), held.path_limits)
 
