@@ -1,4 +1,4 @@
-"""Every benchmark in one run, in at most eight minutes on two cores; writes benchmarks/RESULTS.md with a plot.
+"""Every benchmark in one run, in some fifteen minutes on two cores; writes benchmarks/RESULTS.md with a plot.
 
     make bench                                the whole
     make bench BENCH_ARGS="--share 0.1"       a tenth of the tasks, to see that all works
@@ -31,6 +31,7 @@ PEER_TASKS = 20
 SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "solver": ("solver_times", (), 200),
     "http": ("requests", ("--kind", "joint to pose", "--line-every", "0", "--seed", "2"), 200),
+    "scenes": ("scenes", (), 300),
     "starts": ("starts", (), 0),
     "success": ("requests", ("--clients", "2", "--line-every", "20", "--seed", "3"), 1000),
     "quality": ("quality", (), 100),

@@ -86,6 +86,38 @@ def _solver(found: Figures) -> list[list[str]]:
             verdict(line["p50"] <= 0.010),
             f"{spread_of(line, 1e3, 'ms')}; {_statuses(found['time_scaling'])}",
         ],
+        [
+            "the B-spline with the arm's own links kept apart, times the same without",
+            "p50 ≤ 1.3",
+            f"p50 {found['apart']['ratio']['p50']:.2f}, p95 {found['apart']['ratio']['p95']:.2f}",
+            verdict(found["apart"]["ratio"]["p50"] <= 1.3),
+            spread_of(found["apart"]["ratio"], 1, "", 2),
+        ],
+    ]
+
+
+def _scenes(found: Figures) -> list[list[str]]:
+    bars = {"one candidate": 0.25, "whole request": 1.0}
+    rows = [
+        [
+            f"among obstacles (table, shelf, bin, cage; p50 {found['obstacles']['p50']:.0f} of them): {kind}",
+            f"p50 ≤ {bar * 1e3:.0f} ms",
+            ms(found["wall"][kind]),
+            verdict(found["wall"][kind]["p50"] <= bar),
+            spread_of(found["wall"][kind], 1e3, "ms", 0),
+        ]
+        for kind, bar in bars.items()
+    ]
+    solved = [found["solved"][kind] for kind in bars]
+    return [
+        *rows,
+        [
+            "the same tasks solved, and answers that hit something when replayed every 0.1 ms by Coal",
+            "≥ 99 %, none",
+            f"{solved[0]} and {solved[1]} of {found['count']}, {len(found['hits'])}",
+            verdict(min(solved) >= 0.99 * found["count"] and not found["hits"]),
+            f"{sum(found['led'].values())} of them led around; straight line blocked in {found['blocked']}",
+        ],
     ]
 
 
@@ -208,6 +240,7 @@ def _service(found: Figures) -> list[list[str]]:
 JUDGES = (
     ("solver", _solver),
     ("http", _http),
+    ("scenes", _scenes),
     ("starts", _starts),
     ("success", _success),
     ("quality", _quality),

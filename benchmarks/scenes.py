@@ -30,7 +30,7 @@ from optimizer.motion import sample
 from optimizer.problem import Problem
 
 REPLAY = 1e-4  # s
-SOLVED = 0.95  # share that must be solved, of either kind
+SOLVED = 0.99  # share that must be solved, of either kind
 KINDS = ("one candidate", "whole request")
 
 

@@ -1,7 +1,8 @@
 """Time of one candidate, joint to joint, on one core: the free B-spline and the time-scaled line.
 
 Timed is `optimizer.candidate.Solver` alone, from the two configurations to a motion that holds every limit between the
-nodes too; not the refinement of the winner, the baselines or the certificate.
+nodes too; not the refinement of the winner, the baselines or the certificate. Of the tasks at whose ends the arm is not
+in itself, the B-spline is also timed with its own links kept apart, each task with and without in turn.
 """
 
 from __future__ import annotations
@@ -10,11 +11,16 @@ import time
 from collections import Counter
 from typing import Any
 
+import numpy as np
+
 from benchmarks.command import keep, on_one_core, parser
 from benchmarks.figures import Spread
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
+from optimizer.arm import Arm
 from optimizer.candidate import Attempt
+from optimizer.collision import CollisionModel
+from optimizer.keep_away import RESERVE
 from optimizer.kernel import compile_kernel
 from optimizer.methods import solver_for
 from optimizer.motion import Task
@@ -25,9 +31,9 @@ PATIENCE = 60.0  # s
 METHODS: tuple[Method, ...] = ("bspline", "time_scaling")
 
 
-def solve(move: Move, method: Method) -> tuple[float, Attempt]:
+def solve(move: Move, method: Method, collisions: bool = False) -> tuple[float, Attempt]:
     """Wall time [s] and outcome of one candidate."""
-    task = Task(Problem(move.q_start, move.q_goal, method=method, collisions=False))
+    task = Task(Problem(move.q_start, move.q_goal, method=method, collisions=collisions))
     began = time.perf_counter()
     outcome = solver_for(task, move.q_start, move.q_goal, began + PATIENCE).solve()
     return time.perf_counter() - began, outcome
@@ -45,8 +51,21 @@ def measure(seed: int, count: int, method: Method) -> dict[str, Any]:
     }
 
 
+def apart(seed: int, count: int) -> dict[str, Any]:
+    """What it costs to keep the arm's links apart: ratio of the times with and without, task by task."""
+    model = CollisionModel(Arm())
+    ratios, walls = [], []
+    for move in moves(seed, count):
+        if model.least(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:
+            continue
+        without, with_links = (solve(move, "bspline", collisions)[0] for collisions in (False, True))
+        ratios.append(with_links / without)
+        walls.append(with_links)
+    return {"wall": Spread.of(walls), "ratio": Spread.of(ratios)}
+
+
 def main() -> None:
-    """Measure both methods."""
+    """Measure both methods, and what collisions add."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=200, help="tasks (%(default)s)")
     given = arguments.parse_args()
@@ -57,6 +76,8 @@ def main() -> None:
     for method, found in figures.items():
         print(f"{method:13s} {found['wall'].times(1e3).told(' ms')}, iterations {found['iterations'].told('', 0)}")
         print(f"{'':13s} {found['statuses']} {', '.join(found['unsolved'])}")
+    figures["apart"] = found = apart(given.seed, given.count)
+    print(f"links apart   {found['wall'].times(1e3).told(' ms')}; times the same without {found['ratio'].told('', 2)}")
     keep(given.json, figures)
 
 
