@@ -135,7 +135,8 @@ class Programmed(Solver):
         if guarded:
             guessed = spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
             pairs = self.task.near(guessed)
-        programme = self._watched(programme, self.task.guarded(pairs) if guarded else self.task.path)
+        path = self.task.guarded(pairs) if guarded else self.task.path
+        programme = replace(programme, path=path, room=_rooms(path))
         limits = self.task.problem.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
         duration = self._first_duration(programme, free, guess.duration)
@@ -154,38 +155,43 @@ class Programmed(Solver):
             if excess is not None:
                 spline = self._stretched(spline, excess)
                 excess = self._excess(spline)
-            hit, beyond = self.task.hit(spline), self._beyond(spline, programme.path)
+            hit = self.task.hit(spline)
+            beyond = self._beyond(spline, programme.path, hit)
             if excess is None and hit is None and not beyond.any():
                 return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)
             if excess is not None:
                 limits = _tightened(limits, excess)
                 programme = replace(programme, coordinates=self._coordinates(limits))
+            room, path = programme.room - beyond, programme.path
             nearby = pairs if hit is None else np.union1d(pairs, self.task.near(spline))
             if len(nearby) > len(pairs):
                 # only now, since most motions hit nothing
+                path = self.task.guarded(nearby)
+                known = np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))
+                room, held = _rooms(path), room
+                room[known] = held
                 pairs = nearby
-                programme = self._watched(programme, self.task.guarded(pairs))
-            elif programme.path is not None:
-                if hit is not None and not beyond.any():
-                    # met nowhere, but not proven either: a hair more between the points that are held
-                    beyond = np.where(np.array(programme.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
-                programme = replace(programme, room=programme.room - beyond)
+            elif hit is not None and path is not None and not beyond.any():
+                # met nowhere, but not proven either: a hair more between the points that are held
+                room -= np.where(np.array(path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
+            programme = replace(programme, path=path, room=room)
             # the solver takes no step for positions alone: it bounds them
             free = np.clip(result.free, programme.limits.q_min, programme.limits.q_max)
             duration, multiplier = result.duration, result.multiplier
         reason = "limits stay broken between the nodes" if hit is None else f"found no way around: {hit.words}"
         return Attempt("failed", reason, iterations, REPAIRS, hit=hit)
 
-    def _watched(self, programme: Programme, path: PathLimits | None) -> Programme:
-        """The programme with limits along the path."""
-        return programme if path is None else replace(programme, path=path, room=np.full(len(path.names), 1 - MARGIN))
-
-    def _beyond(self, spline: Spline, path: PathLimits | None) -> Array:
+    def _beyond(self, spline: Spline, path: PathLimits | None, hit: Clearance | None) -> Array:
         """By how much each share of the limits along the path must shrink, (c,): they are broken between the points."""
         if path is None:
             return np.zeros(0)
-        q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
-        beyond = path.shares(q, v).max(axis=0) - 1
+        # clearance comes last, and where it is proven the motion keeps it
+        looked_at = path if hit is not None else self.task.path
+        share = np.zeros(len(path.names))
+        if looked_at is not None:
+            q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
+            share[: len(looked_at.names)] = looked_at.shares(q, v).max(axis=0)
+        beyond = share - 1
         return np.where(beyond > -REPAIR_MARGIN / 4, PATH_REPAIR * np.maximum(beyond, 0.0) + REPAIR_MARGIN, 0.0)
 
     def _coordinates(self, limits: Limits) -> Coordinates:
@@ -248,6 +254,11 @@ def sampled(spline: Spline) -> tuple[Array, Array]:
     """Samples q (k, nq) of a motion at times t (k,), to learn from."""
     t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
     return np.asarray(BSpline(spline.knots, spline.control_points, spline.degree)(t)), t
+
+
+def _rooms(path: PathLimits | None) -> Array:
+    """How much of each limit along the path (c,) may be used at first."""
+    return np.full(0 if path is None else len(path.names), 1 - MARGIN)
 
 
 def _tightened(limits: Limits, excess: Limits) -> Limits:

@@ -13,6 +13,10 @@ so that n·x(t) lies above its chord over an interval of length h less A h² / 8
 |v_k| and |a_k| are bounded by the Bernstein coefficients of the polynomials that they are within a knot span. n is the
 normal at either end, whichever gives more; a wrong n could only weaken the bound. Intervals whose bound is not near
 enough to the least distance sampled are halved.
+
+Before all that, pairs far apart are done with: no point of the second body passes the first faster than
+L = Σ_k lever_k |v_k|, so that a distance bounded by that of the bodies' balls at both ends of an interval is at least
+(ball(begin) + ball(end) - L h) / 2 all along it.
 """
 
 from __future__ import annotations
@@ -33,8 +37,6 @@ GAP, RELATIVE_GAP = 1e-4, 0.01
 LEAST_INTERVALS = 32
 # halvings of an interval, and pairs at intervals looked at, before the proof is left where it stands
 MOST_LEVELS, MOST_CHECKS = 20, 400_000
-# at the outset, pairs further than the least distance by more than this [m] are judged by their bounding balls
-NEAR = 0.05
 
 
 @dataclass(frozen=True)
@@ -100,22 +102,26 @@ class _Proof:
         return Clearance(min(proven, self.least), self.least, self.model.names(pair), t)
 
     def outset(self) -> tuple[_Times, _Checks]:
-        """All pairs over intervals that each lie within a knot span."""
+        """Intervals that each lie within a knot span, and the pairs that may be the nearest there."""
         spans = np.unique(self.spline.knots)
         share = self.spline.duration / LEAST_INTERVALS
         parts = [np.linspace(a, b, math.ceil((b - a) / share), endpoint=False) for a, b in pairwise(spans)]
         t = np.concatenate([*parts, spans[-1:]])
         times = self.at(t)
         n, p = len(t), len(self.model.pairs)
-        instant, pair = np.divmod(np.arange(n * p), p)
-        balls = self.model.nearest(times.frames, instant, pair, -np.inf)
-        nearest = balls.distance.reshape(n, p).argmin(axis=1)
-        self.sampled(times, np.arange(n), nearest)
-        found = self.model.nearest(times.frames, instant, pair, self.least + NEAR)
-        self.note(times, instant, pair, found.distance)
-        normals = found.normal.reshape(n, p, 3)
-        begin, pair = np.divmod(np.arange((n - 1) * p), p)
-        return times, _Checks(pair, begin, begin + 1, (normals[:-1].reshape(-1, 3), normals[1:].reshape(-1, 3)))
+        balls = self.model.gaps(times.frames, within=-np.inf).distance
+        self.sampled(times, np.arange(n), balls.argmin(axis=1))
+        v, _, h = self.rates(t[:-1], t[1:])
+        passed = (v * h[:, None]) @ self.levers.T
+        open_ = (balls[:-1] + balls[1:] - passed) / 2 < self.least
+        looked_at = np.zeros((n, p), dtype=bool)
+        looked_at[:-1] |= open_
+        looked_at[1:] |= open_
+        instant, pair = np.nonzero(looked_at)
+        normals = np.zeros((n, p, 3))
+        normals[instant, pair] = self.sampled(times, instant, pair)
+        begin, pair = np.nonzero(open_)
+        return times, _Checks(pair, begin, begin + 1, (normals[begin, pair], normals[begin + 1, pair]))
 
     def halved(self, times: _Times, checks: _Checks) -> tuple[_Times, _Checks]:
         """Both halves of every interval, with the normals in the middle."""
@@ -135,14 +141,11 @@ class _Proof:
     def sampled(self, times: _Times, instant: Indices, pair: Indices) -> Array:
         """Normals (k, 3) of pairs at instants, whose distances count as samples."""
         found = self.model.nearest(times.frames, instant, pair)
-        self.note(times, instant, pair, found.distance)
+        if len(pair):
+            k = int(found.distance.argmin())
+            if found.distance[k] < self.least:
+                self.least, self.where = float(found.distance[k]), (int(pair[k]), float(times.t[instant[k]]))
         return found.normal
-
-    def note(self, times: _Times, instant: Indices, pair: Indices, distance: Array) -> None:
-        """Remember the least distance."""
-        k = int(distance.argmin())
-        if distance[k] < self.least:
-            self.least, self.where = float(distance[k]), (int(pair[k]), float(times.t[instant[k]]))
 
     def bounds(self, times: _Times, checks: _Checks) -> Array:
         """Lower bounds (k,) [m] on the distances over the intervals."""
@@ -166,13 +169,7 @@ class _Proof:
     def sag(self, times: _Times, checks: _Checks) -> Array:
         """A h² / 8 (k,) [m]."""
         intervals, which = np.unique(np.column_stack([checks.begin, checks.end]), axis=0, return_inverse=True)
-        t, h = times.t[intervals[:, 0]], np.diff(times.t[intervals], axis=1)
-        degree = self.spline.degree
-        # the polynomial of each interval in powers of the share of it that has passed
-        powers = np.stack([self.curve(t, order) * h**order / math.factorial(order) for order in range(1, degree + 1)])
-        orders = np.arange(1, degree + 1)[:, None, None]
-        v = np.abs(_bernstein(powers * orders)).max(axis=0) / h
-        a = np.abs(_bernstein((powers * orders * (orders - 1))[1:])).max(axis=0) / h**2
+        v, a, h = self.rates(*times.t[intervals].T)
         before = np.cumsum(v, axis=1) - v
         between = self.model.between[checks.pair]
         which = which.ravel()
@@ -181,7 +178,17 @@ class _Proof:
         lower = before[which] - np.where(between, below, 0.0)
         v, a = v[which], a[which]
         acceleration = (self.levers[checks.pair] * (a + v**2 + 2 * v * np.maximum(lower, 0.0))).sum(axis=1)
-        return np.asarray(acceleration * h[which, 0] ** 2 / 8)
+        return np.asarray(acceleration * h[which] ** 2 / 8)
+
+    def rates(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
+        """Bounds on |v| and |a| (k, nq) over intervals from begin to end (k,) [s], and their lengths (k,) [s]."""
+        h, degree = end - begin, self.spline.degree
+        # the polynomial of each interval in powers of the share of it that has passed
+        powers = np.stack([self.curve(begin, d) * (h**d / math.factorial(d))[:, None] for d in range(1, degree + 1)])
+        orders = np.arange(1, degree + 1)[:, None, None]
+        v = np.abs(_bernstein(powers * orders)).max(axis=0) / h[:, None]
+        a = np.abs(_bernstein((powers * orders * (orders - 1))[1:])).max(axis=0) / h[:, None] ** 2
+        return v, a, h
 
     def at(self, t: Array) -> _Times:
         """Where everything is at times (k,)."""

@@ -68,6 +68,19 @@ class Nearest:
     point: Array
 
 
+@dataclass(frozen=True)
+class Gaps:
+    """Of p pairs at n configurations: distances (n, p) [m], and which k of them are exact: configuration and column.
+
+    The others are the bounding balls', which are less than the bodies'.
+    """
+
+    distance: Array
+    configuration: Indices
+    column: Indices
+    nearest: Nearest
+
+
 class CollisionModel:
     """An arm's bodies and the pairs of them that are compared, `pairs` (p, 2), the less moved body first.
 
@@ -112,7 +125,7 @@ class CollisionModel:
         self.between = (joints > first[:, None]) & (joints <= second[:, None])
         segment = np.array([body.is_segment for body in bodies])[pairs]
         box = np.array([body.core.half is not None for body in bodies])[pairs]
-        plane = np.array([body.core.plane for body in bodies])[pairs][:, 0]
+        self._plane = plane = np.array([body.core.plane for body in bodies])[pairs][:, 0]
         # 0: segments, 1: box and segment, 2: segment and box, 3: half-space, 4: any other
         self._kinds = np.select(
             [plane, segment.all(axis=1), box[:, 0] & segment[:, 1], segment[:, 0] & box[:, 1]], [3, 0, 1, 2], 4
@@ -134,20 +147,35 @@ class CollisionModel:
 
         Pairs whose bounding balls are further apart than `within` [m] get the balls' distance instead, which is less.
         """
-        frames, n, p = self.frames(q), len(q), len(self.pairs)
-        configuration, pair = np.divmod(np.arange(n * p), max(p, 1))
-        found = self.nearest(frames, configuration, pair, within)
-        gradient = self.gradients(frames, configuration, pair, found)
-        return found.distance.reshape(n, p), gradient.reshape(n, p, self.nq)
+        frames = self.frames(q)
+        found = self.gaps(frames, within=within)
+        gradient = np.zeros((*found.distance.shape, self.nq))
+        exact = found.configuration, found.column
+        gradient[exact] = self.gradients(frames, *exact, found.nearest)
+        return found.distance, gradient
 
-    def gaps(self, q: Array, within: float) -> Array:
-        """Signed distances (n, pairs) [m] at q (n, nq); where one exceeds `within`, something above that."""
-        configuration, pair = np.divmod(np.arange(len(q) * len(self.pairs)), max(len(self.pairs), 1))
-        return self.nearest(self.frames(q), configuration, pair, within).distance.reshape(len(q), -1)
+    def gaps(self, frames: Array, pairs: Indices | None = None, within: float = np.inf) -> Gaps:
+        """Signed distances of `pairs` (p,), or of every pair, at every one of `frames` (n, nq + 1, 4, 4).
+
+        Exact are those of the pairs whose bounding balls are at most `within` [m] apart.
+        """
+        pairs = np.arange(len(self.pairs)) if pairs is None else pairs
+        first, second = self.pairs[pairs].T
+        T = frames[:, self.links]
+        middles = (T[..., :3, :3] @ self._middles[:, :, None])[..., 0] + T[..., :3, 3]
+        across = middles[:, second] - middles[:, first]
+        distance = np.sqrt(np.einsum("npi,npi->np", across, across))
+        distance -= self._reach[first] + self._reach[second] + self._swelling[pairs]
+        # no ball holds a half-space
+        distance[:, self._plane[pairs]] = -np.inf
+        configuration, column = np.nonzero(distance <= within)
+        nearest = self.nearest(frames, configuration, pairs[column])
+        distance[configuration, column] = nearest.distance
+        return Gaps(distance, configuration, column, nearest)
 
     def least(self, q: Array, within: float) -> float:
         """The least distance [m] over all pairs at q (n, nq), or, where it exceeds `within`, something above that."""
-        return float(self.gaps(q, within).min(initial=np.inf))
+        return float(self.gaps(self.frames(q), within=within).distance.min(initial=np.inf))
 
     def contacts(self, q: Sequence[Array] | Array, within: float = np.inf) -> list[Contact]:
         """The nearest pair at each of q (n, nq): none at all where nothing is compared.
@@ -156,12 +184,11 @@ class CollisionModel:
         """
         if not (len(self.pairs) and len(q)):
             return []
-        frames, p = self.frames(np.asarray(q)), len(self.pairs)
+        frames = self.frames(np.asarray(q))
         # many of them differ by full turns alone, which move nothing
         moved = (np.round(frames[:, 1:, :3], 9) + 0.0).reshape(len(frames), -1)
         _, first, which = np.unique(moved, axis=0, return_index=True, return_inverse=True)
-        configuration, pair = np.divmod(np.arange(len(first) * p), p)
-        distance = self.nearest(frames[first], configuration, pair, within).distance.reshape(-1, p)
+        distance = self.gaps(frames[first], within=within).distance
         nearest = distance.argmin(axis=1)
         contacts = [Contact(self.names(int(k)), float(d[k])) for k, d in zip(nearest, distance, strict=True)]
         return [contacts[k] for k in which.ravel()]
@@ -177,22 +204,19 @@ class CollisionModel:
         turning -= np.einsum("kji,ki->kj", np.cross(axes, origins)[configuration], found.normal)
         return np.asarray(turning * self.between[pair])
 
-    def nearest(self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf) -> Nearest:
-        """Distances of pairs (k,) at configurations (k,) of `frames`; beyond `within` the bounding balls' only."""
+    def nearest(self, frames: Array, configuration: Indices, pair: Indices) -> Nearest:
+        """Distances of pairs (k,) at configurations (k,) of `frames`."""
         first, second = self.pairs[pair].T
         k = len(pair)
         result = Nearest(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
         kinds = self._kinds[pair]
-        if np.isfinite(within):
-            kinds = np.where(self._balls(frames, configuration, first, second, result, pair) > within, -1, kinds)
         handlers = (self._segments, self._box_first, self._box_second, self._planes, self._others)
         for kind, handler in enumerate(handlers):
             chosen = np.flatnonzero(kinds == kind)
             if chosen.size:
                 found = handler(frames, configuration[chosen], first[chosen], second[chosen])
                 result.distance[chosen], result.normal[chosen], result.point[chosen] = found
-        exact = kinds >= 0
-        result.distance[exact] -= self._swelling[pair[exact]]
+        result.distance[:] -= self._swelling[pair]
         return result
 
     def separation(self, frames: Array, configuration: Indices, pair: Indices, normal: Array) -> Array:
@@ -238,21 +262,6 @@ class CollisionModel:
             return np.asarray(placed[configuration, body])
         T = frames[configuration, self.links[body]]
         return np.asarray(self._points[body, :2] @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3])
-
-    def _balls(
-        self, frames: Array, configuration: Indices, first: Indices, second: Indices, result: Nearest, pair: Indices
-    ) -> Array:
-        """Fills in the bounding balls' distances. A half-space has no ball: minus infinity."""
-        T = frames[:, self.links]
-        middles = (T[..., :3, :3] @ self._middles[:, :, None])[..., 0] + T[..., :3, 3]
-        seconds = middles[configuration, second]
-        across = seconds - middles[configuration, first]
-        length = np.sqrt(np.einsum("ki,ki->k", across, across))
-        result.distance[:] = length - self._reach[first] - self._reach[second] - self._swelling[pair]
-        result.distance[self._kinds[pair] == 3] = -np.inf
-        result.normal[:] = across / np.maximum(length, 1e-12)[:, None]
-        result.point[:] = seconds
-        return result.distance
 
     def _segments(
         self, frames: Array, configuration: Indices, first: Indices, second: Indices

@@ -8,14 +8,15 @@ from functools import cached_property
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision import CollisionModel, Indices
+from optimizer.collision import CollisionModel, Gaps, Indices
 from optimizer.path_limits import Shares
 
 CLEARANCE = "clearance"
 # kept beyond the margins [m]: twice the gap that the proof leaves between what it proves and what is met
 RESERVE = 2e-4
-# distance [m] over which a share falls from 1 to 0; bodies further apart than that do not count
-SCALE = 0.1
+# distance [m] over which a share falls from 1 to 0, and the distance from which on bodies do not count: as the solver
+# does not look at shares below a half, only a bound is known of theirs
+SCALE, COUNTED = 0.1, 0.06
 
 
 @dataclass(frozen=True)
@@ -34,18 +35,18 @@ class KeepAway:
 
     def shares(self, frames: Array, q: Array, v: Array) -> Array:
         """Shares (n, k)."""
-        return _share(self.model.nearest(frames, *self._every(len(q)), RESERVE + SCALE).distance).reshape(len(q), -1)
+        return _share(self._gaps(frames).distance)
 
     def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
-        """Shares and gradients."""
-        configuration, pair = self._every(len(q))
-        found = self.model.nearest(frames, configuration, pair, RESERVE + SCALE)
-        by_q = self.model.gradients(frames, configuration, pair, found).reshape(len(q), -1, q.shape[1]) / -SCALE
-        return Shares(_share(found.distance).reshape(len(q), -1), by_q, np.zeros_like(by_q))
+        """Shares and gradients, which are zero for bodies further apart than counts."""
+        found = self._gaps(frames)
+        by_q = np.zeros((*found.distance.shape, q.shape[1]))
+        gradients = self.model.gradients(frames, found.configuration, self.pairs[found.column], found.nearest)
+        by_q[found.configuration, found.column] = gradients / -SCALE
+        return Shares(_share(found.distance), by_q, np.zeros_like(by_q))
 
-    def _every(self, count: int) -> tuple[Indices, Indices]:
-        """Every pair at every configuration."""
-        return np.repeat(np.arange(count), len(self.pairs)), np.tile(self.pairs, count)
+    def _gaps(self, frames: Array) -> Gaps:
+        return self.model.gaps(frames, self.pairs, COUNTED)
 
 
 def _share(distance: Array) -> Array:

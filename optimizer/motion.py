@@ -193,12 +193,12 @@ class Task(Plant):
 
     def near(self, spline: Spline) -> Indices:
         """The pairs that come so near each other in a motion that they are worth watching."""
-        gaps = self.collisions.gaps(self._seen(spline), WATCHED)
-        return np.flatnonzero(gaps.min(axis=0) < WATCHED)
+        return np.flatnonzero(self._gaps(spline, WATCHED).min(axis=0) < WATCHED)
 
-    def _seen(self, spline: Spline) -> Array:
-        """Samples (CONTACT_SAMPLES, nq) of a motion at which contact is looked for."""
-        return sample(spline, np.linspace(0.0, spline.duration, CONTACT_SAMPLES))[0]
+    def _gaps(self, spline: Spline, within: float) -> Array:
+        """Distances (CONTACT_SAMPLES, pairs) [m] along a motion, exact up to `within`."""
+        q = sample(spline, np.linspace(0.0, spline.duration, CONTACT_SAMPLES))[0]
+        return self.collisions.gaps(self.collisions.frames(q), within=within).distance
 
     @cached_property
     def collisions(self) -> CollisionModel:
@@ -232,7 +232,7 @@ class Task(Plant):
         """Where the motion comes nearest, if it is not proven to keep its margins there."""
         if not self.problem.collisions:
             return None
-        gaps = self.collisions.gaps(self._seen(spline), CLEAR)
+        gaps = self._gaps(spline, CLEAR)
         least = float(gaps.min(initial=np.inf))
         if least >= CLEAR:
             return None

@@ -48,6 +48,15 @@ class Linearisation:
 
 
 @dataclass(frozen=True)
+class Passage:
+    """The basis' path points: q and v (M, nq), and the shares of the limits along the path there, with gradients."""
+
+    q: Array
+    v: Array
+    shares: Shares
+
+
+@dataclass(frozen=True)
 class PathRows:
     """Limits along the path that come near: path point and column (rows,), room left, gradients (rows, n) by x."""
 
@@ -262,60 +271,59 @@ class Programme:
         """First to third derivative of s by τ on the fine grid, (3, M, r)."""
         return self.basis.at_grid @ self.points(free)
 
-    def shares(self, free: Array, T: float) -> Array:
-        """Shares of the limits along the path at the basis' path points, (M, c); none where there are no limits."""
+    def passage(self, free: Array, T: float) -> Passage:
+        """The limits along the path at the basis' path points; no columns where there are no limits."""
+        s, rising = self.basis.at_path @ self.points(free)
+        q, v = self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
         if self.path is None:
-            return np.zeros((len(self.basis.at_path[0]), 0))
-        return self.path.shares(*self._passing(free, T))
+            none = np.zeros((len(q), 0, self.kernel.nq))
+            return Passage(q, v, Shares(none[..., 0], none, none))
+        return Passage(q, v, self.path.linearised(q, v))
 
-    def path_rows(self, free: Array, T: float, near: float) -> PathRows:
+    def path_rows(self, passage: Passage, T: float, near: float) -> PathRows:
         """The shares that use more than `near` of their room."""
-        if self.path is None:
-            none = np.zeros(0, dtype=np.intp)
-            return PathRows(none, none, np.zeros(0), np.zeros((0, self.free_count * self.r + 1)))
-        q, v = self._passing(free, T)
-        shares: Shares = self.path.linearised(q, v)
+        shares = passage.shares
         k, c = np.nonzero(shares.value > near * self.room)
-        Q, V = self._state_rows(v, T, k)
-        gradients = np.einsum("rj,rjn->rn", shares.by_q[k, c], Q) + np.einsum("rj,rjn->rn", shares.by_v[k, c], V)
+        by_q, by_v = shares.by_q[k, c], shares.by_v[k, c]
+        at, rising = self._path_free[:, k, :, None]
+        P = self.coordinates.directions
+        by_points = at * (by_q @ P)[:, None] + rising * (by_v @ P / T)[:, None]
+        by_time = -np.einsum("rj,rj->r", by_v, passage.v[k]) / T
+        gradients = np.hstack([by_points.reshape(len(k), self.free_count * self.r), by_time[:, None]])
         return PathRows(k, c, self.room[c] - shares.value[k, c], gradients)
 
-    def path_hessian(self, free: Array, T: float, weights: Array) -> Array:
+    def path_hessian(self, passage: Passage, T: float, weights: Array) -> Array:
         """Hessian (n, n) of Σ weights · shares, weights (M, c), by finite differences of the shares' gradients."""
         k = np.flatnonzero(weights.any(axis=1))
+        n = self.free_count * self.r + 1
         if self.path is None or not len(k):
-            return np.zeros((self.free_count * self.r + 1,) * 2)
+            return np.zeros((n, n))
         nq = self.kernel.nq
-        q, v = self._passing(free, T)
-        y = np.hstack([q[k], v[k]])
+        v = passage.v[k]
+        y = np.hstack([passage.q[k], v])
         stepped = np.concatenate([y[None], y + DIFFERENCE * np.eye(2 * nq)[:, None]]).reshape(-1, 2 * nq)
         shares = self.path.linearised(stepped[:, :nq], stepped[:, nq:])
         w = np.tile(weights[k], (2 * nq + 1, 1))[..., None]
         slopes = np.hstack([(w * shares.by_q).sum(axis=1), (w * shares.by_v).sum(axis=1)]).reshape(-1, len(k), 2 * nq)
         bent = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
         Y = np.concatenate(self._state_rows(v, T, k), axis=1)
-        hessian: Array = np.einsum("kim,kij,kjn->mn", Y, bent, Y, optimize=True)
+        hessian: Array = Y.reshape(-1, n).T @ (bent @ Y).reshape(-1, n)
         # v = s' / T bends by itself
         by_v, V = slopes[0][:, nq:], Y[:, nq:]
         mixed = -np.einsum("kj,kjn->n", by_v, V)[:-1] / T
         hessian[:-1, -1] += mixed
         hessian[-1, :-1] += mixed
-        hessian[-1, -1] += 2 * float((by_v * v[k]).sum()) / (T * T)
+        hessian[-1, -1] += 2 * float((by_v * v).sum()) / (T * T)
         return hessian
 
     def _state_rows(self, v: Array, T: float, k: Index) -> tuple[Array, Array]:
-        """Gradients of q and v (rows, nq, n) at the path points k."""
+        """Gradients of q and v (rows, nq, n) at the path points k, where the speeds are v (rows, nq)."""
         at, rising = self._path_free[:, k]
         P, rows = self.coordinates.directions, (len(k), self.kernel.nq, self.free_count * self.r)
         Q = np.einsum("km,jr->kjmr", at, P).reshape(rows)
         V = np.einsum("km,jr->kjmr", rising / T, P).reshape(rows)
         none = np.zeros((len(k), self.kernel.nq, 1))
-        return np.concatenate([Q, none], axis=2), np.concatenate([V, -v[k][..., None] / T], axis=2)
-
-    def _passing(self, free: Array, T: float) -> tuple[Array, Array]:
-        """q and v (M, nq) at the basis' path points."""
-        s, rising = self.basis.at_path @ self.points(free)
-        return self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
+        return np.concatenate([Q, none], axis=2), np.concatenate([V, -v[..., None] / T], axis=2)
 
     @cached_property
     def _path_free(self) -> Array:

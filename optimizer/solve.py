@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array
-from optimizer.nlp import Linearisation, Programme
+from optimizer.nlp import Linearisation, Passage, Programme
 
 # rows enter the QP when they use more than this share of their limit
 NEAR = 0.8
@@ -125,9 +125,10 @@ class _Solver:
             scale[-1] = time_scale
         line, kin = p.derivatives(free, T, multiplier), p.kinematics(free)
         cost_scale = 1.0 / max(abs(line.cost), 1e-9)
-        violation = self.violations(kin, T, line.tau, p.shares(free, T))
+        passage = p.passage(free, T)
+        violation = self.violations(kin, T, line.tau, passage.shares.value)
         penalty = np.full(len(violation), 0.1)
-        path_multiplier = np.zeros_like(p.shares(free, T))
+        path_multiplier = np.zeros_like(passage.shares.value)
         curvature, stationarity, iterations = 0.0, np.inf, 0
         status: Status = "stalled"
         for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
@@ -135,10 +136,10 @@ class _Solver:
                 status = "out of time"
                 break
             g = line.gradient[: self.n] * scale * cost_scale
-            H = (line.hessian + p.path_hessian(free, T, path_multiplier)) * cost_scale
+            H = (line.hessian + p.path_hessian(passage, T, path_multiplier)) * cost_scale
             H[-1, -1] += curvature
             H = _convex(H[: self.n, : self.n] * np.outer(scale, scale))
-            step = self._qp(H, g, line, free, T, time_scale, kin / self.rates(T)[:, None, :])
+            step = self._qp(H, g, line, passage, free, T, time_scale, kin / self.rates(T)[:, None, :])
             if step is None:
                 status = "infeasible"
                 break
@@ -173,14 +174,15 @@ class _Solver:
                 trial_T = min(max(trial_T, p.t_min), p.t_max)  # rounding must not leave the bounds
                 trial_cost, trial_tau = p.value(trial, trial_T)
                 trial_kin = p.kinematics(trial)
-                trial_violation = self.violations(trial_kin, trial_T, trial_tau, p.shares(trial, trial_T))
+                trial_passage = p.passage(trial, trial_T)
+                trial_violation = self.violations(trial_kin, trial_T, trial_tau, trial_passage.shares.value)
                 if trial_cost * cost_scale + float(penalty @ trial_violation) <= merit + 1e-4 * alpha * descent + 1e-12:
                     break
                 alpha *= 0.5
             else:
                 status = "solved" if worst < FEASIBILITY and promised < 100 * PROGRESS else "stalled"
                 break
-            free, T, kin, violation = trial, trial_T, trial_kin, trial_violation
+            free, T, kin, passage, violation = trial, trial_T, trial_kin, trial_passage, trial_violation
             line = p.derivatives(free, T, multiplier)
         return Result(status, free, T, line.cost, iterations, float(violation.max()), stationarity, multiplier)
 
@@ -232,10 +234,18 @@ class _Solver:
         return A, leeway.lower - moved, leeway.upper - moved
 
     def _qp(
-        self, H: Array, g: Array, line: Linearisation, free: Array, T: float, time_scale: float, ratio: Array
+        self,
+        H: Array,
+        g: Array,
+        line: Linearisation,
+        passage: Passage,
+        free: Array,
+        T: float,
+        time_scale: float,
+        ratio: Array,
     ) -> _Step | None:
         k, j, torque_sign, A_torque, b_torque = self._torque_rows(line, T, time_scale)
-        path_rows = self.p.path_rows(free, T, NEAR_PATH)
+        path_rows = self.p.path_rows(passage, T, NEAR_PATH)
         A_path = path_rows.gradients
         A_path[:, -1] *= time_scale
         lower, upper = self._bounds(free, T, time_scale)

@@ -17,8 +17,9 @@ from optimizer.baselines import time_optimal, time_optimal_positions
 from optimizer.bounds import LEAST_DURATION
 from optimizer.bspline import Basis
 from optimizer.candidate import Attempt, Guess, Programmed
+from optimizer.motion import sample
 from optimizer.solution import BaselineName, Spline
-from optimizer.way_around import along, length
+from optimizer.way_around import along, length, nothing_between
 
 # control points of a first attempt with evenly spaced knots
 COARSE = 13
@@ -70,6 +71,9 @@ class FreeSpline(Programmed):
             if time.perf_counter() > now + PATIENCE * left or length(way, v_max) > DETOUR * length(ways[0], v_max):
                 break
             q, t = along(way, 1.0, v_max)
+            motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
+            if any(nothing_between(task.collisions, q, motion) for motion in motions):
+                continue
             points = space.fit(self.coordinates.from_joints(q), t)
             outcome = self.improve(Guess(space, points, 0.0), guarded=True, deadline=now + PATIENCE * left)
             found.append(replace(outcome, reason=f"{outcome.reason}{LED}"))

@@ -23,7 +23,7 @@ from optimizer.motion import sample
 from optimizer.path_limits import Cone, PathLimits
 from optimizer.problem import Problem
 from optimizer.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
-from optimizer.way_around import ROOMS, STEP, along, ways_around
+from optimizer.way_around import ROOMS, STEP, along, nothing_between, ways_around
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 
 # s: ample, so that a seed and not the machine's load decides what is found
@@ -206,6 +206,16 @@ def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
     (candidate,) = raised.value.candidates
     assert candidate.status == "failed"
     assert any(name in candidate.reason for name in ("wall", "post", "over"))
+
+
+def test_something_stands_between_ways_on_either_side_of_it() -> None:
+    arm, q_start, q_goal = task("post")
+    model, ones = CollisionModel(arm), np.ones(6)
+    (way, *_) = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE)
+    around = along(way, 1.0, ones)[0]
+    through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
+    assert nothing_between(model, around, around)
+    assert not nothing_between(model, around, 2 * through - around)
 
 
 def test_limits_tightened_are_kept() -> None:
