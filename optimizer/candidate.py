@@ -162,24 +162,30 @@ class Programmed(Solver):
             if excess is not None:
                 limits = _tightened(limits, excess)
                 programme = replace(programme, coordinates=self._coordinates(limits))
-            room, path = programme.room - beyond, programme.path
+            # pairs are watched only once something is hit, since most motions hit nothing
             nearby = pairs if hit is None else np.union1d(pairs, self.task.near(spline))
-            if len(nearby) > len(pairs):
-                # only now, since most motions hit nothing
-                path = self.task.guarded(nearby)
-                known = np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))
-                room, held = _rooms(path), room
-                room[known] = held
-                pairs = nearby
-            elif hit is not None and path is not None and not beyond.any():
-                # met nowhere, but not proven either: a hair more between the points that are held
-                room -= np.where(np.array(path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
-            programme = replace(programme, path=path, room=room)
+            programme = self._watched(programme, pairs, nearby, beyond, hit)
+            pairs = nearby
             # the solver takes no step for positions alone: it bounds them
             free = np.clip(result.free, programme.limits.q_min, programme.limits.q_max)
             duration, multiplier = result.duration, result.multiplier
         reason = "limits stay broken between the nodes" if hit is None else f"found no way around: {hit.words}"
         return Attempt("failed", reason, iterations, REPAIRS, hit=hit)
+
+    def _watched(
+        self, programme: Programme, pairs: Indices, nearby: Indices, beyond: Array, hit: Clearance | None
+    ) -> Programme:
+        """The programme with the limits along its path tightened, and all of `nearby` watched instead of `pairs`."""
+        room = programme.room - beyond
+        if len(nearby) > len(pairs):
+            path = self.task.guarded(nearby)
+            widened = _rooms(path)
+            widened[np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))] = room
+            return replace(programme, path=path, room=widened)
+        if hit is not None and programme.path is not None and not beyond.any():
+            # met nowhere, but not proven either: a hair more between the points that are held
+            room -= np.where(np.array(programme.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
+        return replace(programme, room=room)
 
     def _beyond(self, spline: Spline, path: PathLimits | None, hit: Clearance | None) -> Array:
         """By how much each share of the limits along the path must shrink, (c,): they are broken between the points."""

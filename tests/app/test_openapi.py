@@ -104,7 +104,7 @@ def fuzzed() -> Iterator[Server]:
 
 @schema.parametrize()
 @settings(
-    max_examples=25,
+    max_examples=16,
     derandomize=True,
     deadline=None,
     phases=[Phase.explicit, Phase.generate],
