@@ -129,10 +129,12 @@ def _ipopt(found: Search, moved: Array | None) -> float:
 
 def fingerprint(robot: Robot) -> str:
     """Hash of the figures that energies and limits depend on: references hold for these alone."""
-    task = Task(Problem(np.zeros(robot.nq), np.zeros(robot.nq), robot=robot))
-    limits = task.problem.active_limits
-    # without the last two, which smooth what the solver sees and do not touch exact energies
-    parts = [task.objective_parameters[:-2], limits.v_max, limits.a_max, limits.j_max, limits.tau_max]
+    friction = next(iter(robot.friction_laws.values()))
+    figures = {
+        k: v for part in (robot.limits, robot.drives, friction, robot.electronics) for k, v in vars(part).items()
+    }
+    # the names bear no figure, and the ranges of the joints bind no motion between two configurations within them
+    parts = [np.atleast_1d(v) for k, v in figures.items() if k not in ("name", "q_min", "q_max")]
     parts += [placement.homogeneous.ravel() for placement in robot.model.jointPlacements]
     parts += [body.toDynamicParameters() for body in robot.model.inertias]
     text = " ".join(f"{value:.9g}" for value in np.round(np.concatenate(parts), 12).tolist())
