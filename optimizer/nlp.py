@@ -272,16 +272,19 @@ class Programme:
         return self.basis.at_grid @ self.points(free)
 
     def passage(self, free: Array, T: float) -> Passage:
-        """The limits along the path at the basis' path points; no columns where there are no limits."""
+        """The limits along the path at the basis' path points; nothing at all where there are none."""
+        if self.path is None:
+            none = np.zeros((0, self.kernel.nq))
+            return Passage(none, none, Shares(none[:, :0], none[:, None], none[:, None]))
         s, rising = self.basis.at_path @ self.points(free)
         q, v = self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
-        if self.path is None:
-            none = np.zeros((len(q), 0, self.kernel.nq))
-            return Passage(q, v, Shares(none[..., 0], none, none))
         return Passage(q, v, self.path.linearised(q, v))
 
     def path_rows(self, passage: Passage, T: float, near: float) -> PathRows:
         """The shares that use more than `near` of their room."""
+        if self.path is None:
+            none = np.zeros(0, dtype=np.intp)
+            return PathRows(none, none, np.zeros(0), np.zeros((0, self.free_count * self.r + 1)))
         shares = passage.shares
         k, c = np.nonzero(shares.value > near * self.room)
         by_q, by_v = shares.by_q[k, c], shares.by_v[k, c]

@@ -113,7 +113,7 @@ class _Solver:
         (3 r + nq + c,)."""
         kin: Array = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.rates(T)
         torque = np.abs(tau).max(axis=0) / self.tau_max
-        path = shares.max(axis=0) - self.p.room + 1
+        path = shares.max(axis=0, initial=0.0) - self.p.room + 1
         return np.asarray(np.maximum(np.concatenate([kin.ravel(), torque, path]) - 1, 0.0))
 
     def solve(self, free: Array, T: float, multiplier: Array | None) -> Result:
