@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Robot
 from optimizer.arm import Arm
 from optimizer.convex import ConvexPairs
 from optimizer.distance import box_segment, segment_segment
@@ -309,6 +309,17 @@ class CollisionModel:
         T_first = frames[configuration, self.links[first]] @ self._T_link_core[first]
         T_second = frames[configuration, self.links[second]] @ self._T_link_core[second]
         return self._convex.nearest(first.tolist(), second.tolist(), T_first, T_second)
+
+
+def collision_model(arm: Arm) -> CollisionModel:
+    """An arm's model: one is kept for arms that carry nothing and have nothing around them, as in most requests."""
+    bare = not (arm.tool or arm.scene.obstacles or arm.payload.shape)
+    return _bare(arm.robot) if bare else CollisionModel(arm)
+
+
+@cache
+def _bare(robot: Robot) -> CollisionModel:
+    return CollisionModel(Arm(robot=robot))
 
 
 def _bodies(arm: Arm) -> tuple[Body, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optimizer.arm import Arm
-from optimizer.collision import CollisionModel
+from optimizer.collision import collision_model
 from optimizer.pieces import Pieces
 
 # between samples at most [s], if a block of pieces is not so long that it would take more than MOST
@@ -35,7 +35,7 @@ class ContactWatch:
     """Sees a motion go by and keeps the least distance."""
 
     def __init__(self, arm: Arm) -> None:
-        self._model = CollisionModel(arm)
+        self._model = collision_model(arm)
         self.nearest: Nearest | None = None
 
     def see(self, pieces: Pieces) -> None:

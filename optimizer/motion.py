@@ -15,7 +15,7 @@ from optimizer import bspline
 from optimizer.arm import Arm
 from optimizer.bus import charges, drawn_at
 from optimizer.clearance import clearance
-from optimizer.collision import CollisionModel, Indices
+from optimizer.collision import CollisionModel, Indices, collision_model
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown, power_flow
 from optimizer.keep_away import KeepAway
@@ -203,7 +203,7 @@ class Task(Plant):
     @cached_property
     def collisions(self) -> CollisionModel:
         """What can hit what."""
-        return CollisionModel(self.problem)
+        return collision_model(self.problem)
 
     @cached_property
     def _placements(self) -> Array:

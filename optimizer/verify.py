@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline
 from models.robot import Array, Limits
 from optimizer.arm import Pose
 from optimizer.clearance import clearance
-from optimizer.collision import CollisionModel
+from optimizer.collision import collision_model
 from optimizer.dwell import holding_power
 from optimizer.energy import breakdown
 from optimizer.orientation import LoosePose
@@ -68,7 +68,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         balance_error=_worst(
             *(_relative(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
         ),
-        clearance=clearance(CollisionModel(problem), spline) if problem.collisions else None,
+        clearance=clearance(collision_model(problem), spline) if problem.collisions else None,
     )
 
 

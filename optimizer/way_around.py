@@ -15,7 +15,7 @@ from ompl import util as ou
 
 from models.robot import Array
 from optimizer.arm import Arm
-from optimizer.collision import CollisionModel
+from optimizer.collision import CollisionModel, collision_model
 from optimizer.free_space import FreeSpace
 
 # how far the joints may leave the range between start and goal [rad], in turn from run to run: what is near comes
@@ -51,7 +51,7 @@ def ways_around(
     nothing. None where an end itself is not clear or nothing is found before `deadline` (of `time.perf_counter`). The
     seed decides what is found, as long as the deadline does not. `model` is the arm's own, where it is at hand.
     """
-    model = CollisionModel(arm) if model is None else model
+    model = collision_model(arm) if model is None else model
     for reserve in RESERVE:
         space = FreeSpace(arm, model, reserve)
         if space.free(q_start) and space.free(q_goal):

@@ -12,7 +12,7 @@ from app.convert_scene import to_arm
 from app.documentation import problem_responses
 from app.schemas import problems
 from app.schemas.ik import IKRequest, IKResponse
-from optimizer.collision import CollisionModel
+from optimizer.collision import collision_model
 from optimizer.inverse_kinematics import inverse_kinematics_for
 
 router = APIRouter(tags=["motion"])
@@ -37,6 +37,6 @@ def solve(request: Request, body: IKRequest) -> Response:
     solutions = inverse_kinematics_for(robot).solve(
         to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal"
     )
-    contacts = CollisionModel(to_arm(body, robot)).contacts([solution.q for solution in solutions])
+    contacts = collision_model(to_arm(body, robot)).contacts([solution.q for solution in solutions])
     content = to_ik_response(body, request.state.id, solutions, contacts)
     return Response(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), media_type="application/json")
