@@ -42,6 +42,7 @@ TORQUE_POINTS = 4
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
 # samples of a motion that another is fitted to
 FIT_SAMPLES = 201
+DEARER = "its best motion hits something, and even so spends no less than the best found"
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,10 @@ class Attempt:
     """What came of a candidate: the spline if it is solved, and what was spent on it.
 
     `iterations` are the method's own: of the SQP, generations, or energies evaluated. `hit` is what the best motion
-    found runs into, where it does.
+    found runs into, where it does. It is pruned where it is dearer than a motion known even before it keeps clear.
     """
 
-    status: Literal["solved", "infeasible", "failed", "out of time"]
+    status: Literal["solved", "infeasible", "failed", "pruned", "out of time"]
     reason: str
     iterations: int = 0
     solves: int = 0
@@ -83,6 +84,8 @@ class Solver(ABC):
     most_solved: ClassVar[int | None] = None
     # whether it ends where nothing nearby is better
     converges: ClassVar[bool] = True
+    # what a motion already found spends [J], in the objective: it is not worth the while to keep dearer ones clear
+    best_known: float = np.inf
 
     def __init__(
         self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
@@ -156,6 +159,12 @@ class Programmed(Solver):
                 spline = self._stretched(spline, excess)
                 excess = self._excess(spline)
             hit = self.task.hit(spline)
+            if (
+                hit is not None
+                and not len(pairs)
+                and self.task.objective_of(self.task.energy(spline)) >= self.best_known
+            ):
+                return Attempt("pruned", DEARER, iterations, solves)
             beyond = self._beyond(spline, programme.path, hit)
             if excess is None and hit is None and not beyond.any():
                 return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)

@@ -164,7 +164,12 @@ class Run:
     def attempt(self, entry: Entry) -> Attempt:
         """Solve the entry in every window of durations; the outcome of least energy."""
         open_to_it = [w for w in windows(self.task, entry.q_goal) if w.t_max >= entry.shortest]
-        outcomes = [self.count(self.solver(entry, window).solve()) for window in open_to_it]
+        best, outcomes = self.best(), []
+        for window in open_to_it:
+            solver = self.solver(entry, window)
+            if best is not None and best.energy is not None:
+                solver.best_known = best.energy
+            outcomes.append(self.count(solver.solve()))
         solved = [outcome for outcome in outcomes if outcome.spline is not None]
         if len(solved) > 1:
             solved.sort(key=lambda o: self.task.objective_of(self.task.energy(o.spline)) if o.spline else np.inf)

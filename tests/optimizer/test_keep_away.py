@@ -6,9 +6,11 @@ import pytest
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
+from optimizer.candidate import DEARER, Attempt
 from optimizer.collision import CollisionModel
 from optimizer.keep_away import COUNTED, RESERVE, SCALE, KeepAway
 from optimizer.kinematics import joint_placements
+from optimizer.methods.free_spline import FreeSpline
 from optimizer.motion import Task, sample
 from optimizer.path_limits import Cone, PathLimits
 from optimizer.problem import Problem
@@ -72,6 +74,20 @@ def test_what_is_far_away_changes_nothing() -> None:
     ball = Obstacle("ball", Sphere(0.1), at(-0.5, 0.8, 1.2))
     with_ball, without = solved(ball).energy.electrical.total, solved(collisions=False).energy.electrical.total
     assert with_ball == pytest.approx(without, rel=SAME_ENERGY)
+
+
+def test_what_is_dearer_than_a_known_motion_is_not_kept_clear() -> None:
+    task = Task(Problem(HOME, GOAL, scene=Scene((low_post(),))))
+    free = solved(collisions=False).energy.electrical.total
+
+    def attempt(best_known: float) -> Attempt:
+        solver = FreeSpline(task, HOME, GOAL, np.inf)
+        solver.best_known = best_known
+        return solver.solve()
+
+    assert attempt(np.inf).status == attempt(1.1 * free).status == "solved"
+    pruned = attempt(0.9 * free)
+    assert (pruned.status, pruned.reason, pruned.spline) == ("pruned", DEARER, None)
 
 
 def every_pair(model: CollisionModel) -> PathLimits:
