@@ -1,4 +1,4 @@
-"""Every benchmark in one run, in some fifteen minutes on two cores; writes benchmarks/RESULTS.md with a plot.
+"""Every benchmark in one run, in some eleven minutes on two cores; writes benchmarks/RESULTS.md with a plot.
 
     make bench                                the whole
     make bench BENCH_ARGS="--share 0.1"       a tenth of the tasks, to see that all works

@@ -240,8 +240,8 @@ class OptimizeResponse(Response):
     objective: Literal["electrical", "mechanical"] = described("What was minimised.", None, "electrical")
     duration: float = described("Length of the motion.", "s", 1.8)
     status: Literal["optimal", "feasible"] = described(
-        "`optimal`: converged, and every other candidate solved or ruled out by a bound. `feasible`: verified, but the "
-        "search was cut short.",
+        "`optimal`: converged, and every other candidate solved, ruled out by a bound, or dearer even without keeping "
+        "clear. `feasible`: verified, but the search was cut short.",
         None,
         "optimal",
     )
