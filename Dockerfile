@@ -23,7 +23,7 @@ ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
 RUN mkdir /opt/matplotlib \
     && python -c "import importlib, pkgutil; [importlib.import_module(m.name) for p in ('app', 'optimizer', 'models') for m in pkgutil.walk_packages([p], p + '.') if not m.name.endswith('__main__')]" \
-    && python -m optimizer.precompile
+    && python -m optimizer.energy.precompile
 
 FROM ${BASE_IMAGE}
 RUN apt-get update \

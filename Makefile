@@ -39,7 +39,7 @@ bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
 kernels: $(VENV)/.runtime $(COMPILER)
-	@$(PY) -m optimizer.precompile
+	@$(PY) -m optimizer.energy.precompile
 
 # The dev lockfile holds the runtime one whole, at the same versions.
 $(VENV)/.runtime: requirements.lock $(PY)

@@ -14,7 +14,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
 
-    from app.forkserver import start_forkserver
+    from app.engine.forkserver import start_forkserver
 
     start_forkserver()
 

@@ -8,13 +8,14 @@ from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
 
-from app import __version__, tasks
-from app.body_limit import BodyLimit
-from app.context import RequestContext
-from app.documentation import install_openapi
-from app.engine import Engine
-from app.handlers import install_handlers
-from app.json_body import JsonBody
+from app import __version__
+from app.engine.pool import Engine
+from app.engine.warm_up import warm
+from app.http.body_limit import BodyLimit
+from app.http.handlers import install_handlers
+from app.http.json_body import JsonBody
+from app.http.openapi import install_openapi
+from app.http.request_context import RequestContext
 from app.routes import (
     answers,
     compare,
@@ -42,7 +43,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.engine = engine = Engine(settings, tasks.warm)
+        app.state.engine = engine = Engine(settings, warm)
         app.state.store = store = Store(settings.database_url)
         engine.start()
         # aside: a database that does not answer holds nobody up who needs none

@@ -9,7 +9,7 @@ import socket
 import uvicorn
 from fastapi import FastAPI
 
-from app.engine import Engine
+from app.engine.pool import Engine
 from app.main import create_app
 from app.settings import Settings
 

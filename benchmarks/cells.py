@@ -15,13 +15,14 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from models.registry import load_robot
 from models.robot import Array
-from optimizer.arm import Arm
-from optimizer.collision import CollisionModel
+from optimizer.collision.model import CollisionModel
+from optimizer.collision.path_planner import ways_around
 from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.inverse_kinematics import inverse_kinematics_for
-from optimizer.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
-from optimizer.way_around import ways_around
+from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.problem.arm import Arm
+from optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
 
 Cell = Literal["table", "shelf", "bin", "cage"]
 CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")
@@ -62,7 +63,9 @@ def cell_task(seed: int, index: int) -> CellTask:
     for draw in count():
         rng = np.random.default_rng([seed, index, draw])
         obstacles, starts, goals = _DRAWS[cell](rng)
-        arm = Arm(scene=Scene([table, *obstacles]), tool=(TOOL,), T_flange_tcp=_at(0, 0, GRIP))
+        arm = Arm(
+            robot=load_robot("ur5e"), scene=Scene([table, *obstacles]), tool=(TOOL,), T_flange_tcp=_at(0, 0, GRIP)
+        )
         model = CollisionModel(arm)
         T_start, T_goal = starts(), goals()
         from_, to = (_clear(arm, model, T) for T in (T_start, T_goal))

@@ -12,8 +12,8 @@ from benchmarks.motion import SplineMotion, limit_shares
 from benchmarks.tasks import flange
 from models.registry import load_robot
 from models.robot import Array, Limits
-from optimizer.arm import LIMIT_NAMES, Payload
-from optimizer.problem import Problem
+from optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
+from optimizer.problem.problem import Problem
 
 # as the contract has them
 RATIO, REACH, BALANCE = 1 + 1e-6, 1e-6, 1e-3
@@ -124,10 +124,12 @@ def problem_of(body: dict[str, Any]) -> Problem:
     load = body.get("payload")
     rest = np.clip(np.zeros(robot.nq), limits.q_min, limits.q_max)
     return Problem(
+        arm=Arm(
+            robot=robot,
+            payload=Payload(load["mass"], np.array(load["com"])) if load else Payload(),
+            gravity=np.array(body.get("gravity", [0.0, 0.0, -9.81])),
+            limits=limits,
+        ),
         start=rest,
         goal=rest,
-        robot=robot,
-        payload=Payload(load["mass"], np.array(load["com"])) if load else Payload(),
-        gravity=np.array(body.get("gravity", [0.0, 0.0, -9.81])),
-        limits=limits,
     )

@@ -11,11 +11,12 @@ import time
 import numpy as np
 
 from models.registry import load_robot
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
-from optimizer.kernel import compile_kernel
 from optimizer.methods import METHODS
 from optimizer.optimize import optimize, warm_up
-from optimizer.problem import Method, Problem
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Method, Problem
 
 # within half a turn of zero, as the paper's poses are [rad]
 RANGE = np.pi
@@ -34,7 +35,13 @@ def measure(count: int, seed: int) -> dict[Method, list[tuple[float, float]]]:
             began = time.process_time()
             try:
                 energy = optimize(
-                    Problem(start, goal, method=method, deadline=DEADLINE, collisions=False)
+                    Problem(
+                        arm=Arm(robot=load_robot("ur5e"), collisions=False),
+                        start=start,
+                        goal=goal,
+                        method=method,
+                        deadline=DEADLINE,
+                    )
                 ).energy.electrical.total
             except JoulepathError:
                 energy = np.nan

@@ -12,10 +12,10 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.energy import breakdown
-from optimizer.problem import Problem
+from optimizer.energy.losses import breakdown
+from optimizer.problem.problem import Problem
 from optimizer.solution import Energy
-from optimizer.verify import limit_ratios
+from optimizer.trajectories.limit_ratios import limit_ratios
 
 PERIOD = 1e-3  # of the fine grid, at most [s]
 
@@ -76,7 +76,7 @@ def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> R
     tau = torques(problem, q, v, a)
     model, data = _model(problem)
     climb = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
-    energy = breakdown(weights, v, tau, climb[1] - climb[0], problem)
+    energy = breakdown(weights, v, tau, climb[1] - climb[0], problem.arm)
     ends = max(float(np.abs(q[0] - q_start).max()), float(np.abs(q[-1] - q_goal).max()))
     return Replay(motion.duration, energy, _shares(problem, q, v, a, jerk, tau), ends)
 
@@ -105,11 +105,11 @@ def fine_grid(duration: float) -> tuple[Array, Array]:
 
 
 def _model(problem: Problem) -> tuple[pin.Model, pin.Data]:
-    payload = problem.payload
-    model = problem.robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.gravity)
+    payload = problem.arm.payload
+    model = problem.arm.robot.loaded_model(payload.mass, payload.com, payload.inertia, problem.arm.gravity)
     return model, model.createData()
 
 
 def _shares(problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array) -> dict[str, float]:
     jerk = np.full_like(a, np.inf) if jerk is None else jerk
-    return limit_ratios(problem.active_limits, q, v, a, jerk, tau + problem.friction_law.torque(v))
+    return limit_ratios(problem.arm.active_limits, q, v, a, jerk, tau + problem.arm.friction_law.torque(v))

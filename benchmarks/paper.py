@@ -21,10 +21,10 @@ from scipy.stats import spearmanr
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import Problem, optimize
-from optimizer.arm import Arm
-from optimizer.evaluate import Evaluation, evaluate
-from optimizer.given_motion import Configurations
-from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.problem.arm import Arm
+from optimizer.replay.evaluate import Evaluation, evaluate
+from optimizer.replay.recording import Configurations
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "paper.md"
@@ -193,7 +193,10 @@ def table_2() -> list[str]:
 def table_3() -> list[str]:
     """Power, and what it is proportional to."""
     theirs = table("table3_power")[:, 1]
-    arms = {"UR5e": powers(Arm()), "UR5": powers(Arm(link_mass_scale=older_links()))}
+    arms = {
+        "UR5e": powers(Arm(robot=load_robot("ur5e"))),
+        "UR5": powers(Arm(robot=load_robot("ur5e"), link_mass_scale=older_links())),
+    }
     agreements = {name: Agreement.of(ours, theirs) for name, ours in arms.items()}
 
     def cells(k: int) -> list[str]:
@@ -232,8 +235,8 @@ def savings() -> list[str]:
 
     def cells(k: int) -> list[str]:
         q = configurations()[k]
-        there = there_and_back(Arm(), q).segments[0]
-        solution = optimize(Problem(start=HOME, goal=q, windings=False))
+        there = there_and_back(Arm(robot=load_robot("ur5e")), q).segments[0]
+        solution = optimize(Problem(arm=Arm(robot=load_robot("ur5e")), start=HOME, goal=q, windings=False))
         default = next(each for each in solution.baselines if each.name == "controller_default")
         linear, ours = there.energy, solution.energy
         return [

@@ -10,10 +10,11 @@ from benchmarks.figures import Spread
 from benchmarks.reference import FILE, fingerprint, load
 from benchmarks.tasks import move
 from models.registry import load_robot
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
-from optimizer.kernel import compile_kernel
 from optimizer.optimize import optimize
-from optimizer.problem import Problem
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
 
 
 def main() -> None:
@@ -34,7 +35,9 @@ def main() -> None:
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(Problem(task.q_start, task.q_goal, robot=robot, collisions=False)).energy.electrical.total
+            energy = optimize(
+                Problem(arm=Arm(robot=robot, collisions=False), start=task.q_start, goal=task.q_goal)
+            ).energy.electrical.total
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")

@@ -28,13 +28,14 @@ from benchmarks.peers.casadi_opti import CasadiOptiGrid
 from benchmarks.tasks import Move, move
 from models.registry import load_robot
 from models.robot import Array, Robot
-from optimizer import bspline
-from optimizer.candidate import Guess
-from optimizer.kernel import compile_kernel
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods.free_spline import FreeSpline
-from optimizer.motion import Task
-from optimizer.problem import Problem
-from optimizer.solution import Spline
+from optimizer.methods.sqp_method import Guess
+from optimizer.prepared_problem import Task
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
+from optimizer.trajectories import bspline
+from optimizer.trajectories.spline import Spline
 
 FILE = Path(__file__).with_name("reference_energies.json")
 SEED, TASKS = 1, 100
@@ -63,7 +64,10 @@ class Search:
     """One task's best motion so far, by the exact energy [J]."""
 
     def __init__(self, task: Move) -> None:
-        self.move, self.task = task, Task(Problem(task.q_start, task.q_goal, collisions=False))
+        self.move, self.task = (
+            task,
+            Task.of(Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal)),
+        )
         self.best: Spline | None = None
         self.energy = np.inf
 
@@ -93,7 +97,7 @@ def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, A
     def bulged() -> Array:
         points = straight.copy()
         points[space.free] += bulge(rng, space, nq)
-        limits = found.task.problem.active_limits
+        limits = found.task.problem.arm.active_limits
         return np.clip(points, limits.q_min, limits.q_max)
 
     from_line = found.improve(guess(straight))

@@ -15,16 +15,18 @@ from benchmarks.figures import Spread, exponent
 from benchmarks.tasks import ask, move, moves
 from models.registry import load_robot
 from models.robot import Array, Robot
-from optimizer import bspline
-from optimizer.arm import Pose
-from optimizer.candidate import Guess
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
-from optimizer.inverse_kinematics import inverse_kinematics_for
-from optimizer.kernel import compile_kernel
+from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.methods.free_spline import FreeSpline
-from optimizer.motion import Task
+from optimizer.methods.sqp_method import Guess
 from optimizer.optimize import optimize, warm_up
-from optimizer.problem import BranchFilter, Problem
+from optimizer.prepared_problem import Task
+from optimizer.problem.arm import Arm
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.trajectories import bspline
 
 CONTROL_POINTS = (8, 10, 13, 16, 20, 24, 28, 32)
 JOINTS = (2, 3, 4, 5, 6, 7)
@@ -42,7 +44,12 @@ def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
             points = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
             began = time.perf_counter()
             solver = FreeSpline(
-                Task(Problem(task.q_start, task.q_goal, collisions=False)), task.q_start, task.q_goal, began + PATIENCE
+                Task.of(
+                    Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal)
+                ),
+                task.q_start,
+                task.q_goal,
+                began + PATIENCE,
             )
             outcome = solver.improve(Guess(space, points, 0.0))
             walls.append(time.perf_counter() - began)
@@ -62,8 +69,8 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
         walls, iterations, solved = [], [], 0
         for task in (move(seed, 0, robot), *moves(seed, count, robot)):
             began = time.perf_counter()
-            problem = Problem(task.q_start, task.q_goal, robot=robot, collisions=False)
-            outcome = FreeSpline(Task(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
+            problem = Problem(arm=Arm(robot=robot, collisions=False), start=task.q_start, goal=task.q_goal)
+            outcome = FreeSpline(Task.of(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
             solved += outcome.status == "solved"
@@ -90,7 +97,13 @@ def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
             began = time.perf_counter()
             try:
                 solution = optimize(
-                    Problem(q_start, goal, robot=robot, branch=branch, windings=windings, collisions=False)
+                    Problem(
+                        arm=Arm(robot=robot, collisions=False),
+                        start=q_start,
+                        goal=goal,
+                        branch=branch,
+                        windings=windings,
+                    )
                 )
             except JoulepathError:
                 continue

@@ -20,14 +20,16 @@ import numpy as np
 from benchmarks.cells import CELLS, CellTask, cell_tasks
 from benchmarks.command import keep, on_one_core, parser
 from benchmarks.figures import Spread
+from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
-from optimizer.arm import Pose
-from optimizer.collision import CollisionModel
+from optimizer.collision.model import CollisionModel
+from optimizer.collision.state_validity import FreeSpace
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.free_space import FreeSpace
-from optimizer.motion import sample
-from optimizer.problem import Problem
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.trajectories.spline import sample
 
 REPLAY = 1e-4  # s
 SOLVED = 0.99  # share that must be solved, of either kind
@@ -59,12 +61,10 @@ def run(task: CellTask, kind: str) -> Outcome:
     arm = task.arm
     goal: Array | Pose = task.q_goal if kind == KINDS[0] else Pose(task.T_goal)
     problem = Problem(
-        task.q_start,
-        goal,
+        arm=Arm(robot=load_robot("ur5e"), scene=arm.scene, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp),
+        start=task.q_start,
+        goal=goal,
         windings=kind != KINDS[0],
-        scene=arm.scene,
-        tool=arm.tool,
-        T_flange_tcp=arm.T_flange_tcp,
     )
     outcome = Outcome(task, kind)
     began = time.perf_counter()

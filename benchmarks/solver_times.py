@@ -17,15 +17,15 @@ from benchmarks.command import keep, on_one_core, parser
 from benchmarks.figures import Spread
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
-from optimizer.arm import Arm
-from optimizer.candidate import Attempt
-from optimizer.collision import CollisionModel
-from optimizer.keep_away import RESERVE
-from optimizer.kernel import compile_kernel
+from optimizer.collision.model import CollisionModel
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods import solver_for
-from optimizer.motion import Task
+from optimizer.methods.method import Attempt
+from optimizer.nlp.clearance_constraint import RESERVE
 from optimizer.optimize import warm_up
-from optimizer.problem import Method, Problem
+from optimizer.prepared_problem import Task
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Method, Problem
 
 PATIENCE = 60.0  # s
 METHODS: tuple[Method, ...] = ("bspline", "time_scaling")
@@ -33,7 +33,14 @@ METHODS: tuple[Method, ...] = ("bspline", "time_scaling")
 
 def solve(move: Move, method: Method, collisions: bool = False) -> tuple[float, Attempt]:
     """Wall time [s] and outcome of one candidate."""
-    task = Task(Problem(move.q_start, move.q_goal, method=method, collisions=collisions))
+    task = Task.of(
+        Problem(
+            arm=Arm(robot=load_robot("ur5e"), collisions=collisions),
+            start=move.q_start,
+            goal=move.q_goal,
+            method=method,
+        )
+    )
     began = time.perf_counter()
     outcome = solver_for(task, move.q_start, move.q_goal, began + PATIENCE).solve()
     return time.perf_counter() - began, outcome
@@ -53,7 +60,7 @@ def measure(seed: int, count: int, method: Method) -> dict[str, Any]:
 
 def apart(seed: int, count: int) -> dict[str, Any]:
     """What it costs to keep the arm's links apart: ratio of the times with and without, task by task."""
-    model = CollisionModel(Arm())
+    model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):
         if model.least(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:

@@ -13,7 +13,7 @@ from benchmarks.figures import Spread
 from benchmarks.service import Answer, Service, running
 from benchmarks.tasks import ask
 from models.registry import load_robot
-from optimizer.kernel import compile_kernel
+from optimizer.energy.kernel_cache import compile_kernel
 
 PATIENCE = 90.0  # for the first answer, and for the compiler [s]
 AFTER = 10  # requests answered by the compiled kernel that are measured

@@ -11,9 +11,9 @@ import pinocchio as pin
 
 from models.registry import load_robot
 from models.robot import Array, Robot
-from optimizer.arm import Arm
-from optimizer.collision import CollisionModel
-from optimizer.keep_away import RESERVE
+from optimizer.collision.model import CollisionModel
+from optimizer.nlp.clearance_constraint import RESERVE
+from optimizer.problem.arm import Arm
 
 Kind = Literal["joint to pose", "pose to pose"]
 KINDS: tuple[Kind, ...] = ("joint to pose", "pose to pose")

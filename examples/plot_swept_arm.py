@@ -17,10 +17,11 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from scipy.interpolate import BSpline
 from scipy.spatial import ConvexHull
 
-from app.convert import to_problem
+from app.convert.request import to_problem
 from app.schemas.request import OptimizeRequest
 from models.robot import Array
-from optimizer.collision import TOOL, Body, CollisionModel
+from optimizer.collision.bodies import TOOL, Body
+from optimizer.collision.model import CollisionModel
 from optimizer.optimize import optimize
 
 # Okabe and Ito's blue to orange, which colour-blind readers can tell apart
@@ -103,7 +104,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     solution = optimize(problem)
     spline = solution.trajectory.spline
     curve = BSpline(spline.knots, spline.control_points, spline.degree)
-    model = CollisionModel(problem)
+    model = CollisionModel(problem.arm)
     frames = model.frames(curve(np.linspace(0, spline.duration, instants)))
     polygons: list[Array] = []
     colours: list[tuple[float, ...]] = []
@@ -113,7 +114,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
         polygons.extend(fresh)
         colours.extend(shaded(fresh, colour, alpha))
 
-    obstacles = {obstacle.name for obstacle in problem.scene.obstacles}
+    obstacles = {obstacle.name for obstacle in problem.arm.scene.obstacles}
     for body in model.bodies:
         if body.name in obstacles:
             add(body, np.eye(4), OBSTACLE, 0.18 if body.core.plane else 0.4)
@@ -130,7 +131,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     figure = plt.figure(figsize=(9, 7.2))
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     axes.add_collection3d(Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average"))
-    T_last_tcp = problem.robot.T_last_flange @ problem.T_flange_tcp
+    T_last_tcp = problem.arm.robot.T_last_flange @ problem.arm.T_flange_tcp
     path = (model.frames(curve(np.linspace(0, spline.duration, 200)))[:, -1] @ T_last_tcp)[:, :3, 3]
     axes.plot(*path.T, color="black", linewidth=1.6, zorder=10, label="path of the TCP")
     for point, share, name in ((path[0], 0.0, "start"), (path[-1], 1.0, "goal")):

@@ -1,9 +1,10 @@
-"""Finds a robot arm's motion of least energy. A library: `optimize(Problem(start, goal))` gives a `Solution`.
+"""Finds a robot arm's motion of least energy. A library: `optimize(Problem(arm=Arm(robot), start=…, goal=…))` gives a
+`Solution`.
 
 The names below are the public ones; robots and their figures are in `models`.
 """
 
-from optimizer.arm import Payload, Pose
+from models.registry import load_robot
 from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
@@ -18,14 +19,18 @@ from optimizer.exceptions import (
     UnreachablePose,
 )
 from optimizer.optimize import optimize
-from optimizer.orientation import LoosePose
 from optimizer.pareto import Front, pareto
-from optimizer.problem import BranchFilter, Problem
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import AnyOf
 from optimizer.solution import Solution
-from optimizer.targets import AnyOf
 
 __all__ = [
     "AnyOf",
+    "Arm",
     "BranchFilter",
     "DeadlineExceeded",
     "DurationTooShort",
@@ -44,6 +49,7 @@ __all__ = [
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
+    "load_robot",
     "optimize",
     "pareto",
 ]

@@ -24,10 +24,12 @@ from typing import Literal
 import numpy as np
 
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
-from optimizer.free_goal import between
-from optimizer.optimize import Run, one_thread
-from optimizer.problem import Problem
-from optimizer.solution import Solution, Spline
+from optimizer.optimize import one_thread
+from optimizer.problem.problem import Problem
+from optimizer.search.free_goal import between
+from optimizer.search.run import Run
+from optimizer.solution import Solution
+from optimizer.trajectories.spline import Spline
 
 LEAST_POINTS, MOST_POINTS = 2, 100
 # share of the time left that the search for the fastest motion, and each end of the front, may take

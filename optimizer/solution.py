@@ -6,20 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from models.robot import Array
-
-
-@dataclass(frozen=True)
-class Spline:
-    """A clamped B-spline q(t): degree, knots (m,) [s], control points (n, nq) [rad]."""
-
-    degree: int
-    knots: Array
-    control_points: Array
-
-    @property
-    def duration(self) -> float:
-        """Length of the motion [s]."""
-        return float(self.knots[-1])
+from optimizer.trajectories.spline import Spline
 
 
 @dataclass(frozen=True)

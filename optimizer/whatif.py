@@ -9,13 +9,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from optimizer.certificate import certify
 from optimizer.exceptions import JoulepathError
-from optimizer.motion import Task
-from optimizer.optimize import SLACK, Run, one_thread, optimize
-from optimizer.problem import Problem
+from optimizer.optimize import one_thread, optimize
+from optimizer.prepared_problem import Task
+from optimizer.problem.problem import Problem, narrowed
+from optimizer.search.run import SLACK, Run
 from optimizer.solution import Certificate, Energy, Solution
-from optimizer.targets import narrowed
-from optimizer.verify import certify
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def whatif(base: Solution, problem: Problem) -> Changed:
     holds for all of it.
     """
     began = time.perf_counter()
-    spline, task = base.trajectory.spline, Task(problem)
+    spline, task = base.trajectory.spline, Task.of(problem)
     energy = task.energy(spline)
     asked = narrowed(problem, base.start.target, base.goal.target)
     certificate = certify(asked, spline, base.start.q, base.goal.q, energy)

@@ -12,6 +12,7 @@ import optimizer
 
 PUBLIC = {
     "AnyOf",
+    "Arm",
     "BranchFilter",
     "DeadlineExceeded",
     "DurationTooShort",
@@ -30,6 +31,7 @@ PUBLIC = {
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
+    "load_robot",
     "optimize",
     "pareto",
 }
@@ -53,7 +55,9 @@ def test_one_except_clause_catches_every_error() -> None:
 def test_a_motion_without_http() -> None:
     """The ten lines of the README: joints to joints, everything else left to its default."""
     start, goal = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0]), np.array([1.0, -1.2, 1.8, -2.0, -1.3, 0.5])
-    solution = optimizer.optimize(optimizer.Problem(start=start, goal=goal))
+    solution = optimizer.optimize(
+        optimizer.Problem(arm=optimizer.Arm(robot=optimizer.load_robot("ur5e")), start=start, goal=goal)
+    )
     assert isinstance(solution, optimizer.Solution)
     assert solution.certificate.valid
     assert solution.trajectory.q[0] == pytest.approx(start)

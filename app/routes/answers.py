@@ -8,8 +8,8 @@ from typing import Annotated
 import orjson
 from fastapi import APIRouter, Path, Request, Response
 
-from app.documentation import problem_responses
-from app.schemas import problems
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
 from app.schemas.answers import KeptAnswer
 from app.store import answers
 from app.store.store import Store

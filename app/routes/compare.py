@@ -6,16 +6,16 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.comparison import CompareTask
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.handlers import to_http
-from app.routes.disconnect import unless_disconnected
-from app.routes.optimize import allowed_deadline
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.routes.parameters import allowed_deadline
+from app.schemas import errors as problems
 from app.schemas.compare import CompareRequest, CompareResponse
 from app.schemas.examples import COMPARE_EXAMPLES
 from app.settings import Settings
+from app.tasks.compare import CompareTask
 
 router = APIRouter(tags=["motion"])
 

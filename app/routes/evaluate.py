@@ -7,16 +7,16 @@ from typing import Any, Literal
 
 from fastapi import APIRouter, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.errors import UnsupportedMediaType
-from app.evaluation import EvaluateTask
-from app.handlers import to_http
-from app.routes.disconnect import unless_disconnected
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.exceptions import UnsupportedMediaType
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
 from app.schemas.evaluate_examples import CSV_EXAMPLES, CSV_TABLE, EVALUATE_EXAMPLES
 from app.settings import Settings
+from app.tasks.evaluate import EvaluateTask
 
 router = APIRouter(tags=["motion"])
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.errors import NotReady
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.exceptions import NotReady
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
 from app.schemas.health import Alive, Ready
 
 router = APIRouter(tags=["health"])

@@ -5,15 +5,14 @@ from __future__ import annotations
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from app.convert import to_ik_response
-from app.convert_arm import robot_named
-from app.convert_pose import to_matrix
-from app.convert_scene import to_arm
-from app.documentation import problem_responses
-from app.schemas import problems
+from app.convert.arm import robot_named
+from app.convert.ik import to_arm, to_ik_response
+from app.convert.pose import to_matrix
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
 from app.schemas.ik import IKRequest, IKResponse
-from optimizer.collision import collision_model
-from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.collision.model import collision_model
+from optimizer.kinematics.inverse import inverse_kinematics_for
 
 router = APIRouter(tags=["motion"])
 

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.handlers import to_http
-from app.ik_path import IKPathTask
-from app.routes.disconnect import unless_disconnected
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
 from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathRequest, IKPathResponse
 from app.settings import Settings
+from app.tasks.ik_path import IKPathTask
 
 router = APIRouter(tags=["motion"])
 

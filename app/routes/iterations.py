@@ -9,15 +9,13 @@ from typing import Annotated, Any, TypeVar
 import orjson
 from fastapi import APIRouter, Body, Path, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.errors import Reply
-from app.evaluation import EvaluateTask
-from app.handlers import to_http
-from app.routes.disconnect import unless_disconnected
-from app.routes.optimize import allowed_deadline
-from app.routes.studies import CREATED_HEADERS, Key, StudyId, set_location
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.engine.reply import Reply
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.routes.parameters import CREATED_HEADERS, Key, StudyId, allowed_deadline, set_location
+from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.studies import IterationDetail, IterationRequest, OptimizeStep
@@ -26,8 +24,9 @@ from app.settings import Settings
 from app.store import studies
 from app.store.store import Store
 from app.store.tables import Study
-from app.study_answers import detail
-from app.tasks import OptimizeTask
+from app.studies.answers import detail
+from app.tasks.evaluate import EvaluateTask
+from app.tasks.optimize import OptimizeTask
 from optimizer.exceptions import InvalidProblem
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)

@@ -6,18 +6,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.handlers import to_http
-from app.routes.disconnect import unless_disconnected
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.routes.parameters import allowed_deadline
+from app.schemas import errors as problems
 from app.schemas.examples import OPTIMIZE_EXAMPLES
-from app.schemas.request import MotionRequest, OptimizeRequest
+from app.schemas.request import OptimizeRequest
 from app.schemas.response import OptimizeResponse
-from app.schemas.whatif import WhatifRequest
 from app.settings import Settings
-from app.tasks import OptimizeTask
-from optimizer.exceptions import InvalidProblem
+from app.tasks.optimize import OptimizeTask
 
 router = APIRouter(tags=["motion"])
 
@@ -55,12 +54,3 @@ async def optimize(
     task = OptimizeTask(body, request.state.id)
     work = engine.run(task, allowed_deadline(body, settings.max_deadline))
     return to_http(await unless_disconnected(request, work))
-
-
-def allowed_deadline(body: MotionRequest | WhatifRequest, most: float) -> float:
-    """The request's deadline [s]. Raises InvalidProblem when the caller asks for too much."""
-    if "deadline" not in body.model_fields_set:
-        return min(body.deadline, most)
-    if body.deadline > most:
-        raise InvalidProblem("deadline", f"deadline must be at most {most:g} s.")
-    return body.deadline

@@ -6,16 +6,16 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.fronts import ParetoTask
-from app.handlers import to_http
-from app.kept import keep
-from app.routes.disconnect import unless_disconnected
-from app.routes.optimize import allowed_deadline
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.routes.parameters import allowed_deadline
+from app.schemas import errors as problems
 from app.schemas.pareto import PARETO_EXAMPLES, ParetoRequest, ParetoResponse
 from app.settings import Settings
+from app.store.keep import keep
+from app.tasks.pareto import ParetoTask
 
 router = APIRouter(tags=["motion"])
 

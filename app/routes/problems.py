@@ -10,10 +10,10 @@ from html import escape
 from fastapi import APIRouter
 from fastapi.responses import HTMLResponse
 
-from app.documentation import problem_responses
-from app.errors import NotFound
-from app.schemas import problems
-from app.schemas.problems import PROBLEMS, Problem
+from app.exceptions import NotFound
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
+from app.schemas.errors import PROBLEMS, Problem
 
 router = APIRouter(prefix="/problems", tags=["problems"])
 

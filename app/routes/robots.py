@@ -7,9 +7,9 @@ from typing import Any
 
 from fastapi import APIRouter
 
-from app.convert_arm import robot_named
-from app.documentation import problem_responses
-from app.schemas import problems
+from app.convert.arm import robot_named
+from app.http.openapi import problem_responses
+from app.schemas import errors as problems
 from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from models.registry import load_robot, robot_names
 from models.robot import Robot

@@ -5,37 +5,20 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Header, Path, Query, Request, Response
+from fastapi import APIRouter, Body, Query, Request, Response
 from sqlalchemy.exc import IntegrityError
 
-from app.convert_arm import robot_named
-from app.documentation import problem_responses
-from app.schemas import problems
-from app.schemas.common import KEY_HEADER
-from app.schemas.studies import IdempotencyKey, Study, StudyList, StudyPage, StudyRequest, StudySummary
+from app.convert.arm import robot_named
+from app.http.openapi import problem_responses
+from app.routes.parameters import CREATED_HEADERS, Key, StudyId, set_location
+from app.schemas import errors as problems
+from app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from app.schemas.study_examples import STUDY_CSV, STUDY_EXAMPLES
 from app.store import studies
 from app.store.store import Store
-from app.study_answers import as_csv, full, summary
+from app.studies.answers import as_csv, full, summary
 
 router = APIRouter(prefix="/studies", tags=["studies"])
-
-StudyId = Annotated[str, Path(description="The study's id.", examples=[StudySummary.EXAMPLE_ID])]
-Key = Annotated[
-    IdempotencyKey | None,
-    Header(
-        alias=KEY_HEADER,
-        description="Any text that names this request and no other: sent again under the same key, after a lost "
-        "connection for one, it is answered from what it made the first time.",
-        examples=["2f6f3d0c-try-1"],
-    ),
-]
-REPLAYED = "Idempotency-Replayed"
-"""Header of an answer to a request that was sent before."""
-CREATED_HEADERS = {
-    "Location": {"description": "Path of what was made.", "schema": {"type": "string"}},
-    REPLAYED: {"description": "`true` if it was made before, under the same key.", "schema": {"type": "string"}},
-}
 
 
 @router.post(
@@ -114,10 +97,3 @@ async def delete(request: Request, id: StudyId) -> None:
     """Deletes it with its iterations and their answers."""
     store: Store = request.app.state.store
     await store.write(partial(studies.delete, study_id=id))
-
-
-def set_location(request: Request, response: Response, path: str, again: bool) -> None:
-    """Headers of an answer that says what was made, now or under the same key before."""
-    response.headers["Location"] = f"{request.scope.get('root_path', '')}/studies/{path}"
-    if again:
-        response.headers[REPLAYED] = "true"

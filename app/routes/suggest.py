@@ -9,22 +9,24 @@ from typing import Annotated, Any
 import orjson
 from fastapi import APIRouter, Query, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.errors import Busy, EmptyStudy, Reply, WorkerDied, problem_type
-from app.handlers import to_http
-from app.progress import best_of
-from app.routes.disconnect import unless_disconnected
-from app.routes.studies import StudyId
-from app.schemas import problems
-from app.schemas.problems import PREFIX
+from app.engine.pool import Engine
+from app.engine.reply import Reply
+from app.exceptions import Busy, EmptyStudy, WorkerDied
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.http.problem_details import problem_type
+from app.routes.parameters import StudyId
+from app.schemas import errors as problems
+from app.schemas.errors import PREFIX
 from app.schemas.request import OptimizeRequest
 from app.schemas.suggestions import Suggestions, SuggestQuery
 from app.settings import Settings
 from app.store import answers, studies
 from app.store.store import Store
-from app.suggestions import Proposal, base_of, proposals
-from app.tasks import OptimizeTask
+from app.studies.progress import best_of
+from app.studies.suggestions import Proposal, base_of, proposals
+from app.tasks.optimize import OptimizeTask
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem
 
 router = APIRouter(prefix="/studies", tags=["studies"])

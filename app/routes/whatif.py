@@ -6,17 +6,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.documentation import problem_responses
-from app.engine import Engine
-from app.handlers import to_http
-from app.kept import keep
-from app.routes.disconnect import unless_disconnected
-from app.routes.optimize import allowed_deadline
-from app.schemas import problems
+from app.engine.pool import Engine
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import to_http
+from app.http.openapi import problem_responses
+from app.routes.parameters import allowed_deadline
+from app.schemas import errors as problems
 from app.schemas.whatif import WhatifRequest, WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from app.settings import Settings
-from app.whatif import WhatifTask
+from app.store.keep import keep
+from app.tasks.whatif import WhatifTask
 
 router = APIRouter(tags=["motion"])
 

@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from app.schemas.common import Response, described, part
 from app.schemas.request import MotionRequest
 from app.schemas.response import Baseline, OptimizeResponse
-from optimizer.problem import Method
+from optimizer.problem.problem import Method
 
 ALL: list[Method] = list(get_args(Method))
 _PROBLEM = {"type": "/problems/duration-too-short", "title": "Duration too short", "status": 422}

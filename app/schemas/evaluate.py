@@ -11,7 +11,7 @@ from app.schemas.arm import ArmRequest, by_shape
 from app.schemas.common import JointPositions, Request, Response, described, part
 from app.schemas.request import MAX_SAMPLES, Seconds
 from app.schemas.response import ElectricalEnergy, JointEnergy, JointSamples, MechanicalEnergy, Samples, Storage
-from optimizer.limit_report import LimitName
+from optimizer.replay.limit_report import LimitName
 
 MAX_ROWS = 100_000
 """Most rows of a motion sent as JSON; a CSV holds more."""

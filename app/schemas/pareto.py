@@ -10,7 +10,7 @@ from pydantic import Field
 from app.schemas.answers import KeptAnswer
 from app.schemas.common import Response, described, part
 from app.schemas.request import MAX_DURATION, DurationRange, OptimizeRequest
-from optimizer.problem import Method
+from optimizer.problem.problem import Method
 
 _HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 _LABEL = "left/up/no_flip"

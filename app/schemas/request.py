@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
-from optimizer.problem import Method
+from optimizer.problem.problem import Method
 
 MAX_DURATION = 600.0
 """Longest motion [s]."""

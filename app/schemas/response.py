@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.common import Response, described, part
-from optimizer.problem import Method
+from optimizer.problem.problem import Method
 
 Joints = list[float]
 Samples = list[float]

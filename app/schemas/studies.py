@@ -11,8 +11,8 @@ from pydantic_core import PydanticCustomError
 from app.schemas.answers import KeptAnswer
 from app.schemas.common import Request, Response, RobotName, by_field, described, part
 from app.schemas.evaluate import EvaluateRequest
+from app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
 from app.schemas.request import OptimizeRequest
-from app.store.tables import KEY_LENGTH, NAME_LENGTH
 
 _CREATED = "2025-03-14T09:26:53.589793Z"
 _OPTIMIZE = {

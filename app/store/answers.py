@@ -8,7 +8,7 @@ from datetime import timedelta
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session
 
-from app.errors import UnknownAnswer
+from app.exceptions import UnknownAnswer
 from app.store.tables import Answer, is_id, new_id, now
 
 

@@ -14,7 +14,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
-from app.errors import StoreUnavailable
+from app.exceptions import StoreUnavailable
 from app.store.database import create_database_engine, migrate
 
 logger = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from sqlalchemy import and_, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
-from app.errors import KeyReused, UnknownIteration, UnknownStudy
+from app.exceptions import KeyReused, UnknownIteration, UnknownStudy
 from app.store import answers
 from app.store.tables import Iteration, Study, is_id, new_id, now
 

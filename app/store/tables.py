@@ -10,6 +10,8 @@ from typing import Any
 from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
+from app.schemas.lengths import ID_LENGTH, KEY_LENGTH, NAME_LENGTH
+
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -17,12 +19,6 @@ _NAMES = {
     "fk": "fk_%(table_name)s_%(column_0_N_name)s",
     "pk": "pk_%(table_name)s",
 }
-ID_LENGTH = 36
-"""Of a UUID in writing."""
-KEY_LENGTH = 128
-"""Of an `Idempotency-Key`."""
-NAME_LENGTH = 200
-"""Of a study's name."""
 
 
 def now() -> datetime:

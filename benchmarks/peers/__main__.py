@@ -15,7 +15,8 @@ from benchmarks.motion import Replay, replay
 from benchmarks.peers.peer import Peer, versions
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
-from optimizer.problem import Problem
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
 
 PEERS = {
     "answer": "joulepath:Answer",
@@ -42,7 +43,12 @@ def attempt(peer: Peer, task: Move) -> tuple[float, Replay | None]:
     wall = time.perf_counter() - began
     if motion is None:
         return wall, None
-    found = replay(Problem(task.q_start, task.q_goal, collisions=False), motion, task.q_start, task.q_goal)
+    found = replay(
+        Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal),
+        motion,
+        task.q_start,
+        task.q_goal,
+    )
     return wall, found if found.end_error <= REACHED else None
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from benchmarks.motion import SplineMotion
 from benchmarks.peers.peer import CONTROL_POINTS, NODES
 from models.robot import Array, FrictionLaw, Robot
-from optimizer.bspline import DEGREE, Basis, basis_matrix, clamped
-from optimizer.dynamics import SymbolicPayload, inverse_dynamics
-from optimizer.energy import drawn_power, power_flow
-from optimizer.profile import shortest_duration
+from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
+from optimizer.energy.losses import drawn_power, power_flow
+from optimizer.trajectories.bspline import DEGREE, Basis, basis_matrix, clamped
+from optimizer.trajectories.seven_segment import shortest_duration
 
 WIDTH = 0.5  # of the rounded corners of power [W]
 KNEE = 0.02  # of friction's rounded reversal [rad/s]

@@ -18,8 +18,8 @@ from pydrake.trajectories import BsplineTrajectory
 from benchmarks.motion import SplineMotion
 from benchmarks.peers.peer import CONTROL_POINTS, NODES
 from models.robot import Array, Robot
-from optimizer.bspline import DEGREE, Basis, clamped
-from optimizer.profile import shortest_duration
+from optimizer.trajectories.bspline import DEGREE, Basis, clamped
+from optimizer.trajectories.seven_segment import shortest_duration
 
 WIDTH = 0.5  # of the rounded corners of power [W]
 KNEE = 0.02  # of friction's rounded reversal [rad/s]

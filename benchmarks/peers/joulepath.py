@@ -6,13 +6,14 @@ import time
 
 from benchmarks.motion import SplineMotion
 from models.robot import Array, Robot
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
-from optimizer.kernel import compile_kernel
 from optimizer.methods import solver_for
-from optimizer.motion import Task
 from optimizer.optimize import optimize, warm_up
-from optimizer.problem import Problem
-from optimizer.solution import Spline
+from optimizer.prepared_problem import Task
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
+from optimizer.trajectories.spline import Spline
 
 PATIENCE = 10.0  # s
 
@@ -30,7 +31,7 @@ class Candidate:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
-        task = Task(Problem(q_start, q_goal, robot=self.robot, collisions=False))
+        task = Task.of(Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal))
         return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
 
 
@@ -48,7 +49,11 @@ class Answer:
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
         try:
-            return _motion(optimize(Problem(q_start, q_goal, robot=self.robot, collisions=False)).trajectory.spline)
+            return _motion(
+                optimize(
+                    Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal)
+                ).trajectory.spline
+            )
         except JoulepathError:
             return None
 
@@ -66,7 +71,9 @@ class Line:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
-        task = Task(Problem(q_start, q_goal, robot=self.robot, method="time_scaling", collisions=False))
+        task = Task.of(
+            Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal, method="time_scaling")
+        )
         return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
 
 

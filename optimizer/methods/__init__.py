@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from models.robot import Array
-from optimizer.candidate import Solver
+from optimizer.methods.duration_intervals import Window
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.lagrange import Lagrange
+from optimizer.methods.method import Solver
 from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.methods.time_scaling import TimeScaling
 from optimizer.methods.uniform_scaling import UniformScaling
-from optimizer.motion import Task
-from optimizer.problem import Method
-from optimizer.windows import Window
+from optimizer.prepared_problem import Task
+from optimizer.problem.problem import Method
 
 METHODS: dict[Method, type[Solver]] = {
     "bspline": FreeSpline,

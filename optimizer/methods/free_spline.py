@@ -12,14 +12,16 @@ from dataclasses import replace
 from typing import ClassVar
 
 from models.robot import Array
-from optimizer import bspline, profile
-from optimizer.baselines import time_optimal, time_optimal_positions
-from optimizer.bounds import LEAST_DURATION
-from optimizer.bspline import Basis
-from optimizer.candidate import Attempt, Guess, Programmed
-from optimizer.motion import sample
-from optimizer.solution import BaselineName, Spline
-from optimizer.way_around import along, length, nothing_between
+from optimizer.collision.path_planner import along, length, nothing_between
+from optimizer.methods.method import Attempt
+from optimizer.methods.sqp_method import Guess, Programmed
+from optimizer.problem.problem import LEAST_DURATION
+from optimizer.solution import BaselineName
+from optimizer.trajectories import bspline
+from optimizer.trajectories import seven_segment as profile
+from optimizer.trajectories.bspline import Basis
+from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
+from optimizer.trajectories.spline import Spline, sample
 
 # control points of a first attempt with evenly spaced knots
 COARSE = 13
@@ -63,7 +65,7 @@ class FreeSpline(Programmed):
     def around(self, stuck: Attempt) -> Attempt:
         """From ways that hit nothing, the cheapest motion that comes of them; `stuck` itself where none does."""
         task, space = self.task, bspline.uniform(COARSE)
-        v_max, now = task.problem.active_limits.v_max, time.perf_counter()
+        v_max, now = task.problem.arm.active_limits.v_max, time.perf_counter()
         left = max(self.deadline - now, 0.0)
         ways = task.ways(self.q_start, self.q_goal, now + PLANNING * left)
         found: list[Attempt] = []

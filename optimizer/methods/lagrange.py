@@ -14,10 +14,13 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.baselines import quintic, time_optimal
-from optimizer.candidate import Attempt, Guess, Programmed
-from optimizer.lagrange import polynomials
-from optimizer.solution import BaselineName, Spline
+from optimizer.methods.method import Attempt
+from optimizer.methods.sqp_method import Guess, Programmed
+from optimizer.solution import BaselineName
+from optimizer.trajectories.polynomial import polynomials
+from optimizer.trajectories.ruckig_motion import time_optimal
+from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.time_scalings import quintic
 
 # degree 15: every two nodes more save a UR5e some 0.15 % and take a fifth more time, here as at degrees 9 to 19, while
 # Bernstein's coefficients lose a digit with each three
@@ -64,6 +67,6 @@ class Lagrange(Programmed):
         q = BSpline(spline.knots, spline.control_points, spline.degree)(
             np.linspace(0.0, spline.duration, POSITION_POINTS)
         )
-        limits = self.task.problem.active_limits
+        limits = self.task.problem.arm.active_limits
         below, above = limits.q_min - q.min(axis=0), q.max(axis=0) - limits.q_max
         return tuple(np.where(beyond > ROUNDING, POSITION_REPAIR * beyond, 0.0) for beyond in (below, above))

@@ -14,10 +14,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from models.robot import Array
-from optimizer.candidate import Attempt, Solver
-from optimizer.lagrange import polynomials
-from optimizer.motion import Task, peak_rates, slowed, spline_of, stretch
-from optimizer.windows import Window
+from optimizer.methods.duration_intervals import Window
+from optimizer.methods.method import Attempt, Solver
+from optimizer.prepared_problem import Task
+from optimizer.trajectories.polynomial import polynomials
+from optimizer.trajectories.spline import peak_rates, slowed, spline_of, stretch
 
 # degree 9: more values are more to search than a few seconds are enough for
 NODES = 4
@@ -93,7 +94,7 @@ class PolynomialGA(Solver):
 
     def costs(self, genes: Array) -> Array:
         """The cost [J] of every chromosome (P, n), (P,), with the penalties for what it breaks."""
-        limits = self.task.problem.active_limits
+        limits = self.task.problem.arm.active_limits
         points, duration, late = self._decoded(genes)
         count, nq = len(points), points.shape[2]
         z = np.einsum("dkm,pmj->pkdj", self.space.at_nodes, points, optimize=True)
@@ -114,7 +115,7 @@ class PolynomialGA(Solver):
         values = self._line + genes[:, :-1].reshape(count, NODES, nq) * self._reach
         ends = np.ones((count, 1, 1))
         points = np.concatenate([ends * self.q_start, values, ends * self.q_goal], axis=1)
-        limits = self.task.problem.active_limits
+        limits = self.task.problem.arm.active_limits
         peaks = np.abs(np.einsum("dgm,pmj->pdgj", self.space.at_grid, points, optimize=True)).max(axis=2)
         ratios = (peaks / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD)).max(axis=2)
         least = np.maximum((ratios ** (1 / np.arange(1, 4))).max(axis=1), self.t_min)
@@ -134,7 +135,7 @@ class PolynomialGA(Solver):
 
     def _held(self, genes: Array) -> Attempt:
         """The motion of a chromosome, slowed until it holds every limit between the nodes too."""
-        limits = self.task.problem.active_limits
+        limits = self.task.problem.arm.active_limits
         points, duration, _ = self._decoded(genes[None])
         spline = spline_of(self.space, points[0], float(duration[0]))
         needed = stretch(peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max]))

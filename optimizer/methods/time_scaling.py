@@ -8,12 +8,15 @@ from __future__ import annotations
 from typing import ClassVar
 
 from models.robot import Limits
-from optimizer import bspline, profile, shortest_line
-from optimizer.baselines import quintic_spline
-from optimizer.candidate import Attempt, Guess
+from optimizer.methods import time_optimal_scaling as shortest_line
 from optimizer.methods.free_spline import COARSE, EXACT, FreeSpline
-from optimizer.nlp import Coordinates
+from optimizer.methods.method import Attempt
+from optimizer.methods.sqp_method import Guess
+from optimizer.nlp.coordinates import Coordinates
 from optimizer.solution import BaselineName
+from optimizer.trajectories import bspline
+from optimizer.trajectories import seven_segment as profile
+from optimizer.trajectories.time_scalings import quintic_spline
 
 
 class TimeScaling(FreeSpline):

@@ -14,12 +14,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
-from optimizer.baselines import time_optimal_spline
-from optimizer.candidate import Attempt, Solver
-from optimizer.motion import Task, peak_rates, sample, stretch
-from optimizer.solution import Spline
-from optimizer.verify import grid
-from optimizer.windows import Window
+from optimizer.methods.duration_intervals import Window
+from optimizer.methods.method import Attempt, Solver
+from optimizer.prepared_problem import Task
+from optimizer.trajectories.quadrature import grid
+from optimizer.trajectories.ruckig_motion import time_optimal_spline
+from optimizer.trajectories.spline import Spline, peak_rates, sample, stretch
 
 # factors tried, each so many times the one before; the search ends when so many in a row spend more than the best
 RATIO, PATIENCE = 1.12, 8
@@ -37,7 +37,7 @@ class UniformScaling(Solver):
         self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
     ) -> None:
         super().__init__(task, q_start, q_goal, deadline, window)
-        self.given = time_optimal_spline(task.problem.active_limits, q_start, q_goal)
+        self.given = time_optimal_spline(task.problem.arm.active_limits, q_start, q_goal)
         q, self._v, a = sample(self.given, grid(self.given.duration))
         self._q = q
         still = np.zeros_like(q)
@@ -48,7 +48,7 @@ class UniformScaling(Solver):
 
     def solve(self) -> Attempt:
         """The factor of least energy (or the least factor, in haste) at which limits, torque and duration hold."""
-        limits, length = self.task.problem.active_limits, self.given.duration
+        limits, length = self.task.problem.arm.active_limits, self.given.duration
         hit = self.task.hit(self.given)
         if hit is not None:
             return Attempt("infeasible", f"the given motion hits something: {hit.words}", hit=hit)
@@ -83,7 +83,7 @@ class UniformScaling(Solver):
         """What is minimised; infinite where torque, or a limit along the path, is broken."""
         self._evaluations += 1
         tau = self._holding + self._moving / factor**2 + self.task.friction.torque(self._v / factor)
-        if (np.abs(tau) > self.task.problem.active_limits.tau_max * TORQUE_HELD).any():
+        if (np.abs(tau) > self.task.problem.arm.active_limits.tau_max * TORQUE_HELD).any():
             return np.inf
         if self.task.path is not None and (self.task.path.shares(self._q, self._v / factor) > TORQUE_HELD).any():
             return np.inf

@@ -6,7 +6,7 @@ import os
 import time
 from dataclasses import dataclass
 
-from app.errors import Reply
+from app.engine.reply import Reply
 
 
 @dataclass(frozen=True)

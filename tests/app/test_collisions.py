@@ -10,15 +10,16 @@ import pytest
 from scipy.interpolate import BSpline
 from starlette.testclient import TestClient
 
-from app.convert_arm import arm_fields
-from app.schemas import problems
+from app.convert.arm import to_arm
+from app.schemas import errors as problems
 from app.schemas.request import OptimizeRequest
-from optimizer.arm import Arm
-from optimizer.collision import CollisionModel
-from optimizer.keep_away import RESERVE
+from optimizer.collision.model import CollisionModel
+from optimizer.nlp.clearance_constraint import RESERVE
+from optimizer.problem.arm import Arm
 from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.test_examples import EXAMPLES as FILES
 from tests.app.test_problems import DOWN, refused
+from tests.optimizer.moves import ROBOT
 
 # a far obstacle may cost no more than this share of the energy
 FAR = 1e-3
@@ -44,7 +45,7 @@ def answered(client: TestClient, request: dict[str, Any], path: str = "/optimize
 
 def least_distance(request: dict[str, Any], spline: dict[str, Any]) -> float:
     """The least distance [m] of a motion on a 0.1 ms grid."""
-    model = CollisionModel(Arm(**arm_fields(OptimizeRequest.model_validate_json(json.dumps(request)))))
+    model = CollisionModel(to_arm(OptimizeRequest.model_validate_json(json.dumps(request))))
     curve = BSpline(np.array(spline["knots"]), np.array(spline["control_points"]), spline["degree"])
     q = curve(np.linspace(0, spline["knots"][-1], int(spline["knots"][-1] * 1e4) + 1))
     return min(contact.distance for contact in model.contacts(q, within=0.01))
@@ -84,7 +85,7 @@ def test_start_and_goal_in_collision(client: TestClient) -> None:
     goal = refused(client.post("/optimize", json=move(goal={"q": FOLDED})), problems.GoalInCollision)
     assert start["pair"] == goal["pair"] == ["upper_arm", "wrist_1"]
     assert start["branches"] == goal["branches"] and goal["branches"][0]["q"] == FOLDED
-    arm = Arm()
+    arm = Arm(robot=ROBOT)
     found = CollisionModel(arm).contacts([np.array(FOLDED)])[0].distance
     assert goal["depth"] == pytest.approx(RESERVE - found)
     assert answered(client, move(goal={"q": FOLDED}, collisions=False))["certificate"]["clearance"] is None

@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.schemas.compare import CompareResponse
-from optimizer.problem import Method
+from optimizer.problem.problem import Method
 
 ALL = list(get_args(Method))
 MOVE = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]}}

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import problems
+from app.schemas import errors as problems
+from app.schemas.errors import Problem
 from app.schemas.evaluate import EvaluateResponse
 from app.schemas.evaluate_examples import CSV_EXAMPLES, EVALUATE_EXAMPLES
-from app.schemas.problems import Problem
 from tests.app.requests import HOME, NEAR, move
 
 REQUESTS: dict[str, Any] = {name: example["value"] for name, example in EVALUATE_EXAMPLES.items()}

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import problems
+from app.schemas import errors as problems
 from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathResponse
 from models.registry import load_robot
 from tests.app.requests import HOME

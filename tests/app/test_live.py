@@ -13,7 +13,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from app.schemas.problems import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
+from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
 from app.schemas.response import OptimizeResponse
 from tests.app.live import EXIT, WARM_UP, Server, alive, serving
 from tests.app.requests import EXAMPLES, long_search, move

@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 
 from app import __version__
 from app.main import create_app
-from app.schemas.problems import PROBLEMS
+from app.schemas.errors import PROBLEMS
 from app.settings import Settings
 from tests.app.live import ROOT, Server, serving
 

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.errors import TABLE
+from app.http.problem_details import TABLE
 from app.main import create_app
-from app.schemas import problems
-from app.schemas.problems import PROBLEMS, Problem
+from app.schemas import errors as problems
+from app.schemas.errors import PROBLEMS, Problem
 from app.settings import Settings
 from tests.app.requests import HOME, move
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert_pose import to_matrix
+from app.convert.pose import to_matrix
 from app.schemas.common import QuaternionPose
 from app.schemas.ik import IKResponse
 from app.schemas.robots import RobotDetail, RobotList
 from models.registry import load_robot
-from optimizer.inverse_kinematics import inverse_kinematics_for
+from optimizer.kinematics.inverse import inverse_kinematics_for
 
 POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 

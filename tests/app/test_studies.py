@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas import problems
+from app.schemas import errors as problems
 from app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.live import Server, serving

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.convert_pose import to_matrix
-from app.schemas import problems
+from app.convert.pose import to_matrix
+from app.schemas import errors as problems
 from app.schemas.common import QuaternionPose
 from app.schemas.suggestions import Suggestions
 from models.registry import load_robot
-from optimizer.inverse_kinematics import inverse_kinematics_for
-from optimizer.turned import turned_poses
+from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.tcp import turned_poses
 from tests.app.requests import HOME, NEAR, move
 from tests.app.test_studies import ABSENT, SECRET, added, begin
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.problems import UnreachableTargets
+from app.schemas.errors import UnreachableTargets
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, NEAR, move
 from tests.app.test_validation import POSE, refused

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.problems import Validation
+from app.schemas.errors import Validation
 from tests.app.requests import HOME, move
 
 SECRET = "caller-secret-7f3a"

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app import kept as kept_answers
-from app.errors import InvalidRequest
-from app.kept import Shelf
+from app.exceptions import InvalidRequest
 from app.schemas.evaluate import EvaluateResponse
 from app.schemas.response import OptimizeResponse
 from app.schemas.whatif import WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
+from app.store import keep as kept_answers
+from app.tasks.stored_answers import Shelf
 from tests.app.requests import HOME, NEAR, move
 from tests.optimizer.moves import tcp_pose
 

@@ -8,7 +8,8 @@ import numpy as np
 import orjson
 import pytest
 
-from app.convert import to_problem, to_response
+from app.convert.request import to_problem
+from app.convert.solution import to_response
 from app.schemas.request import OptimizeRequest
 from benchmarks.checks import allowed, beats, faults
 from benchmarks.motion import SplineMotion, replay

@@ -13,8 +13,8 @@ from benchmarks.peers.casadi_opti import derivative_points
 from benchmarks.peers.peer import Peer, versions
 from benchmarks.tasks import move
 from models.registry import load_robot
-from optimizer.bspline import DEGREE, uniform
-from optimizer.problem import Problem
+from optimizer.trajectories.bspline import DEGREE, uniform
+from tests.optimizer.moves import problem_with
 
 OPTIONAL = {"drake": "pydrake", "copp": "copp_py"}
 ENDS = 1e-6  # rad
@@ -33,7 +33,7 @@ def planned(name: str) -> Replay:
     assert versions(peer)
     motion = peer.plan(task.q_start, task.q_goal)
     assert motion is not None
-    return replay(Problem(task.q_start, task.q_goal), motion, task.q_start, task.q_goal)
+    return replay(problem_with(task.q_start, task.q_goal), motion, task.q_start, task.q_goal)
 
 
 @pytest.mark.parametrize("name", PEERS)

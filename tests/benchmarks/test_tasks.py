@@ -4,17 +4,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from app.convert import to_problem
+from app.convert.request import to_problem
 from app.schemas.request import OptimizeRequest
 from benchmarks.chains import chain
 from benchmarks.figures import Spread, exponent
 from benchmarks.tasks import KINDS, ask, asks, flange, move, moves
 from models.registry import load_robot
 from models.robot import Robot
-from optimizer.inverse_kinematics import inverse_kinematics_for
-from optimizer.kernel import Kernel, build
-from optimizer.motion import Task
-from optimizer.problem import Problem
+from optimizer.energy.kernel import Kernel
+from optimizer.energy.kernel_expressions import build
+from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.prepared_problem import Task
+from tests.optimizer.moves import problem_with
 
 POSE_ERROR = 1e-12  # rounding of a few products of rotations
 TORQUE_ERROR = 1e-9  # N·m
@@ -61,7 +62,7 @@ def test_chains_move_as_pinocchio_says(robot: Robot, joints: int) -> None:
     assert arm.nq == joints and arm.limits.v_max.shape == arm.friction.coulomb.shape == (joints,)
     kernel = Kernel(arm, build(arm), compiled=False)
     q, v, a = np.random.default_rng(joints).normal(size=(3, 5, joints))
-    task = Task(Problem(np.zeros(joints), np.zeros(joints), robot=arm))
+    task = Task.of(problem_with(np.zeros(joints), np.zeros(joints), robot=arm))
     tau = kernel.torque(q, v, a, task.objective_parameters)
     data = task.model.createData()
     for k in range(5):

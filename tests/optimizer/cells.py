@@ -7,8 +7,8 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.arm import Arm, Payload
-from optimizer.scene import (
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.scene import (
     Attachment,
     Box,
     Capsule,
@@ -21,7 +21,8 @@ from optimizer.scene import (
     Sphere,
     capsule_between,
 )
-from optimizer.solution import Spline
+from optimizer.trajectories.spline import Spline
+from tests.optimizer.moves import ROBOT
 
 LOADS: tuple[Shape, ...] = (
     Box(np.array([0.1, 0.15, 0.2])),
@@ -57,6 +58,7 @@ def cell(seed: int = 1) -> Scene:
 def arm_in_cell(load: Shape = LOADS[0], scene: Scene | None = None) -> Arm:
     fork = capsule_between(np.array([0, 0.05, 0.1]), np.array([0, -0.05, 0.1]), 0.02)
     return Arm(
+        robot=ROBOT,
         tool=[capsule_between(np.array([0, 0, 0.03]), np.array([0, 0, 0.1]), 0.03), fork],
         payload=Payload(1.0, shape=Attachment(load, at([0, 0, 0.25], [0.1, 0.2, 0.3]))),
         scene=cell() if scene is None else scene,

@@ -13,8 +13,9 @@ import pinocchio as pin
 
 from models.registry import load_robot
 from models.robot import Array, Limits
-from optimizer.arm import Payload, Pose
-from optimizer.problem import Problem
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
 
 ROBOT = load_robot("ur5e")
 START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
@@ -29,7 +30,21 @@ CEILING = np.array([0.0, 0.0, 9.81])
 
 def problem(start: Any = START, goal: Any = GOAL, **given: Any) -> Problem:
     """A problem in which nothing hits anything: moves are drawn without regard to it."""
-    return Problem(**{"start": start, "goal": goal, "collisions": False} | given)
+    return problem_with(start, goal, **{"collisions": False} | given)
+
+
+def problem_with(start: Any, goal: Any, **given: Any) -> Problem:
+    """A problem of the UR5e, or of `robot`; `given` are fields of its arm and its own."""
+    own = {name: value for name, value in given.items() if name in Problem.__dataclass_fields__}
+    arm = {name: value for name, value in given.items() if name not in own}
+    return Problem(arm=Arm(**{"robot": ROBOT} | arm), start=start, goal=goal, **own)
+
+
+def changed(asked: Problem, **given: Any) -> Problem:
+    """The problem with other fields, of its arm or its own."""
+    own = {name: value for name, value in given.items() if name in Problem.__dataclass_fields__}
+    arm = {name: value for name, value in given.items() if name not in own}
+    return replace(asked, **{"arm": replace(asked.arm, **arm)} | own)
 
 
 def fixed(duration: float) -> dict[str, Any]:
@@ -60,16 +75,16 @@ def random_moves(seed: int, count: int) -> Iterator[tuple[Array, Array]]:
 
 def torques(task: Problem, q: Array, v: Array, a: Array) -> Array:
     """Rigid body and rotor torques (k, nq) by Pinocchio, payload and gravity included."""
-    load = task.payload
-    model = task.robot.loaded_model(load.mass, load.com, load.inertia, task.gravity)
+    load = task.arm.payload
+    model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
     data = model.createData()
     return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
 
 
 def potential(task: Problem, q: Array) -> float:
     """Potential energy [J] of arm and payload by Pinocchio."""
-    load = task.payload
-    model = task.robot.loaded_model(load.mass, load.com, load.inertia, task.gravity)
+    load = task.arm.payload
+    model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
     return float(pin.computePotentialEnergy(model, model.createData(), q))
 
 

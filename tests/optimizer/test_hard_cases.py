@@ -10,6 +10,7 @@ import pytest
 
 from models.registry import load_robot
 from optimizer import Payload, Pose, Problem, optimize
+from tests.optimizer.moves import problem_with
 
 ROBOT = load_robot("ur5e")
 # of a baseline's energy against ours where it is the answer itself: both are quadratures, and where switches of two
@@ -57,7 +58,7 @@ def varied(seed: int, index: int) -> Problem:
     start = q_start if rng.random() < 0.6 else pose(q_start)
     goal = pose(q_goal) if rng.random() < 0.8 else q_goal
     # drawn without regard to what the arm could hit
-    return Problem(start=start, goal=goal, deadline=60.0, collisions=False, **options)  # type: ignore[arg-type]
+    return problem_with(start=start, goal=goal, deadline=60.0, collisions=False, **options)  # type: ignore[arg-type]
 
 
 CASES = {
@@ -94,6 +95,6 @@ def test_very_slow_motions(jerk: float, duration: float, travel: float) -> None:
     limits = replace(ROBOT.limits, j_max=np.full(6, jerk))
     start = np.full(6, -travel / 2)
     fixed = {"duration_min": duration, "duration_max": duration, "deadline": 60.0, "collisions": False}
-    solution = optimize(Problem(start, start + travel, limits=limits, **fixed))  # type: ignore[arg-type]
+    solution = optimize(problem_with(start, start + travel, limits=limits, **fixed))  # type: ignore[arg-type]
     assert solution.certificate.valid
     assert solution.duration == duration

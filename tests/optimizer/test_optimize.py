@@ -16,8 +16,8 @@ import pytest
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.arm import Payload, Pose
-from optimizer.baselines import saving
+from optimizer.certificate import certify
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
@@ -28,12 +28,14 @@ from optimizer.exceptions import (
     TorqueInfeasible,
     UnreachablePose,
 )
-from optimizer.kernel import compile_kernel
 from optimizer.optimize import optimize
-from optimizer.problem import BranchFilter, Problem
-from optimizer.profile import shortest_duration
+from optimizer.problem.arm import Payload
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.search.baselines import saving
 from optimizer.solution import Certificate, Solution
-from optimizer.verify import certify
+from optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import (
     CEILING,
     GOAL,
@@ -76,7 +78,7 @@ def total(solution: Solution, task: Problem) -> float:
 
 
 def shortest(start: Array = START, goal: Array = GOAL, **given: Any) -> float:
-    return float(shortest_duration(goal - start, problem(start, goal, **given).active_limits))
+    return float(shortest_duration(goal - start, problem(start, goal, **given).arm.active_limits))
 
 
 def assert_true(solution: Solution, task: Problem) -> None:
@@ -199,7 +201,7 @@ def test_the_trajectory_is_that_of_the_spline() -> None:
         assert samples == pytest.approx(curve(path.t, d), abs=1e-7)
     tau = torques(task, path.q, path.v, path.a)
     assert path.tau == pytest.approx(tau, abs=1e-7)
-    tau_motor = tau + task.friction_law.torque(path.v)
+    tau_motor = tau + task.arm.friction_law.torque(path.v)
     assert path.tau_motor == pytest.approx(tau_motor, abs=1e-7)
     drives = ROBOT.drives
     joints = tau_motor * path.v + drives.copper * (tau_motor / drives.torque_constant) ** 2

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from optimizer.arm import Pose
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, JoulepathError
 from optimizer.optimize import optimize
 from optimizer.pareto import Front, pareto
-from optimizer.problem import Problem
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
 from optimizer.solution import Solution
-from tests.optimizer.moves import PAYLOAD, START, fixed, problem
+from tests.optimizer.moves import PAYLOAD, START, changed, fixed, problem
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 
@@ -150,7 +150,7 @@ def test_no_front_where_every_motion_takes_longer() -> None:
 @pytest.mark.parametrize(("fields", "n"), [({}, 1), ({}, 101), (fixed(2.0), 5)])
 def test_refuses_what_is_no_front(fields: dict[str, float], n: int) -> None:
     with pytest.raises(InvalidProblem):
-        pareto(replace(joints(), **fields), n)
+        pareto(changed(joints(), **fields), n)
 
 
 def test_standing_still_is_one_point() -> None:

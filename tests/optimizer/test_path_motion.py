@@ -10,11 +10,11 @@ import pinocchio as pin
 import pytest
 
 from models.robot import Array
-from optimizer.motion import sample
 from optimizer.optimize import optimize
-from optimizer.path_limits import Cone
-from optimizer.problem import Problem
+from optimizer.problem.tool_cone import ToolCone
 from optimizer.solution import Solution
+from optimizer.trajectories.spline import sample
+from tests.optimizer.moves import problem_with
 
 # the tool points straight down at both ends, 12 cm from the flange
 START, GOAL = np.array([-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]), np.array([0.66, -1.4, 0.75, -0.92, -1.57, -0.91])
@@ -28,9 +28,9 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 @cache
 def solved(half_angle: float | None = None, **speeds: float) -> Solution:
-    cone = None if half_angle is None else Cone(-DOWN, DOWN, half_angle)
+    cone = None if half_angle is None else ToolCone(-DOWN, DOWN, half_angle)
     fields: dict[str, Any] = {"T_flange_tcp": T_FLANGE_TCP, "tool_cone": cone, **speeds}
-    return optimize(Problem(start=START, goal=GOAL, **fields))
+    return optimize(problem_with(start=START, goal=GOAL, **fields))
 
 
 def electrical(solution: Solution) -> float:
@@ -41,9 +41,9 @@ def replayed(solution: Solution) -> tuple[Array, Array, Array]:
     """Tilt of the tool [rad], speed of the TCP and of the elbow's housing [m/s] on a 0.1 ms grid."""
     spline = solution.trajectory.spline
     q, v, _ = sample(spline, np.linspace(0, spline.duration, int(spline.duration * 1e4) + 1))
-    problem = Problem(start=START, goal=GOAL)
-    model = problem.robot.model
-    data, flange, elbow = model.createData(), model.getFrameId("flange"), problem.robot.elbow
+    problem = problem_with(start=START, goal=GOAL)
+    model = problem.arm.robot.model
+    data, flange, elbow = model.createData(), model.getFrameId("flange"), problem.arm.robot.elbow
     assert elbow is not None
     tilt, tcp, housing = [], [], []
     for q_k, v_k in zip(q, v, strict=True):

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from optimizer.certificate import certify
 from optimizer.exceptions import DeadlineExceeded, TorqueInfeasible
-from optimizer.motion import Task
 from optimizer.optimize import optimize
-from optimizer.problem import Problem
-from optimizer.scene import Obstacle, Scene, Sphere
+from optimizer.prepared_problem import Task
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import Obstacle, Scene, Sphere
 from optimizer.solution import Solution
-from optimizer.verify import certify
 from optimizer.whatif import whatif
 from tests.optimizer.cells import at
-from tests.optimizer.moves import PAYLOAD, limits, problem, tcp_pose
+from tests.optimizer.moves import PAYLOAD, changed, limits, problem, tcp_pose
 
 # quadrature of the same motion on another grid
 QUADRATURE = 1e-3
@@ -41,7 +41,7 @@ def test_what_is_not_changed_is_as_it_was(asked: Problem, base: Solution) -> Non
 
 
 def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> None:
-    loaded = replace(asked, payload=PAYLOAD, link_mass_scale=1.3)
+    loaded = changed(asked, payload=PAYLOAD, link_mass_scale=1.3)
     found = whatif(base, loaded)
     assert found.certificate.valid
     assert found.certificate.energy_error < QUADRATURE
@@ -54,7 +54,7 @@ def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> N
 def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method: str) -> None:
     """Also where what is found from the ground up does: these methods' own motions are worse than the base's."""
     worse = replace(asked, method=method)  # type: ignore[arg-type]
-    same = Task(worse).energy(base.trajectory.spline).electrical.total
+    same = Task.of(worse).energy(base.trajectory.spline).electrical.total
     assert optimize(worse).energy.electrical.total > same
     found = whatif(base, worse)
     assert found.certificate.valid and found.reoptimised is not None and found.reoptimised.certificate.valid
@@ -64,7 +64,7 @@ def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method
 def test_what_stands_in_the_way_breaks_the_same_motion(asked: Problem, base: Solution) -> None:
     middle = base.trajectory.q[len(base.trajectory.q) // 2]
     post = Obstacle("post", Sphere(0.03), at(tcp_pose(middle).T[:3, 3]))
-    found = whatif(base, replace(asked, scene=Scene([post]), collisions=True))
+    found = whatif(base, changed(asked, scene=Scene([post]), collisions=True))
     assert not found.certificate.valid
     assert found.certificate.clearance is not None and found.certificate.clearance.min_clearance < 0
     assert found.same_motion.electrical == base.energy.electrical
@@ -74,13 +74,13 @@ def test_what_stands_in_the_way_breaks_the_same_motion(asked: Problem, base: Sol
 
 
 def test_what_cannot_be_moved_tells_why(asked: Problem, base: Solution) -> None:
-    weak = replace(asked, limits=limits(tau_max=[150.0, 5.0, 150.0, 28.0, 28.0, 28.0]))
+    weak = changed(asked, limits=limits(tau_max=[150.0, 5.0, 150.0, 28.0, 28.0, 28.0]))
     found = whatif(base, weak)
     assert found.reoptimised is None and isinstance(found.error, TorqueInfeasible)
     assert found.certificate.worst_ratio["torque"] > 1
 
 
 def test_no_time_leaves_the_same_motion(asked: Problem, base: Solution) -> None:
-    found = whatif(base, replace(asked, deadline=1e-6, link_mass_scale=0.5))
+    found = whatif(base, changed(asked, deadline=1e-6, link_mass_scale=0.5))
     assert found.reoptimised is None and isinstance(found.error, DeadlineExceeded)
     assert found.certificate.valid

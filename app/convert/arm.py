@@ -1,0 +1,86 @@
+"""From what a request says of the arm to the optimizer's."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from app.convert.pose import to_matrix
+from app.convert.scene import carried, to_scene, tool_parts
+from app.schemas import arm as asked
+from models.registry import load_robot, robot_names
+from models.robot import Array, Limits, Robot
+from optimizer.exceptions import InvalidProblem, UnknownRobot
+from optimizer.problem.arm import INVERTER_PARTS, LIMIT_NAMES, Arm, Inverter, Payload
+from optimizer.problem.bus import Bus
+from optimizer.problem.tool_cone import ToolCone
+
+
+def robot_named(name: str) -> Robot:
+    """The robot of that name. Raises UnknownRobot."""
+    if name not in robot_names():
+        raise UnknownRobot(robot_names())
+    return load_robot(name)
+
+
+def to_arm(request: asked.ArmRequest) -> Arm:
+    """The optimizer's arm. Raises UnknownRobot or InvalidProblem."""
+    robot = robot_named(request.robot)
+    return Arm(
+        robot=robot,
+        T_flange_tcp=to_matrix(request.tcp),
+        payload=_payload(request.payload),
+        gravity=np.array(request.gravity),
+        limits=_limits(request.limits, robot),
+        friction=request.friction,
+        inverter=Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}),
+        bus=_bus(request.bus),
+        link_mass_scale=np.array(request.link_mass_scale),
+        tool=tool_parts(request.tool),
+        scene=to_scene(request.scene),
+        collisions=request.collisions,
+        tool_cone=_cone(request.tool_cone),
+        tcp_speed=request.limits.tcp_speed,
+        elbow_speed=request.limits.elbow_speed,
+    )
+
+
+def _bus(bus: asked.Bus) -> Bus:
+    if isinstance(bus, asked.RecuperatingBus):
+        return Bus("recuperating", efficiency=bus.efficiency)
+    if isinstance(bus, asked.StorageBus):
+        power = math.inf if bus.power is None else bus.power
+        return Bus("storage", bus.efficiency, bus.capacity, power, bus.initial)
+    return Bus(bus.mode)
+
+
+def _cone(cone: asked.ToolCone | None) -> ToolCone | None:
+    return None if cone is None else ToolCone(np.array(cone.axis), np.array(cone.direction), cone.half_angle)
+
+
+def _payload(payload: asked.Payload | None) -> Payload:
+    if payload is None:
+        return Payload()
+    ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6
+    inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+    shape = None if payload.shape is None else carried(payload.shape)
+    return Payload(payload.mass, np.array(payload.com), inertia, shape)
+
+
+def _limits(limits: asked.Limits, robot: Robot) -> Limits:
+    tighter = {
+        name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq) for public, name in LIMIT_NAMES.items()
+    }
+    if limits.position is not None:
+        tighter["q_min"] = _per_joint("limits.position.lower", limits.position.lower, robot.nq)
+        tighter["q_max"] = _per_joint("limits.position.upper", limits.position.upper, robot.nq)
+    return robot.limits.tightened(**tighter)
+
+
+def _per_joint(field: str, value: float | list[float] | None, nq: int) -> Array | None:
+    if value is None:
+        return None
+    if isinstance(value, list) and len(value) != nq:
+        raise InvalidProblem(field, f"{field} must be one number or a list of {nq}, one per joint.")
+    return np.full(nq, value, dtype=float)

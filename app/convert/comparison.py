@@ -1,0 +1,59 @@
+"""The answer of POST /compare."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.convert.fields import fields
+from app.convert.solution import _gap, _objective, baseline_fields, to_response
+from app.schemas import request as asked
+from app.schemas.compare import ROW_FIELDS, CompareRequest
+from optimizer.problem.problem import Method
+from optimizer.solution import Solution
+
+
+def to_comparison(
+    request: CompareRequest, request_id: str, found: Mapping[Method, Solution], failed: Mapping[Method, dict[str, Any]]
+) -> dict[str, Any]:
+    """The answer of `POST /compare`: what every method found, at least one, or the problem that it met."""
+    energies = {method: _objective(request, solution) for method, solution in found.items()}
+    best = min(energies, key=energies.__getitem__)
+    # the same candidates, so the same bound, whatever the method
+    bound = found[best].lower_bound
+    rows = []
+    for method in request.methods:
+        row: dict[str, Any] = dict.fromkeys(ROW_FIELDS)
+        if method in found:
+            solution = found[method]
+            own = energies[method]
+            row |= {
+                "status": solution.status,
+                "duration": solution.duration,
+                "electrical": solution.energy.electrical.total,
+                "mechanical": solution.energy.mechanical.total,
+                "excess": own / energies[best] - 1 if energies[best] > 0 else 0.0,
+                "optimality_gap": _gap(bound, own),
+                **fields(solution.solver, "wall_time", "iterations", "nlp_solves"),
+                "valid": solution.certificate.valid,
+                "worst_ratio": max(solution.certificate.worst_ratio.values()),
+            }
+            if request.answers:
+                row["answer"] = to_response(single(request, method), request_id, solution)
+        rows.append({**row, "method": method, "problem": failed.get(method)})
+    return {
+        "id": request_id,
+        "robot": request.robot,
+        "objective": request.objective,
+        "lower_bound": bound,
+        "best": best,
+        "methods": rows,
+        "baselines": baseline_fields(found[best]),
+    }
+
+
+def single(request: CompareRequest, method: Method) -> asked.OptimizeRequest:
+    """The request to `POST /optimize` that a row of a comparison answers."""
+    shared = {name: getattr(request, name) for name in asked.MotionRequest.model_fields}
+    # each part has been validated
+    return asked.OptimizeRequest.model_construct(method=method, **shared)

@@ -1,0 +1,28 @@
+"""Attributes of the library's dataclasses as JSON fields."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from optimizer.solution import Candidate, UnreachableTarget
+
+
+def candidate_fields(candidate: Candidate) -> dict[str, Any]:
+    """One entry of `candidates`."""
+    ends = ("start", "start_target", "goal", "goal_target", "q_start", "q_goal")
+    return fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")
+
+
+def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
+    """One entry of `unreachable`."""
+    return fields(target, "end", "target", "reason")
+
+
+def fields(source: object, *names: str) -> dict[str, Any]:
+    """Attributes by name. The JSON encoder takes arrays in C order only, and writes what is not finite as null."""
+    values = {name: getattr(source, name) for name in names}
+    return {
+        name: np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value for name, value in values.items()
+    }

@@ -1,0 +1,142 @@
+"""A motion as a CSV file, read a few thousand lines at a time; a bad value is found again by row and column."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BufferedReader
+from itertools import islice
+from math import pi
+from typing import Literal
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.exceptions import InvalidTable
+from optimizer.replay.recording import BLOCK, LogBlock
+
+FIRST_ROW = 2
+"""Line of the first row of numbers: the header is line 1."""
+LONGEST_LINE = 4096
+_COLUMN = re.compile(r"t|[qva][1-9][0-9]?")
+
+
+@dataclass(frozen=True)
+class MotionCsv:
+    """A CSV file whose header has been read: columns t, q1 … qn, then v1 … vn, then a1 … an, or q1 … qn alone.
+
+    `rows` are what is left to read, in blocks (k, columns) of numbers as they stand in the file.
+    """
+
+    nq: int
+    columns: list[str]
+    scale: float
+    rows: Iterator[Array]
+
+    @property
+    def has_time(self) -> bool:
+        """Whether it is a log; else it lists configurations."""
+        return self.columns[0] == "t"
+
+    @staticmethod
+    def of(file: BufferedReader, nq: int, units: Literal["rad", "deg"]) -> MotionCsv:
+        """Reads the header of a file about an arm of nq joints. Raises InvalidTable, now or when rows are read."""
+        first = _line(file, 1)
+        if not first:
+            raise InvalidTable("The file is empty: send a header and two or more rows.")
+        columns = [name.strip().strip('"').strip() for name in first.removeprefix("\ufeff").strip().split(",")]
+        _check_header(columns, nq)
+        return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns))
+
+    def log(self) -> Iterator[LogBlock]:
+        """The rows of a log, in rad."""
+        for block in self.rows:
+            parts: list[Array | None] = [
+                block[:, i : i + self.nq] * self.scale if i < len(self.columns) else None
+                for i in range(1, 1 + 3 * self.nq, self.nq)
+            ]
+            assert parts[0] is not None
+            yield LogBlock(block[:, 0], parts[0], *parts[1:])
+
+    def configurations(self) -> Array:
+        """All rows of a list of configurations (n, nq), in rad."""
+        rows = [*self.rows]
+        if sum(len(block) for block in rows) < 2:
+            raise InvalidTable("A motion needs two or more rows: there is none in fewer.")
+        return np.concatenate(rows) * self.scale
+
+
+def _check_header(columns: list[str], nq: int) -> None:
+    groups = {kind: [f"{kind}{j}" for j in range(1, nq + 1)] for kind in "qva"}
+    q, v, a = groups["q"], groups["v"], groups["a"]
+    if columns in (q, ["t", *q], ["t", *q, *v], ["t", *q, *v, *a]):
+        return
+    wanted = f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} where they were logged, or q1,…,q{nq} alone"
+    if not any(_COLUMN.fullmatch(name) for name in columns):
+        raise InvalidTable(f"The first line is no header: begin the file with the columns' names, {wanted}.", 1)
+    raise InvalidTable(f"The header's columns are not those of a motion: they must be {wanted}.", 1)
+
+
+def _line(file: BufferedReader, row: int) -> str:
+    """The next line, empty at the end of the file."""
+    raw = file.readline(LONGEST_LINE + 1)
+    if len(raw) > LONGEST_LINE:
+        raise InvalidTable(f"Line {row} is longer than {LONGEST_LINE} characters: this is no table of a motion.", row)
+    if b"\0" in raw:
+        raise InvalidTable(f"Line {row} holds binary data: send CSV as plain text.", row)
+    try:
+        return raw.decode()
+    except UnicodeDecodeError:
+        raise InvalidTable(f"Line {row} is no UTF-8 text: send CSV as plain text.", row) from None
+
+
+def _blocks(file: BufferedReader, columns: list[str]) -> Iterator[Array]:
+    row = FIRST_ROW
+    while lines := [*islice(_lines(file, row), BLOCK)]:
+        yield _numbers(lines, row, columns)
+        row += len(lines)
+        if len(lines) < BLOCK:
+            return
+
+
+def _lines(file: BufferedReader, row: int) -> Iterator[str]:
+    """Lines up to the end, or to empty ones that nothing follows."""
+    while line := _line(file, row):
+        if not line.strip():
+            while rest := _line(file, row):
+                if rest.strip():
+                    raise InvalidTable(f"Line {row} is empty: drop it.", row)
+            return
+        yield line
+        row += 1
+
+
+def _numbers(lines: list[str], row: int, columns: list[str]) -> Array:
+    """Lines as numbers (k, columns)."""
+    try:
+        values = np.loadtxt(lines, delimiter=",", comments=None, quotechar='"', ndmin=2)
+    except ValueError:
+        raise _first_error(lines, row, columns) from None
+    if values.shape != (len(lines), len(columns)) or not np.isfinite(values).all():
+        raise _first_error(lines, row, columns)
+    return np.asarray(values, dtype=float)
+
+
+def _first_error(lines: list[str], first: int, columns: list[str]) -> InvalidTable:
+    for row, line in enumerate(lines, first):
+        cells = next(csv.reader([line]), [])
+        if len(cells) != len(columns):
+            hint = " Separate them by commas, with a point for decimals." if ";" in line else ""
+            message = f"Line {row} has {len(cells)} columns where the header has {len(columns)}: correct it.{hint}"
+            return InvalidTable(message, row)
+        for name, cell in zip(columns, cells, strict=True):
+            try:
+                finite = math.isfinite(float(cell)) and "_" not in cell
+            except ValueError:
+                finite = False
+            if not finite:
+                return InvalidTable(f"{name} in line {row} is no finite number: correct it or drop the row.", row, name)
+    return InvalidTable(f"The lines from {first} on cannot be read as numbers: write them plainly.", first)

@@ -1,0 +1,82 @@
+"""From requests for a motion to the optimizer's problems."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from app.convert.arm import to_arm
+from app.convert.pose import to_matrix, to_rotation
+from app.schemas import request as asked
+from app.schemas.orientation import InCone
+from app.schemas.orientation import LoosePose as LoosePoseSchema
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import AnyOf, Single, Target
+
+
+def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
+    """The optimizer's problem for a request of which `deadline` [s] is left.
+
+    Raises UnknownRobot, InvalidProblem or OutsideLimits.
+    """
+    shortest, longest = _duration(request)
+    branch = request.branch
+    return Problem(
+        start=to_target(request.start),
+        goal=to_target(request.goal),
+        arm=to_arm(request),
+        method=request.method,
+        objective=request.objective,
+        duration_min=shortest,
+        duration_max=longest,
+        cycle=cycle(request.cycle),
+        branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
+        windings=request.windings,
+        sample_period=request.sample_period,
+        deadline=deadline,
+    )
+
+
+def cycle(asked_for: asked.Cycle | None) -> Cycle | None:
+    """The optimizer's cycle. Raises InvalidProblem."""
+    if asked_for is None:
+        return None
+    return Cycle(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
+
+
+def to_target(target: asked.Target) -> Target:
+    """The optimizer's target."""
+    if isinstance(target, asked.AnyOfTarget):
+        return AnyOf(tuple(_single(member) for member in target.any_of))
+    return _single(target)
+
+
+def _single(target: asked.JointTarget | asked.PoseTarget) -> Single:
+    if isinstance(target, asked.JointTarget):
+        return np.array(target.q)
+    return _loose(target.pose) if isinstance(target.pose, LoosePoseSchema) else Pose(to_matrix(target.pose))
+
+
+def _loose(pose: LoosePoseSchema) -> LoosePose:
+    position, orientation = np.array(pose.position), pose.orientation
+    if isinstance(orientation, str):
+        return LoosePose(position)
+    if isinstance(orientation, InCone):
+        cone = orientation.cone
+        return LoosePose(position, np.array(cone.axis), np.array(cone.direction), cone.half_angle)
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = to_rotation(orientation), position
+    return LoosePose.about(Pose(T), np.array(orientation.free_about))
+
+
+def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]:
+    """Bounds on the duration. An open end is closed for the electrical objective: an answer has to end some time."""
+    if isinstance(request.duration, float | int):
+        return request.duration, request.duration
+    given = request.duration or asked.DurationRange()
+    if given.max is None and request.objective == "electrical":
+        return given.min, min(asked.MAX_DURATION, request.sample_period * asked.MAX_SAMPLES)
+    return given.min, given.max

@@ -1,0 +1,77 @@
+"""Between the schemas of the contract and the optimizer's dataclasses, both ways."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.convert.fields import candidate_fields, fields, unreachable_fields
+from app.schemas import request as asked
+from app.schemas.response import Clearance
+from optimizer.solution import Certificate, ElectricalEnergy, Energy, Solution, StorageUse
+
+
+def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
+    """The answer as the contract lays it out: numbers, strings, lists, dicts, and C-contiguous arrays."""
+    trajectory = solution.trajectory
+    return {
+        "id": request_id,
+        "robot": request.robot,
+        "method": request.method,
+        "objective": request.objective,
+        "duration": solution.duration,
+        "status": solution.status,
+        "branch": {end: fields(getattr(solution, end), "label", "q", "target") for end in ("start", "goal")},
+        "trajectory": {
+            **fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power", "charge"),
+            "spline": fields(trajectory.spline, "degree", "knots", "control_points"),
+        },
+        "energy": {
+            **energy_fields(solution.energy),
+            "lower_bound": solution.lower_bound,
+            "optimality_gap": _gap(solution.lower_bound, _objective(request, solution)),
+        },
+        "baselines": baseline_fields(solution),
+        "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
+        "unreachable": [unreachable_fields(target) for target in solution.unreachable],
+        "certificate": certificate_fields(solution.certificate),
+        "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
+    }
+
+
+def _objective(request: asked.MotionRequest, solution: Solution) -> float:
+    energy = solution.energy
+    return energy.electrical.total if request.objective == "electrical" else energy.mechanical.total
+
+
+def _gap(bound: float, energy: float) -> float:
+    """1 - bound / energy; a motion that costs nothing is as good as can be."""
+    return 1 - bound / energy if energy > 0 else 0.0
+
+
+def baseline_fields(solution: Solution) -> list[dict[str, Any]]:
+    """The entries of `baselines`."""
+    names = ("name", "duration", "electrical", "mechanical", "within_limits", "saving")
+    return [fields(baseline, *names) for baseline in solution.baselines]
+
+
+def energy_fields(energy: Energy) -> dict[str, Any]:
+    """Energy as every answer lays it out."""
+    return {
+        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+        "mechanical": fields(energy.mechanical, "total", "per_joint"),
+        "per_joint": fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
+        "storage": None if energy.storage is None else fields(energy.storage, *StorageUse.__dataclass_fields__),
+        **fields(energy, "peak_power", "mean_power"),
+    }
+
+
+def certificate_fields(certificate: Certificate) -> dict[str, Any]:
+    """A certificate as every answer lays it out."""
+    clearance = certificate.clearance
+    return {
+        "worst_ratio": certificate.worst_ratio,
+        "start_error": dict(zip(("position", "rotation"), certificate.start_error, strict=True)),
+        "goal_error": dict(zip(("position", "rotation"), certificate.goal_error, strict=True)),
+        **fields(certificate, "energy_error", "balance_error"),
+        "clearance": None if clearance is None else fields(clearance, *Clearance.model_fields),
+    }

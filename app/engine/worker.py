@@ -1,0 +1,128 @@
+"""One worker process: started, warmed, asked one task at a time, and killed when it is to stop.
+
+Each worker has a pipe of its own and shares no lock with the others, so it can be killed at any moment, and its end,
+whatever the cause, shows as the end of its pipe.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import Executor
+from multiprocessing.connection import Connection, wait
+
+from app.engine.forkserver import CONTEXT
+from app.engine.reply import Reply
+from app.engine.task import Task
+from app.exceptions import WorkerDied
+from app.logs import configure_logging
+
+logger = logging.getLogger(__name__)
+
+
+class Worker:
+    """The parent's side of a worker process."""
+
+    def __init__(self, warm: Callable[[], None], log_level: str, threads: Executor) -> None:
+        self._pipe, self._child_pipe = CONTEXT.Pipe()
+        self._process = CONTEXT.Process(
+            target=_serve, args=(self._child_pipe, warm, log_level), name="joulepath-worker", daemon=True
+        )
+        self._threads = threads
+        self._killed = False
+        self.ended = asyncio.Event()
+
+    @property
+    def pid(self) -> int | None:
+        """Process id; None before the start."""
+        return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can be asked."""
+        return not (self._killed or self.ended.is_set())
+
+    async def start(self) -> None:
+        """Starts the process and waits until it is warm. Raises WorkerDied."""
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.run_in_executor(self._threads, self._start)
+        except (EOFError, OSError):
+            self.kill()
+            raise WorkerDied from None
+        except asyncio.CancelledError:
+            self.kill()
+            raise
+        loop.add_reader(self._process.sentinel, self._has_ended)
+
+    async def ask(self, task: Task, deadline: float) -> Reply:
+        """The task's reply. Cancelled, it kills the worker: nothing else stops a computation. Raises WorkerDied."""
+        loop = asyncio.get_running_loop()
+        try:
+            return await loop.run_in_executor(self._threads, self._exchange, task, deadline)
+        except (EOFError, OSError):
+            self.kill()
+            raise WorkerDied from None
+        except asyncio.CancelledError:
+            self.kill()
+            raise
+
+    def kill(self) -> None:
+        """Ends the process at once. Does nothing if it has ended."""
+        self._killed = True
+        if self._process.pid is not None:
+            self._process.kill()
+
+    def _start(self) -> None:
+        self._process.start()
+        if self._killed:  # while this thread was starting it, so that `kill` found no process
+            self._process.kill()
+        self._child_pipe.close()
+        self._pipe.recv()
+
+    def _exchange(self, task: Task, deadline: float) -> Reply:
+        self._pipe.send((task, deadline))
+        reply: Reply = self._pipe.recv()
+        return reply
+
+    def _has_ended(self) -> None:
+        asyncio.get_running_loop().remove_reader(self._process.sentinel)
+        self._process.join()
+        if not self._killed:
+            logger.error("worker ended by itself", extra={"pid": self.pid, "exit_code": self._process.exitcode})
+        self.ended.set()
+
+
+def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
+    """The worker process."""
+    # a terminal's Ctrl-C and a service manager's SIGTERM reach the whole group: the parent alone decides what to do,
+    # lets requests in flight finish, and then kills
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    configure_logging(log_level)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        warm()
+    except Exception:
+        logger.exception("warm-up failed")
+        sys.exit(1)
+    pipe.send("warm")
+    while True:
+        try:
+            task, deadline = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(task.run(deadline))
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

@@ -1,0 +1,87 @@
+"""What the OpenAPI document says beyond what FastAPI derives from the routes: problems, and the settings' bounds."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic.json_schema import models_json_schema
+
+from app.schemas.errors import PROBLEMS, Internal, Problem
+from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
+from app.settings import Settings
+
+_REF = "#/components/schemas/{model}"
+
+
+def problem_responses(*problems: type[Problem]) -> dict[int | str, dict[str, Any]]:
+    """A route's `responses` for the problems that it may answer with; a 500 is always among them."""
+    by_status: defaultdict[int | str, list[type[Problem]]] = defaultdict(list)
+    every: tuple[type[Problem], ...] = (*problems, Internal)
+    for problem in every:
+        by_status[problem.model_fields["status"].default].append(problem)
+    return {status: _response(same) for status, same in by_status.items()}
+
+
+def _response(same_status: list[type[Problem]]) -> dict[str, Any]:
+    references = {problem: _REF.format(model=problem.__name__) for problem in same_status}
+    schema: dict[str, Any] = {"$ref": references[same_status[0]]}
+    if len(same_status) > 1:
+        mapping = {problem.model_fields["type"].default: reference for problem, reference in references.items()}
+        schema = {
+            "oneOf": [{"$ref": reference} for reference in references.values()],
+            "discriminator": {"propertyName": "type", "mapping": mapping},
+        }
+    response: dict[str, Any] = {
+        "description": " / ".join(str(problem.model_fields["title"].default) for problem in same_status),
+        "content": {"application/problem+json": {"schema": schema}},
+    }
+    if any(problem.retry_after for problem in same_status):
+        response["headers"] = {
+            "Retry-After": {"description": "When to try again [s].", "schema": {"type": "integer", "minimum": 0}}
+        }
+    return response
+
+
+def install_openapi(app: FastAPI, settings: Settings) -> None:
+    """Serves the completed document at `app.openapi_url`."""
+
+    def document() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = _document(app, settings)
+        return app.openapi_schema
+
+    # FastAPI's documented way to extend its document
+    app.openapi = document  # type: ignore[method-assign]
+
+
+def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
+    document = get_openapi(
+        title=app.title,
+        version=app.version,
+        summary=app.summary,
+        description=app.description,
+        license_info=app.license_info,
+        tags=app.openapi_tags,
+        routes=app.routes,
+    )
+    schemas = document["components"]["schemas"]
+    _, others = models_json_schema(
+        [(problem, "serialization") for problem in PROBLEMS]
+        # a body that its route does not let FastAPI read
+        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings)],
+        ref_template=_REF,
+    )
+    schemas.update(others["$defs"])
+    # FastAPI's own error model: no route answers with it
+    for name in ("HTTPValidationError", "ValidationError"):
+        schemas.pop(name, None)
+    for operation in (operation for path in document["paths"].values() for operation in path.values()):
+        if "HTTPValidationError" in str(operation["responses"].get("422", "")):
+            del operation["responses"]["422"]
+    for name in ("OptimizeRequest", "CompareRequest", "ParetoRequest", "WhatifRequest"):
+        deadline = schemas[name]["properties"]["deadline"]
+        deadline |= {"maximum": settings.max_deadline, "default": min(deadline["default"], settings.max_deadline)}
+    return document

@@ -1,0 +1,67 @@
+"""The outermost layer: gives each request an id, logs it, and lets no exception out unanswered."""
+
+from __future__ import annotations
+
+import logging
+import re
+import time
+import uuid
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.exceptions import ClientDisconnected
+from app.http.handlers import respond
+
+logger = logging.getLogger("app.request")
+
+REQUEST_ID_HEADER = "X-Request-ID"
+_SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
+_PROBES = ("/healthz", "/readyz")
+_CLIENT_CLOSED_REQUEST = 499
+"""Status that is logged, never sent, for a request whose caller hung up: nginx's convention."""
+
+
+class RequestContext:
+    """ASGI middleware: the id goes to `request.state.id`, the answer's header and the log."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answers the request, whatever happens inside."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        given = Headers(scope=scope).get(REQUEST_ID_HEADER, "")
+        request_id = given if _SANE_ID.fullmatch(given) else str(uuid.uuid4())
+        scope.setdefault("state", {})["id"] = request_id
+        status = 0
+
+        async def send_with_id(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                MutableHeaders(scope=message)[REQUEST_ID_HEADER] = request_id
+            await send(message)
+
+        began = time.perf_counter()
+        asked = {"request_id": request_id, "method": scope["method"], "path": scope["path"]}
+        logger.debug("received", extra=asked)
+        try:
+            await self._app(scope, receive, send_with_id)
+        except ClientDisconnected:
+            status = _CLIENT_CLOSED_REQUEST
+        except Exception as error:
+            logger.exception("unforeseen error", extra={"request_id": request_id})
+            if status:
+                raise  # the server breaks the connection, so that half an answer is not taken for a whole one
+            await respond(Request(scope), error)(scope, receive, send_with_id)
+        finally:
+            logger.log(
+                # probes come every second or so and say nothing new
+                logging.DEBUG if scope["path"] in _PROBES else logging.INFO,
+                "request",
+                extra=asked | {"status": status, "duration": round(time.perf_counter() - began, 6)},
+            )

@@ -1,0 +1,10 @@
+"""Lengths of texts that requests and the database share."""
+
+from __future__ import annotations
+
+ID_LENGTH = 36
+"""Of a UUID in writing."""
+KEY_LENGTH = 128
+"""Of an `Idempotency-Key`."""
+NAME_LENGTH = 200
+"""Of a study's name."""

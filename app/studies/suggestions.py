@@ -1,0 +1,161 @@
+"""What a study could try next: requests that differ from its best iteration in one thing each.
+
+Only the requests are made here. What each saves is what the optimiser then computes for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import radians
+from typing import Any, Literal
+
+import numpy as np
+
+from app.convert.arm import robot_named
+from app.convert.pose import to_matrix
+from app.schemas.arm import ArmRequest
+from app.schemas.request import MAX_DURATION, OptimizeRequest
+from optimizer.kinematics.tcp import turned_poses
+
+Step = Literal["method", "branch", "orientation", "duration", "payload"]
+Fields = dict[str, Any]
+
+_TOOL_AXIS = [0.0, 0.0, 1.0]
+"""In the TCP frame."""
+_TILT = radians(10.0)
+_LONGER = 1.25
+_NEARER = 0.5
+_OTHER_BRANCHES = 2
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A step to try: `request` is a body for `POST /optimize`."""
+
+    step: Step
+    summary: str
+    request: Fields
+
+
+@dataclass(frozen=True)
+class Base:
+    """What the steps start from: a request for `POST /optimize`, the goal configuration q [rad] that was reached, the
+    duration [s], and the candidates that were looked at."""
+
+    request: Fields
+    q_goal: list[float]
+    duration: float
+    optimized: bool
+    candidates: list[Fields]
+
+
+def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base | None:
+    """From an iteration's request and answer. None where the motion given to `evaluate` has no two ends to optimise
+    between: it goes through configurations on its way, or ends where it starts."""
+    if kind == "optimize":
+        return Base(request, answer["branch"]["goal"]["q"], answer["duration"], True, answer["candidates"])
+    given = request.get("trajectory") or {}
+    q = given.get("q") or request["configurations"]
+    if ("configurations" in request and len(q) > 2) or np.allclose(q[0], q[-1], rtol=0, atol=1e-6):
+        return None
+    arm = {name: value for name, value in request.items() if name in ArmRequest.model_fields}
+    ends: Fields = {"start": {"q": q[0]}, "goal": {"q": q[-1]}, "objective": objective}
+    if objective == "mechanical":
+        ends["duration"] = answer["duration"]
+    return Base(arm | ends, q[-1], answer["duration"], False, [])
+
+
+def proposals(base: Base) -> list[Proposal]:
+    """Every step that makes sense from there, those first that usually save most."""
+    return [*_method(base), *_duration(base), *_branch(base), *_orientation(base), *_payload(base)]
+
+
+def _method(base: Base) -> Iterator[Proposal]:
+    if not base.optimized:
+        yield Proposal("method", "Optimise between the same joint positions.", base.request)
+        yield Proposal(
+            "method", "Optimise between the same joint positions in the same time.", _timed(base, base.duration)
+        )
+    elif base.request.get("method", "bspline") != "bspline":
+        yield Proposal("method", "Optimise a free B-spline.", base.request | {"method": "bspline"})
+
+
+def _duration(base: Base) -> Iterator[Proposal]:
+    if base.request.get("duration") is not None and base.request["objective"] == "electrical":
+        yield Proposal("duration", "Leave the duration to the optimiser.", _timed(base, None))
+    for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
+        duration = min(base.duration * factor, MAX_DURATION)
+        yield Proposal("duration", f"Take {abs(factor - 1):.0%} {word}.", _timed(base, duration))
+
+
+def _branch(base: Base) -> Iterator[Proposal]:
+    fixed = "q" in base.request["goal"]
+    if fixed:
+        pose = _poses(base, [np.zeros(3)])[0]
+        request = _without(base.request, "branch", "windings") | {"goal": pose}
+        yield Proposal("branch", "Reach the same pose in whichever arm configuration is best.", request)
+    elif any(name in base.request for name in ("branch", "windings")):
+        yield Proposal(
+            "branch", "Allow every arm configuration and winding.", _without(base.request, "branch", "windings")
+        )
+    seen = {_branch_name(candidate["goal"]) for candidate in base.candidates if candidate["q_goal"] == base.q_goal}
+    known = [candidate for candidate in base.candidates if candidate["status"] in ("solved", "pruned", "unvisited")]
+    known.sort(key=_least_energy)
+    for candidate in known:
+        name = _branch_name(candidate["goal"])
+        if name not in seen and len(seen) <= _OTHER_BRANCHES:
+            seen.add(name)
+            request = _without(base.request, "branch") | {"goal": {"q": candidate["q_goal"]}}
+            yield Proposal("branch", f"Reach the goal as {name}.", request)
+
+
+def _orientation(base: Base) -> Iterator[Proposal]:
+    (here,) = _poses(base, [np.zeros(3)])
+    orientation = {"free_about": _TOOL_AXIS, "quaternion": here["pose"]["quaternion"]}
+    yield Proposal(
+        "orientation",
+        "Let the tool turn freely about its axis at the goal.",
+        base.request | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
+    )
+    tilts = [sign * _TILT * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
+    yield Proposal(
+        "orientation",
+        "Tilt the tool at the goal by 10 degrees: the best of four ways.",
+        base.request | {"goal": {"any_of": _poses(base, tilts)}},
+    )
+
+
+def _payload(base: Base) -> Iterator[Proposal]:
+    payload = base.request.get("payload")
+    if payload and payload["mass"] and any(payload["com"]):
+        nearer = payload | {"com": [_NEARER * part for part in payload["com"]]}
+        yield Proposal(
+            "payload",
+            "Grip the payload lower: its centre of mass at half the distance from the flange.",
+            base.request | {"payload": nearer},
+        )
+
+
+def _timed(base: Base, duration: float | None) -> Fields:
+    return _without(base.request, "duration") | ({} if duration is None else {"duration": duration})
+
+
+def _without(request: Fields, *names: str) -> Fields:
+    return {name: value for name, value in request.items() if name not in names}
+
+
+def _poses(base: Base, turns: list[Any]) -> list[Fields]:
+    asked = OptimizeRequest.model_validate(base.request)
+    poses = turned_poses(robot_named(asked.robot), to_matrix(asked.tcp), np.array(base.q_goal), turns)
+    return [{"pose": {"position": at.tolist(), "quaternion": quaternion.tolist()}} for at, quaternion in poses]
+
+
+def _branch_name(label: str) -> str:
+    """shoulder/elbow/wrist, without the windings."""
+    return "/".join(label.split("/")[:3])
+
+
+def _least_energy(candidate: Fields) -> float:
+    known = [candidate[name] for name in ("energy", "lower_bound") if candidate[name] is not None]
+    return float(known[0]) if known else float("inf")

@@ -1,0 +1,49 @@
+"""POST /ik/path in a worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.convert.arm import robot_named
+from app.convert.fields import fields
+from app.convert.pose import to_matrix
+from app.engine.reply import Reply
+from app.schemas.ik_path import IKPathRequest
+from app.tasks.task import answer, json_reply
+from optimizer.kinematics.path_following import follow
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+
+
+@dataclass(frozen=True)
+class IKPathTask:
+    """A validated request and its id."""
+
+    request: IKPathRequest
+    request_id: str
+
+    def run(self, deadline: float) -> Reply:
+        """The answer, or the problem; a thousand points take less than a second."""
+        return answer(self.request_id, self._follow)
+
+    def _follow(self) -> Reply:
+        request = self.request
+        arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
+        targets = (
+            np.array(request.points)
+            if request.points is not None
+            else [Pose(to_matrix(pose)) for pose in request.poses or []]
+        )
+        found = follow(arm, targets, np.array(request.guess), request.tolerance, request.near_singular)
+        written = [(t, point.q) for t, point in zip(request.t, found, strict=True) if point.written]
+        names = ("q", "position_error", "rotation_error", "smallest_singular_value", "reached", "written", "reason")
+        return json_reply(
+            {
+                "id": self.request_id,
+                "robot": request.robot,
+                "trajectory": {"t": [t for t, _ in written], "q": [q for _, q in written]},
+                "points": [{"t": t, **fields(point, *names)} for t, point in zip(request.t, found, strict=True)],
+            }
+        )

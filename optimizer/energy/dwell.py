@@ -1,0 +1,58 @@
+"""Energy drawn while the arm waits at the goal until its cycle ends (Meike, Ribickis 2011; Meike, Pellicciari,
+Berselli 2014).
+
+The motors hold the goal's gravity torque. Friction would help and is ignored:
+
+P_hold   = base + Σ_j (copper_j i_j² + inverter_j(i_j)),  i = tau_gravity / torque_constant
+dwell(T) = P_hold · min(time - T, brake_delay) + P_brake · max(time - T - brake_delay, 0)
+
+Without brakes the delay is infinite. So dwell is linear in T on either side of time - brake_delay.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.energy.losses import power_flow
+from optimizer.problem.arm import Arm
+from optimizer.problem.cycle import Cycle
+
+
+@dataclass(frozen=True)
+class LinearDwell:
+    """dwell(T) = constant - power · T for durations T in [t_min, t_max]; s, J, W."""
+
+    t_min: float
+    t_max: float
+    power: Array
+    constant: Array
+
+
+def linear_dwells(cycle: Cycle, arm: Arm, hold: Array) -> list[LinearDwell]:
+    """The intervals from T = 0 to the cycle's time on which dwell(T) is linear, for holding powers `hold` (...) [W]."""
+    if cycle.hold == "motors":
+        return [LinearDwell(0.0, cycle.time, hold, hold * cycle.time)]
+    brake, kink = np.full_like(hold, _brake_power(cycle, arm)), cycle.time - cycle.brake_delay
+    early = LinearDwell(0.0, kink, brake, hold * cycle.brake_delay + brake * kink)
+    late = LinearDwell(max(kink, 0.0), cycle.time, hold, hold * cycle.time)
+    return [interval for interval in (early, late) if interval.t_max > interval.t_min]
+
+
+def dwell_energy(cycle: Cycle, arm: Arm, hold: float, duration: float) -> float:
+    """Energy [J] drawn after a motion of `duration` [s], whose goal takes `hold` [W]; 0 if it lasts the whole cycle."""
+    wait = max(cycle.time - duration, 0.0)
+    by_motors = wait if cycle.hold == "motors" else min(wait, cycle.brake_delay)
+    return hold * by_motors + _brake_power(cycle, arm) * (wait - by_motors)
+
+
+def holding_power(arm: Arm, tau: Array) -> Array:
+    """What the arm draws (...) [W] while its motors hold torques tau (..., nq) [N·m] at rest."""
+    joints = power_flow(tau, np.zeros_like(tau), arm.drives, arm.friction_law).joints
+    return np.asarray(arm.base_power + joints.sum(axis=-1))
+
+
+def _brake_power(cycle: Cycle, arm: Arm) -> float:
+    return arm.base_power if cycle.brake_power is None else cycle.brake_power

@@ -1,0 +1,162 @@
+"""Limits on where the arm is and how fast it passes: a tool axis within a cone, speeds of the TCP and the elbow.
+
+Each gives shares for configurations and speeds: 1 is on the limit, more breaks it; and the gradients of these shares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar, NamedTuple, Protocol
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.kinematics.jacobians import direction_jacobian, point_jacobian, velocity_gradient
+from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.problem.arm import Arm
+from optimizer.problem.tool_cone import ToolCone
+
+# below this a direction's deviation [rad] or a point's speed [m/s] has no gradient to speak of
+AT_REST = 1e-9
+
+
+class Shares(NamedTuple):
+    """Shares (n, c) of c limits, and their gradients by q and by v (n, c, nq)."""
+
+    value: Array
+    by_q: Array
+    by_v: Array
+
+
+class PathLimit(Protocol):
+    """A limit along the path: names of its c shares, and the shares at n states."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for every share."""
+        ...
+
+    def shares(self, frames: Array, q: Array, v: Array) -> Array:
+        """Shares (n, c) for frames (n, nq + 1, 4, 4), q and v (n, nq)."""
+        ...
+
+    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
+        """The same with gradients."""
+        ...
+
+
+@dataclass(frozen=True)
+class ToolConeLimit:
+    """The direction `axis` (3,) of the last link, in its frame, stays within `half_angle` [rad] of `direction` (3,).
+
+    `direction` is in the base frame; both are unit vectors. The ratio is the angle between them over the half angle.
+    """
+
+    axis: Array
+    direction: Array
+    half_angle: float
+
+    names: ClassVar[tuple[str, ...]] = ("tool_cone",)
+
+    @staticmethod
+    def of(arm: Arm, cone: ToolCone) -> ToolConeLimit:
+        """The constraint of an arm's cone, its axis turned from the TCP's frame into the last link's."""
+        return ToolConeLimit(T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle)
+
+    def shares(self, frames: Array, q: Array, v: Array) -> Array:
+        """Shares (n, 1)."""
+        return (self._angle(frames[:, -1, :3, :3] @ self.axis) / self.half_angle)[:, None]
+
+    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
+        """Shares and gradients: the angle grows by -d(cos)/sin."""
+        pointing = frames[:, -1, :3, :3] @ self.axis
+        angle = self._angle(pointing)
+        slope = -(self.direction @ direction_jacobian(frames, pointing))
+        by_q = slope / (np.maximum(np.sin(angle), AT_REST) * self.half_angle)[:, None]
+        return Shares((angle / self.half_angle)[:, None], by_q[:, None], np.zeros((*v.shape[:1], 1, v.shape[1])))
+
+    def _angle(self, pointing: Array) -> Array:
+        """(n,) [rad]; by atan2, exact near zero and near a half turn too."""
+        across = np.linalg.norm(np.cross(pointing, self.direction), axis=1)
+        return np.asarray(np.arctan2(across, pointing @ self.direction))
+
+
+@dataclass(frozen=True)
+class PointSpeed:
+    """Points (c, 3) [m] fixed to a link, in its frame, move at most at `limit` [m/s] in the base frame."""
+
+    name: str
+    link: int
+    points: Array
+    limit: float
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """One name, repeated for every point."""
+        return (self.name,) * len(self.points)
+
+    def shares(self, frames: Array, q: Array, v: Array) -> Array:
+        """Shares (n, c)."""
+        velocities = [point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)]
+        return np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1) / self.limit
+
+    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
+        """Shares and gradients."""
+        value, by_q, by_v = [], [], []
+        for x in self._positions(frames):
+            J = point_jacobian(frames, self.link, x)
+            velocity = (J @ v[..., None])[..., 0]
+            speed = np.linalg.norm(velocity, axis=1)
+            along = (velocity / np.maximum(speed, AT_REST)[:, None])[:, None]
+            value.append(speed)
+            by_q.append((along @ velocity_gradient(frames, J, v))[:, 0])
+            by_v.append((along @ J)[:, 0])
+        return Shares(*(np.stack(each, axis=1) / self.limit for each in (value, by_q, by_v)))
+
+    def _positions(self, frames: Array) -> list[Array]:
+        return [frames[:, self.link, :3, :3] @ point + frames[:, self.link, :3, 3] for point in self.points]
+
+
+@dataclass(frozen=True)
+class PathLimits:
+    """All limits along the path of one arm whose joints are mounted at `placements` (nq, 4, 4)."""
+
+    placements: Array
+    limits: Sequence[PathLimit]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """A name for every share."""
+        return tuple(name for limit in self.limits for name in limit.names)
+
+    def shares(self, q: Array, v: Array) -> Array:
+        """Shares (n, c) at q, v (n, nq)."""
+        frames = link_frames(self.placements, q)
+        return np.concatenate([limit.shares(frames, q, v) for limit in self.limits], axis=1)
+
+    def linearised(self, q: Array, v: Array) -> Shares:
+        """Shares and gradients at q, v (n, nq)."""
+        frames = link_frames(self.placements, q)
+        parts = [limit.linearised(frames, q, v) for limit in self.limits]
+        return Shares(*(np.concatenate(each, axis=1) for each in zip(*parts, strict=True)))
+
+
+def path_limits(arm: Arm) -> list[PathLimit]:
+    """Limits on where the tool points and how fast TCP and elbow move."""
+    limits: list[PathLimit] = []
+    if arm.tool_cone is not None:
+        limits.append(ToolConeLimit.of(arm, arm.tool_cone))
+    if arm.tcp_speed is not None:
+        limits.append(PointSpeed("tcp_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], arm.tcp_speed))
+    if arm.elbow_speed is not None and arm.robot.elbow is not None:
+        limits.append(PointSpeed("elbow_speed", arm.robot.elbow.link, arm.robot.elbow.axis, arm.elbow_speed))
+    return limits
+
+
+def path_limits_of(arm: Arm) -> PathLimits | None:
+    """These limits together, None where there are none."""
+    limits = path_limits(arm)
+    return PathLimits(joint_placements(arm.robot.model), limits) if limits else None

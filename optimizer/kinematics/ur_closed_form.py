@@ -1,0 +1,223 @@
+"""Closed-form inverse kinematics of arms built like Universal Robots': inner axes parallel, the last three offset.
+
+The arm has the standard Denavit-Hartenberg table
+
+    a     = [0, a2, a3, 0, 0, 0],  d = [d1, 0, 0, d4, d5, d6],  alpha = [pi/2, 0, 0, pi/2, -pi/2, 0].
+
+The derivation is K. P. Hawkins, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms" (Georgia Tech,
+2013). Here every angle comes from an atan2 of two exact lengths, never from an acos, so that a joint is as accurate
+next to a singularity as the pose allows: a pose rounded by e moves joints by e / (smallest singular value).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin, sqrt, tau
+
+import numpy as np
+import pinocchio as pin
+from scipy.optimize import minimize_scalar
+
+from models.robot import Array
+from optimizer.problem.branches import Label
+
+# how far beyond its reach [m, or sine of the wrist angle] a pose may lie that rounding alone put there
+ROUNDING = 1e-10
+# of the search for the nearest reachable position: both wrists at so many shoulder angles, then refined
+SHOULDER_ANGLES = 720
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """The lengths [m] of the table above, signed."""
+
+    d1: float
+    a2: float
+    a3: float
+    d4: float
+    d5: float
+    d6: float
+
+    @classmethod
+    def of(cls, model: pin.Model) -> ClosedForm:
+        """Read the lengths from a Pinocchio model with a frame `flange`.
+
+        Raises ValueError when the model is not built that way: its branches have no closed form here.
+        """
+        flange = model.getFrameId("flange")
+        if model.nq == 6:
+            data = model.createData()
+            pin.framesForwardKinematics(model, data, np.zeros(6))
+            elbow, wrist_1, wrist_2 = (data.oMi[j].translation for j in (3, 4, 5))
+            end = data.oMf[flange].translation
+            # at zero the arm lies along x, the second axis along -y
+            d1, d4 = float(elbow[2]), -float(wrist_2[1])
+            candidate = cls(
+                d1=d1,
+                a2=float(elbow[0]),
+                a3=float(wrist_1[0] - elbow[0]),
+                d4=d4,
+                d5=d1 - float(end[2]),
+                d6=-float(end[1]) - d4,
+            )
+            if candidate._describes(model, data, flange):
+                return candidate
+        raise ValueError(
+            f"{model.name} has no closed-form inverse kinematics here: only arms with Universal Robots' axes have."
+        )
+
+    def _describes(self, model: pin.Model, data: pin.Data, flange: int) -> bool:
+        """Whether forward kinematics by the table is the model's, at configurations in general position."""
+        for q in np.random.default_rng(0).uniform(-pi, pi, (4, 6)):
+            pin.framesForwardKinematics(model, data, q)
+            if np.abs(data.oMf[flange].homogeneous - self._forward(q)).max() > 1e-12:
+                return False
+        return True
+
+    def _forward(self, q: Array) -> Array:
+        a, d = (0, self.a2, self.a3, 0, 0, 0), (self.d1, 0, 0, self.d4, self.d5, self.d6)
+        T = np.eye(4)
+        twists = (0, 1), (1, 0), (1, 0), (0, 1), (0, -1), (1, 0)  # cos and sin of alpha
+        for theta, length, offset, (ca, sa) in zip(q, a, d, twists, strict=True):
+            c, s = cos(theta), sin(theta)
+            T = T @ np.array(
+                [[c, -s * ca, s * sa, length * c], [s, c * ca, -c * sa, length * s], [0, sa, ca, offset], [0, 0, 0, 1]]
+            )
+        return T
+
+    @property
+    def _reach(self) -> tuple[float, float]:
+        """Least and greatest distance [m] from the second axis to the fourth."""
+        return abs(abs(self.a2) - abs(self.a3)), abs(self.a2) + abs(self.a3)
+
+    def label(self, q: Array) -> Label:
+        """The branch of a configuration, shape (6,); on a singularity, one of those that meet there."""
+        ahead = self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
+        return self._label(ahead, sin(q[2]), sin(q[4]))
+
+    def _label(self, ahead: float, sin_elbow: float, sin_wrist: float) -> Label:
+        """From the origin of the last axis ahead of the first axis [m], and sines of the third and fifth angle."""
+        return Label(
+            shoulder="left" if ahead * self.d4 < 0 else "right",
+            elbow="up" if ahead * self.a2 * self.a3 * sin_elbow < 0 else "down",
+            wrist="no_flip" if sin_wrist < 0 else "flip",
+        )
+
+    def solve(self, T: Array) -> tuple[Array, list[Label]]:
+        """All configurations, shape (n, 6), angles in [-pi, pi], that put the flange at T (4, 4); and their labels.
+
+        n is at most eight, zero out of reach. On a singularity the branches that meet there count once, and of a
+        continuum (wrist stretched: sin(q5) = 0) one member stands for all.
+        """
+        rows, labels = [], []
+        for q1, ahead in self._shoulders(T):
+            for q5, q6, sin_wrist, x, z, heading in self._wrists(T, q1, ahead):
+                for q2, q3, sin_elbow in self._elbows(x, z):
+                    rows.append((q1, q2, q3, heading - q2 - q3, q5, q6))
+                    labels.append(self._label(ahead, sin_elbow, sin_wrist))
+        if not rows:
+            return np.zeros((0, 6)), []
+        q = np.array(rows)
+        # clipped by no more than the last digit
+        return np.clip(q - tau * np.round(q / tau), -pi, pi), labels
+
+    def _shoulders(self, T: Array) -> list[tuple[float, float]]:
+        """First angle, and how far ahead of the first axis the last axis' origin then lies [m]."""
+        x, y = float(T[0, 3] - self.d6 * T[0, 2]), float(T[1, 3] - self.d6 * T[1, 2])
+        distance = hypot(x, y)
+        if distance < abs(self.d4) - ROUNDING:
+            return []
+        ahead = sqrt(max(0.0, (distance - self.d4) * (distance + self.d4)))
+        towards = atan2(y, x)
+        return [(towards + atan2(self.d4, side), side) for side in ((ahead, -ahead) if ahead > 0 else (0.0,))]
+
+    def _wrists(self, T: Array, q1: float, ahead: float) -> list[tuple[float, float, float, float, float, float]]:
+        """Fifth and sixth angle, sin(q5), fourth axis ahead of the first and above the second [m], q2 + q3 + q4.
+
+        With the wrist stretched the sixth angle is free: zero stands for all.
+        """
+        (r11, r12, r13, _), (r21, r22, r23, _), (r31, r32, r33, pz), _ = T.tolist()
+        c1, s1 = cos(q1), sin(q1)
+        # the second axis (s1, -c1, 0) in flange axes: (sin q5 cos q6, -sin q5 sin q6, cos q5)
+        u, v, w = r11 * s1 - r21 * c1, r12 * s1 - r22 * c1, r13 * s1 - r23 * c1
+        sine = hypot(u, v)
+        if sine < ROUNDING:
+            sine, u, v = 0.0, 1.0, 0.0
+        found = []
+        for sin_q5 in (sine, -sine) if sine > 0 else (0.0,):
+            sign = 1.0 if sin_q5 >= 0 else -1.0
+            q5, q6 = atan2(sin_q5, w), atan2(-sign * v, sign * u)
+            # the fifth axis, minus the y axis after it, in the arm's plane: (sin, -cos) of q2 + q3 + q4
+            c6, s6 = cos(q6), sin(q6)
+            along = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
+            above = -(s6 * r31 + c6 * r32)
+            x = ahead - self.d5 * along
+            z = pz - self.d6 * r33 - self.d1 - self.d5 * above
+            found.append((q5, q6, sin_q5, x, z, atan2(along, -above)))
+        return found
+
+    def _elbows(self, x: float, z: float) -> list[tuple[float, float, float]]:
+        """Second and third angle, and sin(q3), that put the fourth axis at (x, z) in the arm's plane [m]."""
+        least, most = self._reach
+        distance = hypot(x, z)
+        if not least - ROUNDING <= distance <= most + ROUNDING:
+            return []
+        # tan²(q3 / 2) = stretched / folded, by the half-angle law of cosines
+        stretched = sqrt(max(0.0, (most - distance) * (most + distance)))
+        folded = sqrt(max(0.0, (distance - least) * (distance + least)))
+        if self.a2 * self.a3 < 0:
+            stretched, folded = folded, stretched
+        found = []
+        for side in (stretched, -stretched) if stretched > 0 and folded > 0 else (stretched,):
+            q3 = 2 * atan2(side, folded)
+            s3 = sin(q3)
+            q2 = atan2(z, x) - atan2(self.a3 * s3, self.a2 + self.a3 * cos(q3))
+            found.append((q2, q3, s3))
+        return found
+
+    def distance_to_reach(self, T: Array) -> float:
+        """How far T (4, 4) must shift [m], its orientation kept, to have a solution; 0 where it has one.
+
+        With the first angle given, the offset out of the arm's plane and the fourth axis' excess over its reach in that
+        plane are at right angles to each other; what is left is a search over that one angle.
+        """
+        least, most = self._reach
+        axis = T[:3, 2]
+        centre = T[:3, 3] - self.d6 * axis
+
+        def distance(q1: Array, flip: float) -> Array:
+            c1, s1, zero = np.cos(q1), np.sin(q1), np.zeros_like(q1)
+            side = c1 * centre[1] - s1 * centre[0] + self.d4
+            fifth = np.cross(np.stack([s1, -c1, zero], axis=-1), axis)
+            fifth *= flip / np.maximum(np.linalg.norm(fifth, axis=-1, keepdims=True), ROUNDING)
+            x = c1 * centre[0] + s1 * centre[1] - self.d5 * (c1 * fifth[..., 0] + s1 * fifth[..., 1])
+            z = centre[2] - self.d1 - self.d5 * fifth[..., 2]
+            radius = np.hypot(x, z)
+            return np.asarray(np.hypot(side, np.maximum(0, np.maximum(least - radius, radius - most))))
+
+        angles = np.linspace(-pi, pi, SHOULDER_ANGLES + 1)
+        best = self._distance_with_stretched_wrist(T)
+        for flip in (1.0, -1.0):
+            values = distance(angles, flip)
+            k = int(np.argmin(values))
+            bounds = angles[k] - tau / SHOULDER_ANGLES, angles[k] + tau / SHOULDER_ANGLES
+            refined = minimize_scalar(
+                lambda q1, flip=flip: float(distance(np.array(q1), flip)), bounds=bounds, method="bounded",
+                options={"xatol": 1e-10},
+            )  # fmt: skip
+            best = min(best, float(values[k]), float(refined.fun))
+        return best
+
+    def _distance_with_stretched_wrist(self, T: Array) -> float:
+        """The same where the wrist is stretched at an exact first angle, so that the fourth axis may lie anywhere about
+        the fifth joint's circle; infinite elsewhere.
+        """
+        least, most = self._reach
+        best = np.inf
+        for q1, ahead in self._shoulders(T):
+            across = hypot(T[2, 2], cos(q1) * T[0, 2] + sin(q1) * T[1, 2])
+            if across < ROUNDING:
+                radius = hypot(ahead, T[2, 3] - self.d6 * T[2, 2] - self.d1)
+                nearest, farthest = abs(radius - abs(self.d5)), radius + abs(self.d5)
+                best = min(best, max(0.0, least - farthest, nearest - most))
+        return best

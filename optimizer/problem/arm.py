@@ -1,0 +1,186 @@
+"""The arm as it stands in its cell: robot, tool, payload, mounting, limits, friction, drives, bus; validated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from models.robot import Array, Drives, FrictionLaw, Limits, Robot
+from optimizer.exceptions import InvalidProblem, OutsideLimits
+from optimizer.problem.arrays import frozen, per_joint
+from optimizer.problem.bus import Bus
+from optimizer.problem.pose import Pose
+from optimizer.problem.scene import Attachment, Scene
+from optimizer.problem.tool_cone import ToolCone
+
+# a limit on speed below this [m/s] would leave motions that last longer than any answer may
+LEAST_SPEED = 1e-3
+LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
+# most shapes that a tool is made of
+MOST_PARTS = 16
+
+# factors on a link's mass and inertia that are still an arm like the robot
+LINK_MASS_SCALES = (0.1, 10.0)
+# coefficients of the inverter's loss, and their greatest values [W, W/A, W/A²]: far beyond any inverter's
+INVERTER_PARTS = ("constant", "linear", "quadratic")
+INVERTER_MOST = 1e3
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A body fixed to the flange: mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com.
+
+    `shape` is what it takes up of space, for collisions only.
+    """
+
+    mass: float = 0.0
+    com: Array = field(default_factory=lambda: np.zeros(3))
+    inertia: Array = field(default_factory=lambda: np.zeros((3, 3)))
+    shape: Attachment | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.mass) and self.mass >= 0):
+            raise InvalidProblem("payload.mass", "payload.mass must be a finite number of kg, zero or more.")
+        object.__setattr__(self, "com", frozen(self.com, (3,), "payload.com"))
+        object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "payload.inertia"))
+        if np.abs(self.inertia - self.inertia.T).max() > 1e-9 * np.abs(self.inertia).max():
+            raise InvalidProblem("payload.inertia", "payload.inertia must be symmetric.")
+        principal = np.linalg.eigvalsh(self.inertia)
+        slack = 1e-9 * max(1.0, float(principal[-1]))
+        if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
+            raise InvalidProblem(
+                "payload.inertia",
+                "payload.inertia fits no body: principal moments must be positive and obey the triangle inequality.",
+            )
+
+
+@dataclass(frozen=True)
+class Inverter:
+    """The inverters' loss constant + linear·|i| + quadratic·i² [W, W/A, W/A²], one number or one per joint each.
+
+    None keeps the robot's figure.
+    """
+
+    constant: float | Array | None = None
+    linear: float | Array | None = None
+    quadratic: float | Array | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arm:
+    """A robot with what it carries, how it is mounted and which limits it keeps.
+
+    `limits` replaces the robot's limits and may only tighten them. `gravity` (3,) [m/s²] is in the base frame.
+    `friction` names one of the robot's friction laws (None: its default). `inverter` replaces figures of the robot's
+    inverters, `bus` says where surplus power goes, `link_mass_scale` (nq,), or one number, multiplies mass and inertia
+    of every moving link, payload apart. `tool` is what the flange bears, for collisions only, and `scene` what stands
+    around the arm; with `collisions` false nothing is compared. `tool_cone` holds an axis of the tool near a direction,
+    `tcp_speed` and `elbow_speed` [m/s] limit how fast these points move.
+
+    Raises InvalidProblem, with the field named, when the parts do not fit together.
+    """
+
+    robot: Robot
+    T_flange_tcp: Array = field(default_factory=lambda: np.eye(4))
+    payload: Payload = field(default_factory=Payload)
+    gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
+    limits: Limits | None = None
+    friction: str | None = None
+    inverter: Inverter = field(default_factory=Inverter)
+    bus: Bus = field(default_factory=Bus)
+    link_mass_scale: Array = field(default_factory=lambda: np.array(1.0))
+    tool: Sequence[Attachment] = ()
+    scene: Scene = field(default_factory=Scene)
+    collisions: bool = True
+    tool_cone: ToolCone | None = None
+    tcp_speed: float | None = None
+    elbow_speed: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_flange_tcp", Pose(self.T_flange_tcp).T)
+        object.__setattr__(self, "gravity", frozen(self.gravity, (3,), "gravity"))
+        object.__setattr__(self, "limits", self.robot.limits if self.limits is None else self.limits)
+        object.__setattr__(self, "tool", tuple(self.tool))
+        if len(self.tool) > MOST_PARTS:
+            raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_PARTS} capsules.")
+        self._check_limits()
+        for name in ("tcp_speed", "elbow_speed"):
+            speed = getattr(self, name)
+            if speed is not None and not LEAST_SPEED <= speed < np.inf:
+                raise InvalidProblem(f"limits.{name}", f"limits.{name} must be at least {LEAST_SPEED:g} m/s.")
+        if self.elbow_speed is not None and self.robot.elbow is None:
+            raise InvalidProblem("limits.elbow_speed", "This robot has no elbow: leave limits.elbow_speed out.")
+        if self.friction is not None and self.friction not in self.robot.friction_laws:
+            known = ", ".join(self.robot.friction_laws)
+            raise InvalidProblem("friction", f"There is no friction law of that name: use one of {known}.")
+        nq = self.robot.nq
+        scale = per_joint(self.link_mass_scale, nq, "link_mass_scale", *LINK_MASS_SCALES)
+        object.__setattr__(self, "link_mass_scale", scale)
+        given = {name: getattr(self.inverter, name) for name in INVERTER_PARTS}
+        figures = {
+            name: per_joint(value, nq, f"drives.inverter.{name}", 0.0, INVERTER_MOST)
+            for name, value in given.items()
+            if value is not None
+        }
+        object.__setattr__(self, "inverter", Inverter(**figures))
+
+    @property
+    def active_limits(self) -> Limits:
+        """The limits in force."""
+        assert self.limits is not None
+        return self.limits
+
+    @property
+    def friction_law(self) -> FrictionLaw:
+        """The friction law in force."""
+        return self.robot.friction if self.friction is None else self.robot.friction_laws[self.friction]
+
+    @property
+    def drives(self) -> Drives:
+        """The drives in force."""
+        names = [name for name in INVERTER_PARTS if getattr(self.inverter, name) is not None]
+        return replace(self.robot.drives, **{f"inverter_{name}": getattr(self.inverter, name) for name in names})
+
+    @property
+    def base_power(self) -> float:
+        """What the electronics draw besides the motors and their inverters [W]."""
+        return self.robot.electronics.idle_power + self.robot.electronics.controller_power
+
+    @property
+    def regeneration(self) -> float:
+        """The share of surplus on the bus that the supply takes back."""
+        if self.bus.mode == "recuperating":
+            return self.bus.efficiency
+        return 0.0 if self.bus.mode == "isolated" else self.robot.electronics.regeneration
+
+    def check_inside(self, target: str, q: Array) -> None:
+        """Raises OutsideLimits when a joint of q (nq,) is out of range; `target` says whose joints they are."""
+        lower, upper = self.active_limits.q_min, self.active_limits.q_max
+        outside = np.flatnonzero((q < lower) | (q > upper))
+        if outside.size:
+            j = int(outside[0])
+            raise OutsideLimits(target, self.robot.joint_names[j], float(q[j]), float(lower[j]), float(upper[j]))
+
+    def _check_limits(self) -> None:
+        limits, robot = self.active_limits, self.robot.limits
+        # asked so that NaN, which compares false with everything, is refused
+        for public, name in LIMIT_NAMES.items():
+            value, most = getattr(limits, name), getattr(robot, name)
+            if value.shape != most.shape or not (value > 0).all():
+                raise InvalidProblem(f"limits.{public}", f"limits.{public} must be a positive number for every joint.")
+            # the factor lets a caller pass the robot's own figure back after rounding
+            if (value > most * (1 + 1e-9)).any():
+                joint = int(np.argmax(value / most))
+                raise InvalidProblem(
+                    f"limits.{public}",
+                    f"limits.{public} may only tighten the robot's: {self.robot.joint_names[joint]} "
+                    f"allows at most {most[joint]:.6g}.",
+                )
+        if limits.q_min.shape != robot.q_min.shape or limits.q_max.shape != robot.q_max.shape:
+            raise InvalidProblem("limits.position", "limits.position must have one number for every joint.")
+        if not ((limits.q_min >= robot.q_min - 1e-9) & (limits.q_max <= robot.q_max + 1e-9)).all():
+            raise InvalidProblem("limits.position", "limits.position may only tighten the robot's own range.")
+        if (limits.q_min >= limits.q_max).any():
+            raise InvalidProblem("limits.position", "limits.position.lower must be below limits.position.upper.")

@@ -1,0 +1,38 @@
+"""A cycle: how long the arm may take from one start to the next, and how it stands still at the goal until then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from optimizer.exceptions import InvalidProblem
+
+Hold = Literal["motors", "brakes"]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The time [s] from the motion's start until the arm is needed again, and how the arm holds still until then.
+
+    On brakes the motors hold for `brake_delay` [s] first; then the arm draws `brake_power` [W] in all, electronics
+    included (None: what the electronics draw, brakes on).
+
+    Raises InvalidProblem, with the field named.
+    """
+
+    time: float
+    hold: Hold = "motors"
+    brake_delay: float = 0.0
+    brake_power: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.time) and self.time > 0):
+            raise InvalidProblem("cycle.time", "cycle.time must be a positive number of seconds.")
+        if self.hold not in ("motors", "brakes"):
+            raise InvalidProblem("cycle.hold", "cycle.hold must be motors or brakes.")
+        if not (np.isfinite(self.brake_delay) and self.brake_delay >= 0):
+            raise InvalidProblem("cycle.brake_delay", "cycle.brake_delay must be a number of seconds, zero or more.")
+        if self.brake_power is not None and not (np.isfinite(self.brake_power) and self.brake_power >= 0):
+            raise InvalidProblem("cycle.brake_power", "cycle.brake_power must be a number of watts, zero or more.")

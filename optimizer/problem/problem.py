@@ -1,0 +1,83 @@
+"""What is asked: a motion between two targets, validated on construction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.targets import Target, members, validated
+
+if TYPE_CHECKING:
+    from optimizer.problem.branches import Label
+
+Method = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
+Objective = Literal["electrical", "mechanical"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Problem:
+    """A request for the motion of least energy of `arm` between `start` and `goal`.
+
+    `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these. `duration_min` and
+    `duration_max` [s] bound the duration; equal, they fix it; None leaves it to the optimiser. With a `cycle` the arm
+    waits at the goal until the cycle is over, which ends the longest duration allowed, too. `deadline` [s] is the wall
+    time after which the best verified result so far is returned.
+
+    Raises InvalidProblem or OutsideLimits, with the field named, when the parts do not fit together.
+    """
+
+    arm: Arm
+    start: Target
+    goal: Target
+    method: Method = "bspline"
+    objective: Objective = "electrical"
+    duration_min: float | None = None
+    duration_max: float | None = None
+    cycle: Cycle | None = None
+    branch: BranchFilter | None = None
+    windings: bool = True
+    sample_period: float = 0.008
+    deadline: float = 10.0
+
+    def __post_init__(self) -> None:
+        for name in ("start", "goal"):
+            object.__setattr__(self, name, validated(self.arm, name, getattr(self, name)))
+        for name in ("duration_min", "duration_max"):
+            value = getattr(self, name)
+            if value is not None and not (np.isfinite(value) and value > 0):
+                raise InvalidProblem("duration", "duration must be a positive number of seconds.")
+        if self.duration_min is not None and self.duration_max is not None and self.duration_min > self.duration_max:
+            raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
+        if self.cycle is not None:
+            if self.duration_min is not None and self.duration_min > self.cycle.time:
+                raise InvalidProblem("duration", "The shortest duration must not exceed cycle.time.")
+            longest = self.cycle.time if self.duration_max is None else min(self.duration_max, self.cycle.time)
+            object.__setattr__(self, "duration_max", longest)
+        if self.objective == "mechanical" and self.duration_max is None:
+            raise InvalidProblem(
+                "duration",
+                "The mechanical objective has no best duration of its own: give a duration or a duration.max.",
+            )
+        for name in ("sample_period", "deadline"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
+
+    def allows(self, label: Label) -> bool:
+        """Whether the request leaves a branch open."""
+        return self.branch is None or self.branch.allows(label)
+
+
+def narrowed(problem: Problem, start: int, goal: int) -> Problem:
+    """The same problem with one member of its start and one of its goal, by index."""
+    return replace(problem, start=members(problem.start)[start], goal=members(problem.goal)[goal])
+
+
+# no motion is planned shorter than this, even one that goes nowhere, nor longer than that [s]
+LEAST_DURATION = 0.01
+LONGEST_DURATION = 600.0

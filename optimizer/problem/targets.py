@@ -1,0 +1,73 @@
+"""Where a motion may start or end: joint positions, a pose, or any one of several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.arrays import frozen
+from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.pose import Pose
+
+# of `AnyOf`
+MOST_TARGETS = 64
+
+Single = Array | Pose | LoosePose
+
+
+@dataclass(frozen=True)
+class AnyOf:
+    """Whichever of `targets` costs least: 1 to 64 joint positions (nq,) [rad] or poses, mixed as you like.
+
+    Raises InvalidProblem when there are none, too many, or one of them is itself an AnyOf.
+    """
+
+    targets: tuple[Single, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "targets", tuple(self.targets))
+        if not 1 <= len(self.targets) <= MOST_TARGETS:
+            raise InvalidProblem("any_of", f"any_of must hold 1 to {MOST_TARGETS} targets.")
+        if any(isinstance(target, AnyOf) for target in self.targets):
+            raise InvalidProblem("any_of", "any_of must not be nested: list all targets in one.")
+
+
+Target = Single | AnyOf
+
+
+def members(target: Target) -> tuple[Single, ...]:
+    """The targets that it stands for: itself, unless it is an AnyOf."""
+    return target.targets if isinstance(target, AnyOf) else (target,)
+
+
+def single(target: Target) -> Single:
+    """The target itself. Raises ValueError for an AnyOf."""
+    if isinstance(target, AnyOf):
+        raise ValueError("narrow the problem to one of its targets first")
+    return target
+
+
+def validated(arm: Arm, name: str, target: Target) -> Target:
+    """A problem's `start` or `goal` (which `name` says) with its joint positions read-only arrays.
+
+    Raises InvalidProblem, also for a start whose orientation is free, or OutsideLimits for joint positions out of
+    range; those of an AnyOf are merely unreachable.
+    """
+    if name == "start" and any(isinstance(member, LoosePose) for member in members(target)):
+        raise InvalidProblem(name, "Only a goal's orientation may be free: give the start's in full.")
+    if isinstance(target, AnyOf):
+        nq = (arm.robot.nq,)
+        fields = [f"{name}.any_of.{k}.q" for k in range(len(target.targets))]
+        return AnyOf(
+            tuple(
+                member if isinstance(member, Pose | LoosePose) else frozen(member, nq, field)
+                for member, field in zip(target.targets, fields, strict=True)
+            )
+        )
+    if isinstance(target, Pose | LoosePose):
+        return target
+    q = frozen(target, (arm.robot.nq,), f"{name}.q")
+    arm.check_inside(name, q)
+    return q

@@ -1,0 +1,161 @@
+"""A motion that is given rather than looked for: configurations to go through, or a log of joint positions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem, InvalidTable
+from optimizer.problem.arm import Arm
+from optimizer.problem.arrays import frozen
+
+Interpolation = Literal["linear", "trapezoid", "quintic", "spline"]
+
+BLOCK = 2048
+"""Rows that are worked on at a time."""
+MOST_ROWS = 1_000_000
+"""Most rows of a motion."""
+MOST_SPLINE_POINTS = 10_000
+"""Most configurations that one smooth curve goes through: its equations are solved all at once."""
+CLOSEST_TIMES = 1e-6
+"""Least time from row to row [s]."""
+MOST_SPEED, MOST_ACCELERATION = 1e4, 1e7
+"""Beyond these a log's rates are no robot's [rad/s, rad/s²]."""
+# joint positions this many times the joint's range away from zero are no radians
+FAR_OUT = 2.0
+
+
+@dataclass(frozen=True)
+class Configurations:
+    """Joint positions q (n, nq) [rad] to go through, with `times` (n - 1,) [s], one for every segment between them.
+
+    `times` may be one number for all. See `optimizer.pieces` for what each interpolation does.
+    Raises InvalidProblem or InvalidTable; rows are counted from `first_row`.
+    """
+
+    q: Array
+    times: Array
+    interpolation: Interpolation = "quintic"
+    first_row: int = 0
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.q) != 2 or len(self.q) < 2:
+            raise InvalidProblem("configurations", "configurations must be a list of two or more joint positions.")
+        object.__setattr__(self, "q", frozen(self.q, np.shape(self.q), "configurations"))
+        segments = len(self.q) - 1
+        times = np.full(segments, self.times) if np.ndim(self.times) == 0 else self.times
+        if np.shape(times) != (segments,):
+            raise InvalidProblem(
+                "time_per_segment", f"time_per_segment must be one number or a list of {segments}, one per segment."
+            )
+        object.__setattr__(self, "times", frozen(times, (segments,), "time_per_segment"))
+        if (self.times <= 0).any():
+            raise InvalidProblem("time_per_segment", "time_per_segment must be positive.")
+        if self.interpolation == "spline" and len(self.q) > MOST_SPLINE_POINTS:
+            raise InvalidProblem(
+                "interpolation",
+                f"A spline goes through at most {MOST_SPLINE_POINTS} configurations: give more as a trajectory with t.",
+            )
+
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+        return len(self.times)
+
+    def check(self, arm: Arm) -> None:
+        """Raises InvalidProblem or InvalidTable where the motion cannot be this arm's."""
+        _check_joints(arm, self.q, self.first_row)
+
+
+@dataclass(frozen=True)
+class LogBlock:
+    """Consecutive rows of a log: t (n,) [s], q (n, nq) [rad], and v, a where they were logged."""
+
+    t: Array
+    q: Array
+    v: Array | None = None
+    a: Array | None = None
+
+    @property
+    def groups(self) -> dict[str, Array | None]:
+        """The logged columns by name."""
+        return {"q": self.q, "v": self.v, "a": self.a}
+
+
+@dataclass(frozen=True)
+class Log:
+    """A logged trajectory as a stream of blocks, read once. All blocks have the same columns."""
+
+    blocks: Iterable[LogBlock]
+    first_row: int = 0
+
+    def checked(self, arm: Arm) -> Iterator[LogBlock]:
+        """The blocks, with times from the first row's on. Raises InvalidTable at the first row that is wrong."""
+        row, last, origin = self.first_row, -np.inf, None
+        for block in self.blocks:
+            if not len(block.t):
+                continue
+            if row + len(block.t) - self.first_row > MOST_ROWS:
+                raise InvalidTable(f"A trajectory has at most {MOST_ROWS} rows: thin it out or send it in parts.")
+            origin = float(block.t[0]) if origin is None else origin
+            _check_finite(block, row)
+            t = block.t - origin
+            steps = np.diff(t, prepend=last)
+            if (steps < CLOSEST_TIMES).any():
+                at = int(np.argmax(steps < CLOSEST_TIMES))
+                raise InvalidTable(
+                    f"t must increase from row to row by {CLOSEST_TIMES:g} s or more, and does not at row {row + at}: "
+                    "sort the rows and drop repeated ones.",
+                    row + at,
+                    "t",
+                )
+            _check_joints(arm, block.q, row)
+            yield LogBlock(t, block.q, block.v, block.a)
+            row, last = row + len(t), float(t[-1])
+        if row - self.first_row < 2:
+            raise InvalidTable("A trajectory needs two or more rows: there is no motion in fewer.", None, None)
+
+
+def in_blocks(t: Array, q: Array, v: Array | None = None, a: Array | None = None) -> Iterator[LogBlock]:
+    """A log that is in memory, block by block."""
+    for low, high in pairwise([*range(0, len(t), BLOCK), len(t)]):
+        rows = slice(low, high)
+        yield LogBlock(t[rows], q[rows], None if v is None else v[rows], None if a is None else a[rows])
+
+
+def _check_finite(block: LogBlock, first_row: int) -> None:
+    most = {"t": 1e12, "q": np.inf, "v": MOST_SPEED, "a": MOST_ACCELERATION}
+    for name, values in {"t": block.t[:, None], **block.groups}.items():
+        if values is None:
+            continue
+        with np.errstate(invalid="ignore"):
+            wrong = np.argwhere(~(np.isfinite(values) & (np.abs(values) <= most[name])))
+        if len(wrong):
+            row, joint = wrong[0].tolist()
+            column = name if name == "t" else f"{name}{joint + 1}"
+            raise InvalidTable(
+                f"{column} at row {first_row + row} is not finite, or too large to be a robot's: correct it or drop "
+                "the row.",
+                first_row + row,
+                column,
+            )
+
+
+def _check_joints(arm: Arm, q: Array, first_row: int) -> None:
+    if q.shape[1] != arm.robot.nq:
+        raise InvalidProblem("q", f"Every row must have {arm.robot.nq} joint positions, one per joint.")
+    limits = arm.robot.limits
+    wrong = np.argwhere(np.abs(q) > FAR_OUT * np.maximum(np.abs(limits.q_min), np.abs(limits.q_max)))
+    if len(wrong):
+        row, joint = wrong[0].tolist()
+        raise InvalidTable(
+            f"q{joint + 1} at row {first_row + row} is far beyond the joint's range and looks like degrees: give "
+            "radians, or a CSV with units=deg.",
+            first_row + row,
+            f"q{joint + 1}",
+        )

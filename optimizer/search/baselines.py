@@ -1,0 +1,114 @@
+"""What other methods spend between the same ends, and the optimiser's first guesses.
+
+- `trapezoid`: trapezoid of speed, all joints in step, in our duration
+- `quintic`: rest-to-rest quintic, all joints in step, in our duration
+- `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021); knows no torque
+- `ruckig_slowed`: the same path and law, scaled evenly to our duration
+- `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid
+
+All go from the start to the nearest goal, and wait there, each in the time that it leaves of a cycle. A trapezoid's
+acceleration jumps: its jerk is unbounded, so it is never within a jerk limit, and says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.energy.dwell import dwell_energy, holding_power
+from optimizer.energy.losses import breakdown
+from optimizer.problem.problem import Problem
+from optimizer.solution import Baseline, BaselineName, Energy
+from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios
+from optimizer.trajectories.ruckig_motion import time_optimal
+from optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
+
+Torques = Callable[[Array, Array, Array], Array]
+
+
+def baselines(
+    problem: Problem,
+    q_start: Array,
+    q_goals: Array,
+    duration: float,
+    ours: float,
+    torques: Torques,
+    potential: Callable[[Array], float],
+    keeps_path: Callable[[Array, Array], bool],
+) -> list[Baseline]:
+    """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the position limits.
+
+    `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
+    (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
+    `keeps_path` says of samples q, v (k, nq) whether they hit nothing and hold the limits along the path.
+    """
+    motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
+    # one call for all: a compiled kernel works through samples in blocks
+    q, v, a = (np.concatenate([getattr(motion, name) for motion in motions.values()]) for name in ("q", "v", "a"))
+    ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
+    result, hold = [], 0.0
+    if problem.cycle is not None:
+        goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
+        hold = float(holding_power(problem.arm, torques(goal, still, still))[0])
+    for (name, motion), tau in zip(motions.items(), np.split(torques(q, v, a), ends), strict=True):
+        energy = motion_energy(problem, motion, tau, potential)
+        if problem.cycle is not None:
+            energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
+        theirs = energy.electrical.total if problem.objective == "electrical" else energy.mechanical.total
+        result.append(
+            Baseline(
+                name=name,
+                duration=motion.duration,
+                electrical=energy.electrical.total,
+                mechanical=energy.mechanical.total,
+                within_limits=within_limits(problem, motion, tau) and keeps_path(motion.q, motion.v),
+                saving=saving(ours, theirs),
+            )
+        )
+    return result
+
+
+def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
+    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]."""
+    fastest = time_optimal(problem.arm.active_limits, q_start, q_goal)
+    return {
+        "trapezoid": trapezoid(problem, q_start, q_goal, duration),
+        "quintic": quintic(q_start, q_goal, duration),
+        "ruckig": fastest,
+        "ruckig_slowed": fastest.scaled_to(duration),
+        "controller_default": controller_default(problem, q_start, q_goal),
+    }
+
+
+def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:
+    """The goal (nq,) of q_goals (m, nq) that all joints reach first at their speed limits; of equals, least travel."""
+    travel = np.abs(np.asarray(q_goals) - q_start)
+    times = (travel / problem.arm.active_limits.v_max).max(axis=1)
+    # rounded, so that goals that differ by rounding only count as equals
+    return np.asarray(q_goals[np.lexsort((travel.sum(axis=1), np.round(times, 9)))[0]])
+
+
+def saving(ours: float, theirs: float) -> float:
+    """1 - ours / theirs; the sign stays right where regeneration makes theirs negative. 0 where theirs is nothing."""
+    return (theirs - ours) / abs(theirs) if theirs else 0.0
+
+
+def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential: Callable[[Array], float]) -> Energy:
+    """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k, nq)."""
+    return breakdown(motion.weights, motion.v, tau, potential(motion.q[-1]) - potential(motion.q[0]), problem.arm)
+
+
+def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:
+    """Whether a motion holds every limit: its exact peaks of the rates, positions and motor torques at its samples.
+
+    A motion that takes longer than the cycle does not.
+    """
+    if problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE):
+        return False
+    limits = problem.arm.active_limits
+    tau_motor = tau + problem.arm.friction_law.torque(motion.v)
+    jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
+    ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_motor)
+    return all(ratio <= 1 + RATIO_TOLERANCE for ratio in ratios.values())

@@ -1,0 +1,153 @@
+"""Lower bounds: what no motion of any shape and any allowed duration between two configurations can go below.
+
+Each term below is proven in its function's docstring; their sum is minimised over the duration.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.robot import Array, FrictionLaw, Limits
+from optimizer.energy.dwell import linear_dwells
+from optimizer.prepared_problem import Task
+from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from optimizer.trajectories.seven_segment import shortest_duration
+
+# max over x ≥ 0 of x - x² / sqrt(x² + 1), rounded up: what spreading Coulomb friction's jump takes from |v|, in knees
+_KNEE_DEFICIT = 0.3003
+# halvings of the interval that holds the best duration: its width falls below a millionth of itself
+_BISECTIONS = 24
+
+
+def lower_bounds(task: Task, travel: Array, climb: Array, hold: Array | None = None) -> tuple[Array, Array]:
+    """Bounds (P,) on the problem's objective [J] and least durations (P,) [s] for candidates.
+
+    travel (P, nq) [rad] is goal - start, climb (P,) [J] the gain of potential energy, `hold` (P,) [W] what holding the
+    goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds the longest allowed one has
+    the bound inf.
+
+    Waiting draws constant - power · T on each of its linear pieces (see `optimizer.energy.dwell`): there it is a constant and
+    a power less for every second of the motion, and the least over the pieces is a bound for all durations.
+    """
+    problem = task.problem
+    shortest = np.maximum(shortest_duration(travel, problem.arm.active_limits), LEAST_DURATION)
+    t_min = np.maximum(shortest, problem.duration_min or 0.0)
+    t_max = np.full_like(t_min, LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
+    if problem.objective == "mechanical":
+        bound = mechanical(climb)
+    elif problem.cycle is None or hold is None:
+        bound = _least_drawn(task, travel, climb, t_min, t_max, np.zeros_like(climb))
+    else:
+        bound = np.full_like(climb, np.inf)
+        for piece in linear_dwells(problem.cycle, problem.arm, hold):
+            low, high = np.maximum(t_min, piece.t_min), np.minimum(t_max, piece.t_max)
+            value = piece.constant + _least_drawn(task, travel, climb, low, high, piece.power)
+            bound = np.where(low <= high, np.minimum(bound, value), bound)
+    return np.where(t_min > t_max, np.inf, bound), shortest
+
+
+def mechanical(climb: Array) -> Array:
+    """Bound on ∫ Σ |tau_j v_j| dt [J]: it is at least |∫ tau · v dt|, the change of energy between two rests."""
+    return np.abs(climb)
+
+
+def _least_drawn(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array, waiting: Array) -> Array:
+    """`electrical`, and besides what is drawn even where all of the motion's work comes for nothing.
+
+    Where the supply takes nothing back and there is no store, drawn power is never negative; on an isolated bus it is
+    never less than the electronics', for which the joints' surplus does nothing.
+    """
+    arm = task.arm
+    bound = electrical(task, travel, climb, t_min, t_max, waiting)
+    if arm.regeneration > 0 or arm.bus.mode == "storage":
+        return bound
+    rate = (arm.base_power if arm.bus.mode == "isolated" else 0.0) - waiting
+    return np.maximum(bound, np.minimum(rate * t_min, rate * np.maximum(t_max, t_min)))
+
+
+def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array, waiting: Array) -> Array:
+    """Bound on the electrical energy [J] of motions with the given joint travel (P, nq) and climb (P,) [J].
+
+    `waiting` (P,) [W] is what a motion saves by every second that it takes: nothing without a cycle.
+
+    Energy ≥ ∫ P_net dt = base · T + climb + friction + copper + inverter on every bus:
+
+    - shared: drawn = max(P_net, 0) ≥ P_net. With a share below 1 given back, max(P_net, 0) - share · max(-P_net, 0) =
+      P_net + (1 - share) max(-P_net, 0) ≥ P_net. So too for a recuperating bus, whose share is its efficiency.
+    - isolated: drawn = base + Σ max(P_j, 0) ≥ base + Σ P_j = P_net.
+    - storage: with c charged of the net surplus s, total = ∫ (max(P_net, 0) - efficiency · c - share · (s - c)) dt (see
+      `optimizer.bus`) ≥ ∫ P_net dt, as c ≤ s and neither factor exceeds 1. The charge's fall is in the total, so the
+      bound holds whatever the store begins with.
+
+    Copper and inverter ≥ their constants.
+
+    friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
+    The Coulomb part is at least coulomb · |travel|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
+    ∫ g'(h) m(h) dh, ∫ m(h) dh ≥ |travel|, and m(h) ≤ T - 2 t(h), where t(h) ≥ h / a_max (and half a jerk ramp more
+    above half its speed) is the least time from rest to speed h and back. As g' grows, the least integral fills m up to
+    its limit from h = 0 on, until the travel is reached at h = c:
+
+        |travel| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
+
+    This is the value of a linear programme whose right-hand side is linear in T, so it is convex in T, with slope
+    g(c) - c g'(c). Bisection on the slope finds the least sum in [t_min, t_max].
+    """
+    problem = task.problem
+    friction, drives = problem.arm.friction_law, problem.arm.drives
+    base = problem.arm.base_power + float(drives.inverter_constant.sum())
+    base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
+    rate = base - waiting
+    distance = np.abs(travel)
+    cruise = _Cruise(distance, friction, problem.arm.active_limits)
+
+    low, high = t_min.copy(), np.maximum(t_max, t_min)
+    for _ in range(_BISECTIONS):
+        middle = np.sqrt(low * high)
+        rising = rate + cruise.slope(middle) > 0
+        high, low = np.where(rising, middle, high), np.where(rising, low, middle)
+    # convex: the tangent at the lower end stays below the curve up to the upper end
+    value = rate * low + climb + distance @ friction.coulomb + cruise.loss(low)
+    return np.asarray(value + np.minimum(rate + cruise.slope(low), 0.0) * (high - low))
+
+
+class _Cruise:
+    """The least loss ∫ g(|v|) dt of joints that travel `distance` (P, nq) under acceleration and jerk limits."""
+
+    def __init__(self, distance: Array, friction: FrictionLaw, limits: Limits) -> None:
+        self.distance, self.friction, self.a = distance, friction, limits.a_max
+        self.jerk_ramp = limits.a_max / limits.j_max
+        self.ramp_speed = limits.a_max * self.jerk_ramp / 2
+
+    def speed(self, T: Array) -> tuple[Array, Array]:
+        """c (P, nq) for durations T (P,), and the jerk ramp's time that it is subject to."""
+        T = T[:, None]
+        moving = T - self.jerk_ramp
+        room = moving**2 - 4 * (self.distance - self.jerk_ramp * self.ramp_speed) / self.a
+        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(room, 0.0)))
+        without = self.a / 2 * (T - np.sqrt(np.maximum(T**2 - 4 * self.distance / self.a, 0.0)))
+        ramped = with_jerk > self.ramp_speed
+        return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
+
+    def slope(self, T: Array) -> Array:
+        """Derivative (P,) of the loss by T [W]."""
+        c, _ = self.speed(T)
+        law = self.friction
+        # g - c g'
+        return -np.asarray((c * (law.curved * c / np.hypot(c, law.speed) + law.viscous * c)).sum(axis=-1))
+
+    def loss(self, T: Array) -> Array:
+        """The loss (P,) [J], by parts: T g(c) - 2 ∫ g' t dh."""
+        c, ramp = self.speed(T)
+        to_speed = (c * self._g(c) - self._integral(c)) / self.a
+        ramping = ramp / 2 * (self._g(c) - self._g(self.ramp_speed))
+        return np.asarray((T[:, None] * self._g(c) - 2 * (to_speed + ramping)).sum(axis=-1))
+
+    def _g(self, v: Array) -> Array:
+        law = self.friction
+        return np.asarray(v * (law.curved * np.arcsinh(v / law.speed) + law.viscous * v))
+
+    def _integral(self, v: Array) -> Array:
+        """∫_0^v g."""
+        law, s = self.friction, self.friction.speed
+        curved = (v * v / 2 + s * s / 4) * np.arcsinh(v / s) - v * np.hypot(v, s) / 4
+        return np.asarray(law.curved * curved + law.viscous * v**3 / 3)

@@ -1,0 +1,160 @@
+"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the limit grid."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache, cached_property
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import BSpline
+
+from models.robot import Array
+from optimizer.trajectories.quadrature import quadrature
+
+DEGREE = 5
+# at rest (v = a = 0) at both ends: the first and the last three control points coincide
+REST_POINTS = 3
+
+
+# least number of nodes that a motion's cost is summed over, and of points where its peaks are looked for
+LEAST_NODES = 31
+GRID_POINTS = 512
+# points where limits along the path are held; what goes beyond them in between is found afterwards and repaired
+PATH_POINTS = 96
+# parts into which the anchors of speed, acceleration and jerk divide a span: these have degree 4, 3 and 2 there
+ANCHORS = (2, 4, 4)
+
+
+def clamped(breaks: Array) -> Array:
+    """Clamped knots over [0, 1] from breaks (k,) that begin with 0 and end with 1."""
+    return np.concatenate([np.zeros(DEGREE), breaks, np.ones(DEGREE)])
+
+
+def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
+    """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+    n = len(knots) - DEGREE - 1
+    return np.ascontiguousarray(BSpline(knots, np.eye(n), DEGREE)(points, derivative))
+
+
+def greville(knots: Array) -> Array:
+    """Greville points (n,): where a spline's control values stand for its values; it interpolates there uniquely."""
+    n = len(knots) - DEGREE - 1
+    return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
+
+
+def fit(samples: Array, at: Array, knots: Array) -> Array:
+    """Control points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,) in [0, 1]."""
+    matrix = basis_matrix(knots, at)
+    points = np.zeros((matrix.shape[1], samples.shape[1]))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
+    inner = slice(REST_POINTS, len(points) - REST_POINTS)
+    points[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ points, rcond=None)[0]
+    return points
+
+
+def refit(points: Array, knots: Array, onto: Array) -> Array:
+    """Control points (n, r) over the knots `onto` that interpolate the spline of `points` (m, r) over `knots`.
+
+    Exact where `onto` refines `knots`.
+    """
+    x = greville(onto)
+    return np.asarray(np.linalg.solve(basis_matrix(onto, x), basis_matrix(knots, x) @ points), dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """A spline space over [0, 1] of n control points, with everything that does not depend on a request.
+
+    `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, where cost and torque are evaluated;
+    `at_nodes` (3, N, n): basis and its first two derivatives there. `at_grid` (3, M, n): first to third derivative on
+    a grid fine enough to find the peaks of speed, acceleration and jerk; `anchors` (3, M) marks the few of its points
+    per span that hold each derivative down along a stretch at its limit.
+    """
+
+    knots: Array
+    nodes: Array
+    weights: Array
+    at_nodes: Array
+    at_grid: Array
+    anchors: npt.NDArray[np.bool_]
+
+    degree: ClassVar[int] = DEGREE
+    # how many control points rest fixes at either end
+    resting: ClassVar[int] = REST_POINTS
+
+    @property
+    def n(self) -> int:
+        """Number of control points."""
+        return int(self.at_nodes.shape[2])
+
+    @property
+    def free(self) -> slice:
+        """The control points that rest at the ends leaves free."""
+        return slice(self.resting, self.n - self.resting)
+
+    def to_spline(self, points: Array) -> Array:
+        """Control points of the B-spline over `knots` for this space's own: the same here."""
+        return points
+
+    def fit(self, samples: Array, at: Array) -> Array:
+        """Points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,) in [0, 1]."""
+        return fit(samples, at, self.knots)
+
+    @cached_property
+    def at_path(self) -> Array:
+        """Basis and its first derivative (2, PATH_POINTS, n) where limits along the path are held, ends apart."""
+        points = np.linspace(0.0, 1.0, PATH_POINTS + 2)[1:-1]
+        return np.stack([self.matrix(points, d) for d in range(2)])
+
+    def matrix(self, points: Array, derivative: int = 0) -> Array:
+        """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
+        return basis_matrix(self.knots, points, derivative)
+
+    @cached_property
+    def quintic(self) -> Array:
+        """Control values (n,) of the rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which every such space contains."""
+        x = greville(self.knots)
+        values = x**3 * (10 - 15 * x + 6 * x**2)
+        return np.asarray(np.linalg.solve(basis_matrix(self.knots, x), values), dtype=float)
+
+    @staticmethod
+    def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
+        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; knots may be repeated up to three times."""
+        spans = len(np.unique(knots)) - 1
+        nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), 3))
+        edges = np.unique(knots)
+        # a hair off the edges: at a repeated knot jerk jumps, and both of its values count
+        per_span = 4 * max(math.ceil(grid_points / spans / 4), 4)
+        grid = (edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)).ravel()
+        step = np.arange(len(grid)) % (per_span + 1)
+        return Basis(
+            knots=knots,
+            nodes=nodes,
+            weights=weights,
+            at_nodes=np.stack([basis_matrix(knots, nodes, d) for d in range(3)]),
+            at_grid=np.stack([basis_matrix(knots, grid, d) for d in range(1, 4)]),
+            anchors=np.stack([step % (per_span // parts) == 0 for parts in ANCHORS]),
+        )
+
+
+@cache
+def uniform(n: int) -> Basis:
+    """The space of n ≥ 7 control points with evenly spaced knots."""
+    return Basis.of(clamped(np.linspace(0.0, 1.0, n - DEGREE + 1)))
+
+
+def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
+    """A space whose knots are repeated at the switches (k,) and otherwise no further apart than `widest`.
+
+    At a knot repeated twice the third derivative bends, repeated three times it jumps, as jerk does at its limits.
+    """
+    edges = np.concatenate([[0.0], switches[(switches > 1e-3) & (switches < 1 - 1e-3)], [1.0]])
+    breaks = [0.0]
+    for a, b in pairwise(edges):
+        breaks += np.linspace(a, b, math.ceil((b - a) / widest) + 1)[1:-1].tolist()
+        breaks += [b] * (repeat if b < 1.0 else 1)
+    return Basis.of(clamped(np.array(breaks)))

@@ -1,0 +1,30 @@
+"""Values over limits: position, velocity, acceleration, jerk, torque."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.robot import Array, Limits
+
+RATIO_TOLERANCE = 1e-6  # as the certificate's
+
+
+def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, float]:
+    """The worst value / limit over samples and joints; arrays (k, nq), where k may differ between them."""
+    return {name: float(each.max()) for name, each in ratios(limits, q, v, a, jerk, tau_motor).items()}
+
+
+def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, Array]:
+    """Value / limit (k, nq) of every sample and joint; k may differ between the arrays.
+
+    A position's ratio is its distance from the middle of the joint's range over half the range, so that 1 is on a
+    limit, also where the two limits are not opposite.
+    """
+    middle, half = (limits.q_max + limits.q_min) / 2, (limits.q_max - limits.q_min) / 2
+    return {
+        "position": np.abs(q - middle) / half,
+        "velocity": np.abs(v) / limits.v_max,
+        "acceleration": np.abs(a) / limits.a_max,
+        "jerk": np.abs(jerk) / limits.j_max,
+        "torque": np.abs(tau_motor) / limits.tau_max,
+    }

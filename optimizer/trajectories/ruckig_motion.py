@@ -1,0 +1,85 @@
+"""Ruckig's time-optimal motion under limits of speed, acceleration and jerk (Berscheid, Kröger 2021)."""
+
+from __future__ import annotations
+
+import numpy as np
+import ruckig
+
+from models.robot import Array, Limits
+from optimizer.trajectories import bspline
+from optimizer.trajectories.quadrature import lobatto_nodes
+from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.time_scalings import SampledMotion, rest
+
+CLOSEST_BREAKS = (
+    1e-5  # share of a motion: nearer jumps of jerk are one, for rounding would make jerk of its own between them
+)
+
+
+def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
+    """Ruckig's motion from rest to rest, joints ending together, each of up to seven phases of constant jerk.
+
+    Raises RuntimeError should Ruckig find no motion: between configurations at rest there always is one.
+    """
+    found = _ruckig(limits, q_start, q_goal)
+    if found.duration == 0:
+        return rest(q_start, 0.0)
+    profiles = found.profiles[0]
+    tau, weights = lobatto_nodes(_breaks(found))
+    t = tau * found.duration
+    states = np.array([found.at_time(instant) for instant in t.tolist()])
+    return SampledMotion(
+        t=t,
+        weights=weights * found.duration,
+        q=states[:, 0],
+        v=states[:, 1],
+        a=states[:, 2],
+        peak_v=np.abs([profile.v for profile in profiles]).max(axis=1),
+        peak_a=np.abs([profile.a for profile in profiles]).max(axis=1),
+        peak_jerk=np.abs([profile.j for profile in profiles]).max(axis=1),
+    )
+
+
+def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
+    """Ruckig's motion without loss: a spline with threefold knots wherever the jerk of a joint jumps.
+
+    Between equal configurations, which takes Ruckig no time at all, it stands still for a second.
+    """
+    found = _ruckig(limits, q_start, q_goal)
+    if found.duration == 0:
+        return Spline(bspline.DEGREE, bspline.clamped(np.array([0.0, 1.0])), np.tile(q_start, (bspline.DEGREE + 1, 1)))
+    breaks = _breaks(found)
+    inner = breaks[1:-1][np.diff(breaks[:-1]) > CLOSEST_BREAKS]
+    knots = bspline.clamped(np.concatenate([[0.0], np.repeat(inner, 3), [1.0]]))
+    at = bspline.greville(knots)
+    points = np.asarray(np.linalg.solve(bspline.basis_matrix(knots, at), _positions(found, at)), dtype=float)
+    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
+    return Spline(bspline.DEGREE, knots * found.duration, points)
+
+
+def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
+    """Where Ruckig's motion is (k, nq) at the shares `at` (k,) of its duration."""
+    return _positions(_ruckig(limits, q_start, q_goal), at)
+
+
+def _positions(found: ruckig.Trajectory, at: Array) -> Array:
+    return np.array([found.at_time(instant)[0] for instant in (at * found.duration).tolist()])
+
+
+def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
+    given = ruckig.InputParameter(len(q_start))
+    given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()
+    given.max_velocity, given.max_acceleration = limits.v_max.tolist(), limits.a_max.tolist()
+    given.max_jerk = limits.j_max.tolist()
+    found = ruckig.Trajectory(len(q_start))
+    result = ruckig.Ruckig(len(q_start)).calculate(given, found)
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        raise RuntimeError(f"Ruckig found no motion: {result}")
+    return found
+
+
+def _breaks(found: ruckig.Trajectory) -> Array:
+    """Where in [0, 1] the jerk of any joint jumps, both ends included, ascending."""
+    phases = np.array([profile.t for profile in found.profiles[0]])
+    ends = np.append(phases.cumsum(axis=1), [0.0, found.duration]) / found.duration
+    return np.asarray(np.unique(np.round(ends, 12)))

@@ -1,0 +1,96 @@
+"""A motion as a clamped B-spline: samples, quadrature samples, peak rates, retiming."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from models.robot import Array
+from optimizer.trajectories import bspline
+from optimizer.trajectories.quadrature import quadrature
+
+
+@dataclass(frozen=True)
+class Spline:
+    """A clamped B-spline q(t): degree, knots (m,) [s], control points (n, nq) [rad]."""
+
+    degree: int
+    knots: Array
+    control_points: Array
+
+    @property
+    def duration(self) -> float:
+        """Length of the motion [s]."""
+        return float(self.knots[-1])
+
+
+LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
+# points per knot span at which peaks of speed, acceleration and jerk are looked for
+RATE_POINTS = 33
+
+
+def spline_of(basis: bspline.Basis, points: Array, duration: float) -> Spline:
+    """A motion in a spline space: its points (n, nq) there, lasting `duration` [s]."""
+    return Spline(basis.degree, basis.knots * duration, basis.to_spline(points))
+
+
+def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
+    """q, v, a (k, nq) at times t (k,)."""
+    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    return curve(t), curve(t, 1), curve(t, 2)
+
+
+def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, Array]:
+    """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of panels of a knot span at most."""
+    longest = max(min(LONGEST_PANEL, spline.duration / LEAST_PANELS), spline.duration / MOST_PANELS)
+    points, weights = quadrature(spline.knots, per_panel, longest)
+    return weights, *sample(spline, points)
+
+
+def peak_rates(spline: Spline) -> Array:
+    """Greatest absolute speed, acceleration and jerk of every joint, (3, nq).
+
+    Every knot span is expanded around its middle, so that both sides of a repeated knot count, and samples are
+    raised to the vertex of the parabola through their neighbours: exact for a quintic's jerk, which is such a parabola.
+    Samples are denser where the degree is higher.
+    """
+    terms = spline.degree + 1
+    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    edges = np.unique(spline.knots)
+    middle, half = (edges[:-1] + edges[1:]) / 2, np.diff(edges) / 2
+    # the spans as polynomials in x ∈ [-1, 1] around their middles
+    series = np.stack([curve(middle, k) * half[:, None] ** k for k in range(terms)])
+    x = np.linspace(-1.0, 1.0, (RATE_POINTS - 1) * (1 + 3 * max(spline.degree - bspline.DEGREE, 0)) + 1)
+    powers = np.stack([x**k / math.factorial(k) for k in range(terms)], axis=1)
+    peaks = []
+    for d in range(1, 4):
+        values = np.tensordot(powers[:, : terms - d], series[d:], axes=1) / half[:, None] ** d
+        low, top, high = np.abs(values[:-2]), np.abs(values[1:-1]), np.abs(values[2:])
+        bend = 2 * top - low - high
+        # the vertex counts where it lies between the two outer samples
+        vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
+        peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=(0, 1)), (top + vertex).max(axis=(0, 1))))
+    return np.array(peaks)
+
+
+def stretch(ratios: Array) -> float:
+    """The factor on the duration that brings speed, acceleration and jerk, ratios (3, nq) of their limits, to these."""
+    return float((ratios.max(axis=1) ** (1 / np.arange(1, 4))).max())
+
+
+def slowed(spline: Spline, factor: float) -> Spline:
+    """The same path and law in `factor` times the duration."""
+    return replace(spline, knots=spline.knots * factor)
+
+
+# samples of a motion that another is fitted to
+FIT_SAMPLES = 201
+
+
+def sampled(spline: Spline) -> tuple[Array, Array]:
+    """Samples q (k, nq) of a motion at times t (k,), to learn from."""
+    t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
+    return np.asarray(BSpline(spline.knots, spline.control_points, spline.degree)(t)), t

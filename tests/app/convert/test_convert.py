@@ -1,0 +1,88 @@
+"""Poses, bounds and limits on their way from the schema to the optimizer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from pydantic import TypeAdapter
+
+from app.convert.pose import to_matrix
+from app.convert.request import to_problem
+from app.schemas.common import Pose
+from app.schemas.request import OptimizeRequest
+from models.registry import load_robot
+from optimizer.exceptions import InvalidProblem
+from tests.app.requests import move
+
+# of a rotation computed in double precision in two ways
+ROUNDING = 1e-14
+ANGLES = [[0.0, 0.0, 0.0], [0.3, -0.8, 2.1], [np.pi, 0.0, 0.0], [1e-12, 0.0, 1e-9], [-3.0, 1.5707963, 7.0]]
+
+
+def matrix(**pose: Any) -> np.ndarray:
+    return to_matrix(TypeAdapter(Pose).validate_python({"position": [0.1, 0.2, 0.3], **pose}))
+
+
+def problem(**fields: Any) -> Any:
+    request = OptimizeRequest.model_validate(move(**fields))
+    return to_problem(request, request.deadline)
+
+
+@pytest.mark.parametrize("rpy", ANGLES)
+def test_rpy_turns_about_fixed_axes(rpy: list[float]) -> None:
+    T = matrix(rpy=rpy)
+    assert T[:3, :3] == pytest.approx(pin.rpy.rpyToMatrix(*rpy), abs=ROUNDING)
+    assert T[:3, 3].tolist() == [0.1, 0.2, 0.3]
+    assert T[3].tolist() == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize("rotvec", ANGLES)
+def test_rotvec_is_axis_times_angle(rotvec: list[float]) -> None:
+    assert matrix(rotvec=rotvec)[:3, :3] == pytest.approx(pin.exp3(np.array(rotvec)), abs=ROUNDING)
+
+
+def test_quaternion_is_x_y_z_w_and_normalised() -> None:
+    quaternion = np.array([0.1, -0.5, 0.3, 0.8])
+    quaternion /= np.linalg.norm(quaternion)
+    expected = pin.Quaternion(quaternion).toRotationMatrix()
+    assert matrix(quaternion=quaternion.tolist())[:3, :3] == pytest.approx(expected, abs=ROUNDING)
+    assert matrix(quaternion=(1.0005 * quaternion).tolist())[:3, :3] == pytest.approx(expected, abs=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({}, (None, 600.0)),
+        ({"duration": None, "sample_period": 1e-4}, (None, 10.0)),
+        ({"duration": 2}, (2, 2)),
+        ({"duration": {"min": 2.0}}, (2.0, 600.0)),
+        ({"duration": {"min": 1.0, "max": 2.0}}, (1.0, 2.0)),
+        ({"duration": {"max": 2.0}, "objective": "mechanical"}, (None, 2.0)),
+    ],
+)
+def test_durations_are_bounded(fields: dict[str, Any], expected: tuple[float | None, float | None]) -> None:
+    converted = problem(**fields)
+    assert (converted.duration_min, converted.duration_max) == expected
+
+
+def test_one_number_holds_for_every_joint() -> None:
+    limits = problem(limits={"velocity": 2, "position": {"lower": -3, "upper": [3, 3, 2, 3, 3, 3]}}).arm.active_limits
+    robot = load_robot("ur5e").limits
+    assert limits.v_max.tolist() == [2.0] * 6
+    assert limits.q_min.tolist() == [-3.0] * 6
+    assert limits.q_max[2] == 2.0
+    assert limits.tau_max is robot.tau_max
+
+
+def test_limits_must_fit_the_robot() -> None:
+    with pytest.raises(InvalidProblem, match="one number or a list of 6"):
+        problem(limits={"torque": [1.0, 2.0]})
+
+
+def test_payload_inertia_is_symmetric() -> None:
+    payload = problem(payload={"mass": 1, "com": [0, 0, 0.1], "inertia": [3, 0.1, 0.2, 4, 0.3, 5]}).arm.payload
+    assert payload.inertia.tolist() == [[3, 0.1, 0.2], [0.1, 4, 0.3], [0.2, 0.3, 5]]
+    assert problem(payload={"mass": 1, "com": [0, 0, 0.1]}).arm.payload.inertia.tolist() == np.zeros((3, 3)).tolist()

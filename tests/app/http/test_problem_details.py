@@ -1,0 +1,87 @@
+"""Exceptions and what becomes of them, without a server."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.http.problem_details import TABLE, problem_reply, problem_type
+from app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
+from optimizer import exceptions
+from optimizer.exceptions import JoulepathError
+from optimizer.solution import Candidate, Clearance, UnreachableTarget
+
+CANDIDATE = Candidate("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
+COLLIDING = exceptions.CollidingBranch("left/up/flip", 0, np.zeros(6), ("table", "forearm"), 0.02)
+HIT = Clearance(-0.02, -0.02, ("table", "forearm"), 0.5)
+ERRORS: list[JoulepathError] = [
+    exceptions.InvalidProblem("limits.velocity", "limits.velocity must be positive."),
+    exceptions.OutsideLimits("start", "elbow_joint", 4.0, -3.1, 3.1),
+    exceptions.UnknownRobot(["ur5e"]),
+    exceptions.UnreachablePose("goal", 0.1, "The goal pose is out of reach."),
+    exceptions.UnreachablePose("goal", None, "The goal pose is out of reach."),
+    exceptions.NoReachableTarget("start", [UnreachableTarget("start", 0, "The start pose is out of reach.")]),
+    exceptions.SingularPose("goal", 1e-9),
+    exceptions.DurationTooShort(0.8),
+    exceptions.TorqueInfeasible("elbow_joint", 200.0, 150.0),
+    exceptions.NoTrajectory([CANDIDATE]),
+    exceptions.DeadlineExceeded([CANDIDATE]),
+    exceptions.InvalidTable("Times must increase.", 17, "t"),
+    exceptions.StartInCollision([COLLIDING]),
+    exceptions.GoalInCollision([COLLIDING, replace(COLLIDING, depth=0.01)]),
+    exceptions.NoCollisionFreeTrajectory([CANDIDATE], HIT, "left/up/flip", "left/up/no_flip"),
+]
+
+
+def test_none_is_left_out() -> None:
+    def all_kinds(kind: type[JoulepathError]) -> set[type[JoulepathError]]:
+        return set(kind.__subclasses__()).union(*(all_kinds(child) for child in kind.__subclasses__()))
+
+    # a base that only others are made of is never raised
+    assert {type(error) for error in ERRORS} == all_kinds(JoulepathError) - {exceptions.InCollision}
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_survives_pickling(error: JoulepathError) -> None:
+    copy = pickle.loads(pickle.dumps(error))
+    assert type(copy) is type(error)
+    assert str(copy) == str(error)
+    assert repr(vars(copy)) == repr(vars(error))
+
+
+@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
+def test_becomes_a_problem_that_fits_its_schema(error: JoulepathError) -> None:
+    reply = problem_reply(error, "the-id")
+    assert reply.media_type == "application/problem+json"
+    problem = problem_type(error).model_validate_json(reply.body)
+    assert (problem.status, problem.instance, problem.detail) == (reply.status, "the-id", str(error))
+
+
+def test_the_most_special_type_wins() -> None:
+    assert problem_type(ERRORS[1]) is OutsideLimits
+
+
+def test_candidates_are_told() -> None:
+    content = json.loads(problem_reply(exceptions.NoTrajectory([CANDIDATE]), "the-id").body)
+    assert content["candidates"][0]["q_goal"] == [1.0] * 6
+    NoTrajectory.model_validate(content)
+
+
+def test_an_unforeseen_error_keeps_its_message_to_itself() -> None:
+    reply = problem_reply(ZeroDivisionError("secret"), "the-id")
+    assert b"secret" not in reply.body
+    Internal.model_validate_json(reply.body)
+
+
+def test_an_unknown_distance_is_null() -> None:
+    content = json.loads(problem_reply(ERRORS[4], "the-id").body)
+    assert content["distance"] is None
+    UnreachablePose.model_validate(content)
+
+
+def test_every_exception_of_the_table_is_an_error_of_ours() -> None:
+    assert all(kind.__module__ in ("app.errors", "optimizer.exceptions") for kind in TABLE)

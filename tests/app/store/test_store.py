@@ -1,0 +1,207 @@
+"""The store: migrations, several processes at once, answers and their limits, a database that is not there."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import subprocess
+import sys
+from collections.abc import Awaitable, Callable, Iterator
+from datetime import timedelta
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from sqlalchemy import func, select, text, update
+from starlette.testclient import TestClient
+
+from app.exceptions import StoreUnavailable, UnknownAnswer
+from app.schemas import errors as problems
+from app.schemas.answers import KeptAnswer
+from app.store import answers
+from app.store.database import create_database_engine, migrate
+from app.store.store import Store
+from app.store.tables import Answer, Table, now
+from tests.app.databases import Postgres, postgres, why_no_postgres
+from tests.app.live import ROOT, serving
+from tests.app.requests import move
+
+MISSING = why_no_postgres()
+A_DAY = timedelta(days=1)
+MUCH = 1 << 30
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Postgres]:
+    with postgres() as server:
+        yield server
+
+
+@pytest.fixture(
+    params=["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING)))]
+)
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """An empty database."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path}/folder/joulepath.db"
+    server: Postgres = request.getfixturevalue("server")
+    with create_database_engine(server.url).begin() as connection:
+        connection.execute(text("DROP SCHEMA public CASCADE"))
+        connection.execute(text("CREATE SCHEMA public"))
+    return server.url
+
+
+def with_store(url: str, test: Callable[[Store], Awaitable[None]]) -> None:
+    async def run() -> None:
+        store = Store(url)
+        try:
+            await test(store)
+        finally:
+            await store.close()
+
+    asyncio.run(run())
+
+
+def tables(url: str) -> list[Any]:
+    """How the database differs from what the models say."""
+    engine = create_database_engine(url)
+    with engine.connect() as connection:
+        differences = compare_metadata(MigrationContext.configure(connection), Table.metadata)
+    engine.dispose()
+    return list(differences)
+
+
+def test_migrations_make_what_the_models_say(url: str) -> None:
+    migrate(create_database_engine(url))
+    assert tables(url) == []
+    migrate(create_database_engine(url))
+    assert tables(url) == []
+
+
+def test_the_comparison_above_can_fail(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/joulepath.db"
+    engine = create_database_engine(url)
+    migrate(engine)
+    with engine.begin() as connection:
+        connection.execute(text("DROP INDEX ix_answers_study_id"))
+    assert len(tables(url)) == 1
+
+
+def test_several_processes_may_migrate_at_once(url: str) -> None:
+    code = "import sys; from app.store.database import *; migrate(create_database_engine(sys.argv[1]))"
+    processes = [subprocess.Popen([sys.executable, "-c", code, url], cwd=ROOT) for _ in range(4)]
+    assert [process.wait(60) for process in processes] == [0] * 4
+    assert tables(url) == []
+
+
+def test_answers_are_kept_whole(url: str) -> None:
+    body = json.dumps({"energy": [1.5] * 1000, "name": "größte"}).encode()
+
+    async def test(store: Store) -> None:
+        before = now()
+        answer_id = await store.write(partial(answers.put, kind="optimize", body=body))
+        answer, kept = await store.read(partial(answers.get, answer_id=answer_id))
+        assert (answer.kind, kept) == ("optimize", body)
+        assert before <= answer.created <= now()
+        assert answer.size < len(body)
+        with pytest.raises(UnknownAnswer):
+            await store.read(partial(answers.get, answer_id="no\0such"))
+
+    with_store(url, test)
+
+
+def test_the_oldest_answers_make_room(url: str) -> None:
+    async def test(store: Store) -> None:
+        ids = [await store.write(partial(answers.put, kind="optimize", body=b"{}")) for _ in range(5)]
+        size = await store.read(lambda session: session.get_one(Answer, ids[0]).size)
+        await store.write(partial(answers.prune, max_bytes=3 * size, max_age=A_DAY))
+        assert await left(store) == set(ids[2:])
+        await store.write(
+            lambda session: session.execute(
+                update(Answer).where(Answer.id.in_([ids[2], ids[4]])).values(created=now() - 2 * A_DAY)
+            )
+        )
+        await store.write(partial(answers.prune, max_bytes=MUCH, max_age=A_DAY))
+        assert await left(store) == {ids[3]}
+
+    async def left(store: Store) -> set[str]:
+        return set(await store.read(lambda session: session.scalars(select(Answer.id)).all()))
+
+    with_store(url, test)
+
+
+def test_work_that_fails_changes_nothing(url: str) -> None:
+    def fail(session: Any) -> None:
+        answers.put(session, "optimize", b"{}")
+        session.flush()
+        raise ZeroDivisionError
+
+    async def test(store: Store) -> None:
+        with pytest.raises(ZeroDivisionError):
+            await store.write(fail)
+        assert await store.read(lambda session: session.scalar(select(func.count(Answer.id)))) == 0
+
+    with_store(url, test)
+
+
+def test_writers_wait_for_each_other(url: str) -> None:
+    async def test(store: Store) -> None:
+        put = partial(answers.put, kind="optimize", body=b"{}")
+        assert len(set(await asyncio.gather(*(store.write(put) for _ in range(50))))) == 50
+
+    with_store(url, test)
+
+
+def test_answers_over_http(client: TestClient) -> None:
+    store: Store = client.app.state.store  # type: ignore[attr-defined]
+    assert client.portal is not None
+    answer_id = client.portal.call(store.write, partial(answers.put, kind="ik", body=b'{"solutions": [1.5]}'))
+    answer = client.get(f"/answers/{answer_id}")
+    assert answer.status_code == 200, answer.text
+    KeptAnswer.model_validate_json(answer.content)
+    assert answer.json()["answer"] == {"solutions": [1.5]}
+
+
+@pytest.mark.parametrize("id", ["none", "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11", "x" * 5000, "%00", "%ff", "ü"])
+def test_unknown_answer(client: TestClient, id: str) -> None:
+    answer = client.get(f"/answers/{id}")
+    assert answer.status_code == 404
+    problems.UnknownAnswer.model_validate_json(answer.content)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "sqlite:////proc/joulepath.db",
+        "postgresql://tester:secret-word@127.0.0.1:1/postgres",
+        f"sqlite:///{ROOT}/README.md",
+    ],
+)
+def test_without_its_database_the_service_goes_on(url: str) -> None:
+    with serving(workers=1, database_url=url) as server:
+        assert server.post("/optimize", move()).status_code == 200
+        answer = server.get("/answers/none")
+        assert answer.status_code == 503
+        problems.StoreUnavailable.model_validate_json(answer.content)
+        assert int(answer.headers["retry-after"]) > 0
+        errors = [entry for entry in server.logged() if entry["level"] == "error"]
+        assert any("studies" in entry["message"] for entry in errors)
+        assert all(entry["reason"] for entry in errors if entry["message"] == "database unavailable")
+        assert "secret-word" not in str(server.logged())
+        assert server.terminate() == 0
+
+
+@pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+def test_a_database_that_comes_back_is_used_again(server: Postgres) -> None:
+    async def test(store: Store) -> None:
+        answer_id = await store.write(partial(answers.put, kind="ik", body=b"{}"))
+        server.stop()
+        with pytest.raises(StoreUnavailable):
+            await store.read(partial(answers.get, answer_id=answer_id))
+        server.start()
+        assert (await store.read(partial(answers.get, answer_id=answer_id)))[1] == b"{}"
+
+    with_store(server.url, test)

@@ -1,0 +1,266 @@
+"""Ways around: fast checks against the collision model, ways through scenes against dense distances."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.robot import Array
+from optimizer import optimize
+from optimizer.collision.model import CollisionModel
+from optimizer.collision.path_planner import ROOMS, STEP, along, nothing_between, ways_around
+from optimizer.collision.state_validity import FreeSpace
+from optimizer.exceptions import NoTrajectory
+from optimizer.kinematics.forward import joint_placements
+from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.path_constraints import PathLimits, path_limits
+from optimizer.methods.free_spline import LED
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
+from optimizer.problem.tool_cone import ToolCone
+from optimizer.trajectories.spline import sample
+from tests.optimizer.cells import LOADS, arm_in_cell, cell
+from tests.optimizer.moves import ROBOT, problem_with
+
+# s: ample, so that a seed and not the machine's load decides what is found
+AMPLE = 60.0
+DENSE = 0.003  # rad between the configurations at which a way is checked
+DOWN = Rotation.from_euler("x", np.pi).as_matrix()
+REPLAY = 1e-4  # s
+# tasks in which the straight line leads nowhere
+STUCK = ("post", "trap")
+FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+
+
+def at(x: float, y: float, z: float, R: Array | None = None) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = x, y, z
+    if R is not None:
+        T[:3, :3] = R
+    return T
+
+
+def walls(**boxes: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Scene:
+    """A table, and boxes by name, size and middle."""
+    table: Shape = HalfSpace()
+    around = [Obstacle(name, Box(np.array(size)), at(*middle), 0.01) for name, (size, middle) in boxes.items()]
+    return Scene([Obstacle("table", table, at(0, 0, -0.02)), *around])
+
+
+POST = walls(post=((0.08, 0.08, 0.5), (0.5, 0.0, 0.25)))
+SHELF = walls(
+    low=((0.3, 0.8, 0.02), (0.7, 0.0, 0.25)),
+    high=((0.3, 0.8, 0.02), (0.7, 0.0, 0.60)),
+    back=((0.02, 0.8, 0.8), (0.86, 0.0, 0.4)),
+)
+BIN = walls(
+    near=((0.02, 0.4, 0.25), (0.40, 0.3, 0.125)),
+    far=((0.02, 0.4, 0.25), (0.75, 0.3, 0.125)),
+    left=((0.35, 0.02, 0.25), (0.575, 0.1, 0.125)),
+    right=((0.35, 0.02, 0.25), (0.575, 0.5, 0.125)),
+)
+# open towards the base: the TCP starts inside and has to come back out to get past an arm of the U
+TRAP = walls(
+    bottom=((0.02, 0.42, 0.5), (0.75, 0.0, 0.25)),
+    left=((0.30, 0.02, 0.5), (0.60, 0.2, 0.25)),
+    right=((0.30, 0.02, 0.5), (0.60, -0.2, 0.25)),
+)
+TASKS = {
+    "post": (POST, at(0.5, -0.3, 0.15, DOWN), at(0.5, 0.3, 0.15, DOWN)),
+    "shelf": (SHELF, at(0.45, -0.3, 0.12, DOWN), at(0.68, 0.0, 0.42, FORWARD)),
+    "bin": (BIN, at(0.55, -0.3, 0.1, DOWN), at(0.575, 0.3, 0.12, DOWN)),
+    "trap": (TRAP, at(0.6, 0.0, 0.2, DOWN), at(0.55, 0.4, 0.2, DOWN)),
+}
+
+
+def task(name: str) -> tuple[Arm, Array, Array]:
+    """The arm and the ends of least travel that hit nothing."""
+    scene, T_start, T_goal = TASKS[name]
+    arm = Arm(
+        robot=ROBOT,
+        scene=scene,
+        tool=(capsule_between(np.zeros(3), np.array([0, 0, 0.1]), 0.03),),
+        T_flange_tcp=at(0, 0, 0.15),
+    )
+    kinematics, model = inverse_kinematics_for(arm.robot), CollisionModel(arm)
+    ends = []
+    for T in (T_start, T_goal):
+        found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="start")
+        ends.append([s.q for s in found if model.distances(s.q[None])[0].min() > 0])
+    q_start, q_goal = min(
+        ((a, b) for a in ends[0] for b in ends[1]), key=lambda both: float(np.abs(both[1] - both[0]).max())
+    )
+    return arm, q_start, q_goal
+
+
+def between(path: Array) -> Array:
+    """Configurations (k, nq) along a path, DENSE apart."""
+    parts = [np.linspace(a, b, int(np.abs(b - a).max() / DENSE) + 2) for a, b in pairwise(path)]
+    return np.concatenate(parts)
+
+
+def least(arm: Arm, q: Array) -> float:
+    return float(CollisionModel(arm).distances(q, within=0.02)[0].min())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_free_space_agrees_with_the_distances(seed: int) -> None:
+    """Boxes, spheres, cylinders, capsules, meshes and half-spaces, margins too."""
+    arm = arm_in_cell(LOADS[seed], cell(seed))
+    model = CollisionModel(arm)
+    limits = arm.active_limits
+    q = np.random.default_rng(seed).uniform(limits.q_min, limits.q_max, (400, arm.robot.nq))
+    distance = model.distances(q)[0].min(axis=1)
+    for reserve in (0.0, 0.005):
+        space = FreeSpace(arm, model, reserve)
+        free = np.array([space.free(x) for x in q])
+        # Coal ends its search within 1e-6 m
+        clear = np.abs(distance - reserve) > 1e-5
+        assert (free == (distance > reserve))[clear].all()
+        assert 10 < free.sum() < 390
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_ways_hit_nothing(name: str) -> None:
+    arm, q_start, q_goal = task(name)
+    limits = arm.active_limits
+    # there is something in the way
+    assert least(arm, between(np.stack([q_start, q_goal]))) < 0
+    ways = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE)
+    assert ways
+    for way in ways:
+        np.testing.assert_array_equal(way[0], q_start)
+        np.testing.assert_array_equal(way[-1], q_goal)
+        assert (way >= limits.q_min).all() and (way <= limits.q_max).all()
+        assert (way >= np.minimum(q_start, q_goal) - ROOMS[-1]).all()
+        assert (way <= np.maximum(q_start, q_goal) + ROOMS[-1]).all()
+        assert least(arm, between(way)) > 0
+    lengths = [np.linalg.norm(np.diff(way, axis=0) / limits.v_max, axis=1).sum() for way in ways]
+    assert lengths == sorted(lengths)
+
+
+def test_the_same_seed_gives_the_same_ways() -> None:
+    arm, q_start, q_goal = task("post")
+    first, again, other = (ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE, 2, s) for s in (3, 3, 4))
+    assert [way.tolist() for way in first] == [way.tolist() for way in again]
+    assert [way.tolist() for way in first] != [way.tolist() for way in other]
+
+
+def test_two_ways_are_distinct() -> None:
+    arm, q_start, q_goal = task("post")
+    ways = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE, 2)
+    assert len(ways) == 2
+    v_max = arm.active_limits.v_max
+    assert np.abs(along(ways[0], 1.0, v_max)[0] - along(ways[1], 1.0, v_max)[0]).max() > 0.3
+
+
+def test_the_straight_line_is_the_only_way_where_it_is_free() -> None:
+    _, q_start, q_goal = task("post")
+    (way,) = ways_around(Arm(robot=ROBOT), q_start, q_goal, time.perf_counter() + AMPLE)
+    np.testing.assert_array_equal(way, np.stack([q_start, q_goal]))
+
+
+def test_no_way_to_a_goal_that_hits_something() -> None:
+    arm, q_start, q_goal = task("post")
+    through = Scene([*arm.scene.obstacles, Obstacle("plate", Box(np.array([0.2, 0.2, 0.02])), at(0.5, 0.3, 0.2))])
+    blocked = Arm(robot=ROBOT, scene=through, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp)
+    assert ways_around(blocked, q_start, q_goal, time.perf_counter() + AMPLE) == []
+
+
+def walled_in() -> tuple[Arm, Array, Array]:
+    """The task of the post with walls across all that the arm reaches, but for where it stands."""
+    arm, q_start, q_goal = task("post")
+    wall = Obstacle("wall", Box(np.array([3.0, 0.02, 3.0])), at(1.77, 0.0, 1.0))
+    behind = Obstacle("behind", Box(np.array([3.0, 0.02, 3.0])), at(-1.65, 0.0, 1.0))
+    over = Obstacle("over", Box(np.array([0.6, 0.02, 2.0])), at(0.0, 0.0, 1.7))
+    return replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over])), q_start, q_goal
+
+
+def test_no_way_to_a_goal_that_is_walled_in_and_an_answer_by_the_deadline() -> None:
+    closed, q_start, q_goal = walled_in()
+    assert least(closed, q_start[None]) > 0 and least(closed, q_goal[None]) > 0
+    begin = time.perf_counter()
+    assert ways_around(closed, q_start, q_goal, begin + 0.3) == []
+    # a run ends within a few checks of the deadline
+    assert time.perf_counter() - begin < 1.0
+
+
+def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
+    given = {"scene": arm.scene, "tool": arm.tool, "T_flange_tcp": arm.T_flange_tcp}
+    return problem_with(q_start, q_goal, windings=False, **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_motions_get_past_what_is_in_the_way(name: str) -> None:
+    arm, q_start, q_goal = task(name)
+    found = optimize(problem(arm, q_start, q_goal))
+    q = sample(found.trajectory.spline, np.arange(0.0, found.duration, REPLAY))[0]
+    assert least(arm, q) >= 0
+    assert (found.candidates[0].reason == f"converged{LED}") == (name in STUCK)
+
+
+def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
+    with pytest.raises(NoTrajectory) as raised:
+        optimize(problem(*walled_in()))
+    (candidate,) = raised.value.candidates
+    assert candidate.status == "failed"
+    assert any(name in candidate.reason for name in ("wall", "post", "over"))
+
+
+def test_something_stands_between_ways_on_either_side_of_it() -> None:
+    arm, q_start, q_goal = task("post")
+    model, ones = CollisionModel(arm), np.ones(6)
+    (way, *_) = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE)
+    around = along(way, 1.0, ones)[0]
+    through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
+    assert nothing_between(model, around, around)
+    assert not nothing_between(model, around, 2 * through - around)
+
+
+def test_limits_tightened_are_kept() -> None:
+    arm, q_start, q_goal = task("post")
+    limits = arm.active_limits
+    room = 0.5
+    tight = replace(
+        limits,
+        q_min=np.maximum(limits.q_min, np.minimum(q_start, q_goal) - room),
+        q_max=np.minimum(limits.q_max, np.maximum(q_start, q_goal) + room),
+    )
+    for way in ways_around(replace(arm, limits=tight), q_start, q_goal, time.perf_counter() + AMPLE):
+        assert (way >= tight.q_min).all() and (way <= tight.q_max).all()
+
+
+def test_ways_keep_the_tool_within_its_cone() -> None:
+    arm, q_start, q_goal = task("post")
+    cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 0.4)
+    held = replace(arm, tool_cone=cone)
+    tilt = PathLimits(joint_placements(arm.robot.model), path_limits(held))
+
+    def widest(ways: list[Array]) -> float:
+        return max(float(tilt.shares(q := between(way), np.zeros_like(q)).max()) for way in ways)
+
+    free, within = (ways_around(a, q_start, q_goal, time.perf_counter() + AMPLE) for a in (arm, held))
+    assert within
+    assert widest(within) <= 1 + STEP / cone.half_angle
+    assert widest(free) > 1.2
+
+
+def test_samples_along_a_way_rest_at_its_ends_and_round_its_corners() -> None:
+    path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]])
+    q, t = along(path, 3.0, np.array([1.0, 1.0]))
+    assert t[0] == 0 and t[-1] == 3
+    np.testing.assert_array_equal(q[[0, -1]], path[[0, -1]])
+    v = np.gradient(q, t, axis=0)
+    a = np.gradient(v, t, axis=0)
+    # the quintic law's v and a grow with t² and t: by 30 l t²/T³ and 60 l t/T³ at the second sample
+    assert np.abs(v[[0, -1]]).max() < 1e-2 and np.abs(a[[0, -1]]).max() < 0.3
+    # the corner is cut by less than what it is rounded over: 6 % of a length of 3
+    corner = np.linalg.norm(q - path[1], axis=1).min()
+    assert 0.01 < corner < 0.06 * 3
+    assert (np.diff(q, axis=0) >= -1e-12).all()

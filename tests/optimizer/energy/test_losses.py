@@ -1,0 +1,167 @@
+"""Losses, bus power and the breakdown: by hand, against the energy identity, and numpy against CasADi."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array, Drives, Electronics
+from optimizer.energy.losses import breakdown, drawn_power, power_flow, smooth_abs
+from optimizer.problem.arm import Arm
+
+IDENTITY_TOLERANCE = 1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
+ROUTE_TOLERANCE = 1e-12  # relative; numpy and CasADi evaluate the same formulas in another order
+HAND_TOLERANCE = 1e-12  # relative; a few operations in double precision
+
+ROBOT = load_robot("ur5e")
+LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
+    ROBOT.drives,
+    inverter_constant=np.full(6, 0.7),
+    inverter_linear=np.array([0.3, 0.3, 0.3, 0.5, 0.5, 0.5]),
+    inverter_quadratic=np.full(6, 0.02),
+)
+
+
+def arm(drives: Drives, electronics: Electronics = ROBOT.electronics) -> Arm:
+    return Arm(robot=replace(ROBOT, drives=drives, electronics=electronics))
+
+
+def torques(q: Array, v: Array, a: Array) -> Array:
+    """Rigid body and rotor torques (k, nq) by Pinocchio."""
+    data = ROBOT.model.createData()
+    return np.array([pin.rnea(ROBOT.model, data, *state) for state in zip(q, v, a, strict=True)])
+
+
+def closed_motion(duration: float, amplitude: float, samples: int = 4000) -> tuple[Array, Array, Array, Array]:
+    """Weights, q, v, a of a smooth periodic motion; the trapezoid rule over a period is spectrally accurate."""
+    w = 2 * np.pi / duration
+    t = np.arange(samples)[:, None] * duration / samples
+    home = np.array([0.0, -1.2, 1.5, -1.0, -1.5, 0.0])
+    phase, order = np.arange(6) * 0.7, np.array([1, 2, 1, 3, 2, 1])
+    x = order * w * t + phase
+    q, v, a = (amplitude * part for part in (np.sin(x), order * w * np.cos(x), -((order * w) ** 2) * np.sin(x)))
+    return np.full(samples, duration / samples), home + q, v, a
+
+
+@pytest.mark.parametrize("regeneration", [0.0, 0.35, 1.0])
+@pytest.mark.parametrize("amplitude", [0.2, 0.5])
+def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float) -> None:
+    """Back where it began, neither potential nor kinetic energy has changed: every joule is a loss."""
+    weights, q, v, a = closed_motion(duration=2.0, amplitude=amplitude)
+    electronics = replace(ROBOT.electronics, controller_power=11.0, regeneration=regeneration)
+    energy = breakdown(weights, v, torques(q, v, a), 0.0, arm(LOSSY, electronics))
+    electrical = energy.electrical
+    assert electrical.parts_sum == pytest.approx(electrical.total, rel=IDENTITY_TOLERANCE)
+    assert electrical.idle == pytest.approx(2.0 * (36.7 + 11.0), rel=HAND_TOLERANCE)
+    assert electrical.recovered == pytest.approx(-regeneration * electrical.braking, rel=HAND_TOLERANCE, abs=0)
+    if amplitude == 0.5:
+        assert electrical.braking > 1.0  # J: the faster motion does brake, so the identity is tested in full
+    for part in ("friction", "copper", "inverter"):
+        assert getattr(energy.per_joint, part).sum() == pytest.approx(getattr(electrical, part), rel=HAND_TOLERANCE)
+    assert energy.mean_power == pytest.approx(electrical.total / 2.0, rel=HAND_TOLERANCE)
+    assert energy.peak_power >= energy.mean_power
+
+
+def test_parts_add_up_when_energy_is_stored() -> None:
+    """A stretch of the same motion from one moving state to another, by Gauss-Legendre."""
+    duration = 2.0
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    t, weights = (nodes[:, None] + 1) * 0.25, weights * 0.25  # the first half second
+    t = np.vstack([t, [[0.0], [0.5]]])  # and its ends
+    w = 2 * np.pi / duration
+    scale, phase = np.array([0.3, 0.5, 0.4, 0.6, 0.2, 0.5]), np.arange(6) * 0.7
+    q = np.array([0.0, -1.2, 1.5, -1.0, -1.5, 0.0]) + scale * np.sin(w * t + phase)
+    v, a = scale * w * np.cos(w * t + phase), -scale * w * w * np.sin(w * t + phase)
+    data = ROBOT.model.createData()
+    potential = float(np.diff([pin.computePotentialEnergy(ROBOT.model, data, q[i]) for i in (-2, -1)])[0])
+    kinetic = float(np.diff([pin.computeKineticEnergy(ROBOT.model, data, q[i], v[i]) for i in (-2, -1)])[0])
+    tau = torques(q, v, a)[:-2]
+    energy = breakdown(weights, v[:-2], tau, potential, arm(LOSSY), kinetic=kinetic)
+    rotors = 0.5 * ROBOT.drives.rotor_inertia @ (v[-1] ** 2 - v[-2] ** 2)
+    assert abs(rotors) > 0.1  # J: the identity would not hold without the rotors' share of the kinetic energy
+    assert energy.electrical.parts_sum == pytest.approx(energy.electrical.total, rel=IDENTITY_TOLERANCE)
+
+
+def test_constant_power_by_hand() -> None:
+    """One second at constant speed and torque: each term from its own formula, UR5e figures written out."""
+    v, tau = np.zeros((2, 6)), np.zeros((2, 6))
+    v[:, 0], tau[:, 0] = 1.5, 20.0
+    energy = breakdown(np.array([0.25, 0.75]), v, tau, 0.0, arm(LOSSY))
+    friction = float(ROBOT.friction.torque(np.full(6, 1.5))[0])
+    i = (20.0 + friction) / 10.15
+    inverter = 6 * 0.7 + 0.3 * i + 0.02 * i**2  # the constant is paid by every joint
+    electrical, joints = energy.electrical, energy.per_joint
+    assert electrical.friction == pytest.approx(friction * 1.5, rel=HAND_TOLERANCE)
+    assert electrical.copper == pytest.approx(0.36 * i**2, rel=HAND_TOLERANCE)
+    assert electrical.inverter == pytest.approx(inverter, rel=HAND_TOLERANCE)
+    assert joints.shaft == pytest.approx([(20.0 + friction) * 1.5, 0, 0, 0, 0, 0], rel=HAND_TOLERANCE)
+    assert electrical.total == pytest.approx(
+        36.7 + joints.shaft[0] + electrical.copper + electrical.inverter, rel=HAND_TOLERANCE
+    )
+    assert energy.mechanical.per_joint == pytest.approx([30.0, 0, 0, 0, 0, 0], rel=HAND_TOLERANCE)  # without friction
+    assert energy.peak_power == pytest.approx(electrical.total, rel=HAND_TOLERANCE)
+
+
+@pytest.mark.parametrize(("regeneration", "drawn"), [(0.0, 0.0), (0.35, -35.0), (1.0, -100.0)])
+def test_surplus_is_burnt_or_returned(regeneration: float, drawn: float) -> None:
+    """Of 100 W too much the supply takes back the regenerated fraction; a demand of 100 W is always drawn in full."""
+    assert drawn_power(-100.0, regeneration) == pytest.approx(drawn, rel=HAND_TOLERANCE, abs=HAND_TOLERANCE)
+    assert drawn_power(100.0, regeneration) == pytest.approx(100.0, rel=HAND_TOLERANCE)
+
+
+def test_braking_costs_nothing_but_its_losses() -> None:
+    """A joint braking hard, 200 W at the shaft: without regeneration nothing is drawn, and the surplus is reported."""
+    v, tau = np.zeros((1, 6)), np.zeros((1, 6))
+    v[:, 0], tau[:, 0] = 2.0, -100.0
+    flow = power_flow(tau, v, ROBOT.drives, ROBOT.friction)
+    surplus = -(36.7 + flow.joints.sum())
+    assert surplus > 50.0  # W
+    for regeneration in (0.0, 0.5):
+        electronics = replace(ROBOT.electronics, regeneration=regeneration)
+        electrical = breakdown(np.ones(1), v, tau, 0.0, arm(ROBOT.drives, electronics)).electrical
+        assert electrical.braking == pytest.approx(surplus, rel=HAND_TOLERANCE)
+        assert electrical.total == pytest.approx(-regeneration * surplus, rel=HAND_TOLERANCE, abs=1e-12)
+
+
+def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
+    """sqrt(x² + w²) lies above |x| by at most w (at zero), so the optimiser never sees less than what is reported."""
+    net = np.linspace(-80.0, 120.0, 2001)
+    for regeneration in (0.0, 0.35):
+        exact = np.maximum(net, 0.0) - regeneration * np.maximum(-net, 0.0)
+        assert drawn_power(net, regeneration) == pytest.approx(exact, abs=1e-12)  # rounding at some 100 W
+        for width in (10.0, 1.0, 1e-3):
+            excess = drawn_power(net, regeneration, width) - exact
+            assert excess.min() > -1e-12
+            assert excess.max() == pytest.approx((1 - regeneration) * width / 2, rel=1e-9)  # the sample at zero
+    _, q, v, a = closed_motion(duration=2.0, amplitude=0.4, samples=200)
+    tau = torques(q, v, a)
+    exact_loss = power_flow(tau, v, LOSSY, ROBOT.friction).inverter
+    for width in (1.0, 0.1, 1e-3):
+        excess = power_flow(tau, v, LOSSY, ROBOT.friction, width).inverter - exact_loss
+        assert excess.min() >= 0
+        assert (excess <= LOSSY.inverter_linear * width + 1e-12).all()
+    assert smooth_abs(-3.0, 0.0, np) == 3.0
+
+
+@pytest.mark.parametrize("width", [0.0, 0.05])
+def test_casadi_and_numpy_agree(width: float) -> None:
+    """The optimiser and the report use the same lines; the modules they run in must not make a difference."""
+    tau, v = ca.SX.sym("tau", 6), ca.SX.sym("v", 6)
+    flow = power_flow(tau, v, LOSSY, ROBOT.friction, width, ca)
+    net = 36.7 + ca.sum1(flow.joints)
+    outputs = [flow.tau_motor, flow.friction, flow.copper, flow.inverter, flow.shaft, drawn_power(net, 0.2, width, ca)]
+    symbolic = ca.Function("flow", [tau, v], outputs)
+    rng = np.random.default_rng(3)
+    for _ in range(100):
+        torque, speed = rng.uniform(-100.0, 100.0, 6), rng.uniform(-3.0, 3.0, 6)
+        flow = power_flow(torque, speed, LOSSY, ROBOT.friction, width)
+        drawn = drawn_power(36.7 + flow.joints.sum(), 0.2, width)
+        expected = [flow.tau_motor, flow.friction, flow.copper, flow.inverter, flow.shaft, drawn]
+        for ours, theirs in zip(symbolic(torque, speed), expected, strict=True):
+            scale = 1.0 + np.abs(theirs).max()
+            assert np.abs(ours.full().ravel() - theirs).max() <= ROUTE_TOLERANCE * scale

@@ -1,0 +1,144 @@
+"""One candidate from guess to motion: it holds every limit between the nodes too, and says so when it cannot."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import BSpline
+
+from models.robot import Array
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.methods import METHODS, solver_for
+from optimizer.methods import duration_intervals as windows
+from optimizer.methods.method import Attempt, Solver
+from optimizer.prepared_problem import Task
+from optimizer.problem.problem import Problem
+from optimizer.trajectories.seven_segment import shortest_duration
+from optimizer.trajectories.spline import Spline
+from tests.optimizer.moves import (
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    TILTED,
+    fixed,
+    limits,
+    problem,
+    random_moves,
+    torques,
+)
+
+SAMPLES = 3001  # at primes and their like: on nobody's grid
+HELD = 1e-6  # share of a limit, as the certificate's
+ROUNDING = 1e-9
+
+CONDITIONS: list[dict[str, Any]] = [
+    {},
+    {"payload": PAYLOAD, "gravity": TILTED},
+    {"limits": limits(tau_max=[60, 120, 60, 14, 14, 14])},
+    {"limits": limits(v_max=1.0, a_max=3.0, j_max=15.0), "payload": PAYLOAD},
+    {"friction": "coulomb_viscous", "limits": limits(j_max=25.0)},
+]
+
+
+def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any) -> Solver:
+    compile_kernel(ROBOT)
+    task = Task.of(problem(start, goal, **given))
+    window = windows.fastest(task) if fastest else None
+    return solver_for(task, start, goal, time.perf_counter() + wait, window)
+
+
+def spline(attempt: Attempt) -> Spline:
+    assert attempt.status == "solved" and attempt.spline is not None, attempt.reason
+    return attempt.spline
+
+
+def assert_held(task: Problem, motion: Spline) -> None:
+    """Every limit, at samples apart from any grid of the optimiser's, with SciPy's spline and Pinocchio's torques."""
+    own = task.arm.active_limits
+    curve = BSpline(motion.knots, motion.control_points, motion.degree)
+    t = np.linspace(0.0, motion.duration, SAMPLES)
+    q, v, a, jerk = (curve(t, d) for d in range(4))
+    tau = torques(task, q, v, a) + task.arm.friction_law.torque(v)
+    for values, maxima in ((v, own.v_max), (a, own.a_max), (jerk, own.j_max), (tau, own.tau_max)):
+        assert (np.abs(values) <= maxima * (1 + HELD)).all()
+    assert (q >= own.q_min - ROUNDING).all() and (q <= own.q_max + ROUNDING).all()
+    assert np.abs(v[[0, -1]]).max() < 1e-8 and np.abs(a[[0, -1]]).max() < 1e-6
+    assert q[0] == pytest.approx(np.asarray(task.start), abs=ROUNDING)
+    assert q[-1] == pytest.approx(np.asarray(task.goal), abs=ROUNDING)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("objective", ["electrical", "mechanical"])
+def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
+    for (start, goal), given in zip(random_moves(31, len(CONDITIONS)), CONDITIONS, strict=True):
+        own = given.get("limits", ROBOT.limits)
+        longest = None if objective == "electrical" else 2.0 * float(shortest_duration(goal - start, own))
+        mine = solver(start, goal, method=method, objective=objective, duration_max=longest, **given)
+        attempt = mine.solve()
+        if method == "time_scaling" and attempt.status == "infeasible":
+            continue  # a straight line may lead where the arm cannot be held
+        assert_held(mine.task.problem, spline(attempt))
+        assert attempt.iterations > 0 and attempt.solves > 0
+
+
+def test_a_time_scaled_motion_stays_on_its_line() -> None:
+    """Every control point, so every point; each a little further along."""
+    for start, goal in random_moves(32, 4):
+        points = spline(solver(start, goal, method="time_scaling").solve()).control_points
+        travel = goal - start
+        fraction = (points - start) @ travel / (travel @ travel)
+        assert np.abs(points - start - np.outer(fraction, travel)).max() < ROUNDING
+        assert fraction[0] == pytest.approx(0, abs=ROUNDING) and fraction[-1] == pytest.approx(1, abs=ROUNDING)
+
+
+def test_in_haste_the_arm_nearly_reaches_the_shortest_duration() -> None:
+    """With ample torque; never below what the limits allow."""
+    for start, goal in random_moves(33, 4):
+        least = float(shortest_duration(goal - start, ROBOT.limits))
+        mine = solver(start, goal, fastest=True)
+        motion = spline(mine.solve())
+        assert_held(mine.task.problem, motion)
+        assert least * (1 - ROUNDING) <= motion.duration <= 1.03 * least
+
+
+def test_haste_forgets_the_duration_asked_for() -> None:
+    """It tells what would be possible."""
+    quick = spline(solver(START, GOAL, fastest=True).solve()).duration
+    for given in (fixed(0.1), fixed(5.0)):
+        assert spline(solver(START, GOAL, fastest=True, **given).solve()).duration == pytest.approx(quick, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_too_little_time_gives_no_motion(method: str) -> None:
+    least = float(shortest_duration(GOAL - START, ROBOT.limits))
+    attempt = solver(START, GOAL, method=method, **fixed(0.9 * least)).solve()
+    assert attempt.status in ("infeasible", "failed") and attempt.spline is None and attempt.reason
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
+    attempt = solver(START, GOAL, method=method, wait=-1.0).solve()
+    assert attempt.status == "out of time" and attempt.spline is None
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_fixed_duration_is_kept(method: str) -> None:
+    # breeding finds nothing within a tenth of the shortest duration
+    for duration in (1.0, 4.0) if method == "polynomial_ga" else (0.75, 1.0, 4.0):
+        mine = solver(START, GOAL, method=method, **fixed(duration))
+        motion = spline(mine.solve())
+        assert motion.duration == duration
+        assert_held(mine.task.problem, motion)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_going_nowhere_is_a_motion(method: str) -> None:
+    mine = solver(START, START, method=method)
+    motion = spline(mine.solve())
+    assert motion.duration > 0
+    assert np.abs(motion.control_points - START).max() < 0.1
+    assert_held(mine.task.problem, motion)

@@ -1,0 +1,198 @@
+"""What a problem accepts, and that what it refuses names the field as the contract does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem, OutsideLimits
+from optimizer.problem.arm import Payload
+from optimizer.problem.pose import Pose
+from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, problem_with, tcp_pose
+
+ROTATED = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([0.4, 0.1, 0.5])).homogeneous
+
+
+def outside(joint: int, by: float) -> Array:
+    q: Array = GOAL.copy()
+    q[joint] = ROBOT.limits.q_max[joint] + by
+    return q
+
+
+def test_defaults() -> None:
+    """The UR5e without a load, upright, electrical energy, free duration."""
+    task = problem()
+    assert task.arm.robot.name == "ur5e" and task.arm.payload.mass == 0
+    assert task.arm.gravity.tolist() == [0, 0, -9.81]
+    assert (task.method, task.objective, task.duration_min, task.duration_max) == ("bspline", "electrical", None, None)
+    assert task.arm.active_limits is ROBOT.limits and task.arm.friction_law is ROBOT.friction
+    assert (task.windings, task.branch, task.sample_period, task.deadline) == (True, None, 0.008, 10.0)
+    assert (task.arm.T_flange_tcp == np.eye(4)).all()
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"start": np.zeros(5)}, "start.q"),
+        ({"goal": np.zeros((6, 1))}, "goal.q"),
+        ({"goal": [0, 0, 0, 0, 0, math.nan]}, "goal.q"),
+        ({"start": ["a"] * 6}, "start.q"),
+        ({"goal": outside(2, 1e-9)}, "goal.q"),
+        ({"start": -outside(5, 1e-9)}, "start.q"),
+        ({"gravity": [0, 0]}, "gravity"),
+        ({"gravity": [0, 0, math.inf]}, "gravity"),
+        ({"T_flange_tcp": np.diag([1.0, 1.0, -1.0, 1.0])}, "pose"),
+        ({"duration_min": 0.0}, "duration"),
+        ({"duration_max": -1.0}, "duration"),
+        ({"duration_max": math.nan}, "duration"),
+        ({"duration_max": math.inf}, "duration"),
+        ({"duration_min": 2.0, "duration_max": 1.0}, "duration"),
+        ({"objective": "mechanical"}, "duration"),
+        ({"objective": "mechanical", "duration_min": 1.0}, "duration"),
+        ({"sample_period": 0.0}, "sample_period"),
+        ({"sample_period": math.nan}, "sample_period"),
+        ({"deadline": -1.0}, "deadline"),
+        ({"friction": "none such"}, "friction"),
+        ({"limits": limits(v_max=0.0)}, "limits.velocity"),
+        ({"limits": limits(v_max=[1, 1, 1, 1, 1, 4])}, "limits.velocity"),
+        ({"limits": limits(a_max=-1.0)}, "limits.acceleration"),
+        ({"limits": limits(a_max=10.1)}, "limits.acceleration"),
+        ({"limits": limits(j_max=1e6)}, "limits.jerk"),
+        ({"limits": limits(tau_max=150.0)}, "limits.torque"),
+        ({"limits": limits(q_min=-7.0)}, "limits.position"),
+        ({"limits": limits(q_max=7.0)}, "limits.position"),
+        ({"limits": limits(q_min=1.0, q_max=1.0)}, "limits.position"),
+    ],
+    ids=str,
+)
+def test_refusals_name_the_field(given: dict[str, Any], field: str) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        problem(**given)
+    assert refusal.value.field == field
+    assert str(refusal.value).endswith(".") and "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", ["v_max", "a_max", "j_max", "tau_max", "q_min", "q_max"])
+def test_nan_is_no_limit(name: str) -> None:
+    """NaN compares false with everything: a check that asks whether a limit is too large lets it pass."""
+    values = getattr(ROBOT.limits, name).copy()
+    values[3] = math.nan
+    with pytest.raises(InvalidProblem):
+        problem(limits=replace(ROBOT.limits, **{name: values}))
+
+
+@pytest.mark.parametrize("name", ["v_max", "a_max", "j_max", "tau_max", "q_min", "q_max"])
+def test_limits_are_one_per_joint(name: str) -> None:
+    with pytest.raises(InvalidProblem):
+        problem(limits=replace(ROBOT.limits, **{name: getattr(ROBOT.limits, name)[:1]}))
+
+
+def test_a_joint_outside_carries_its_data() -> None:
+    with pytest.raises(OutsideLimits) as refusal:
+        problem(start=outside(2, 0.25))
+    error = refusal.value
+    assert (error.target, error.joint) == ("start", ROBOT.joint_names[2])
+    assert (error.value, error.lower, error.upper) == pytest.approx((math.pi + 0.25, -math.pi, math.pi))
+
+
+def test_tightened_limits_count_for_the_ends() -> None:
+    assert problem(limits=limits(q_max=1.65)).arm.active_limits.q_max[0] == 1.65
+    with pytest.raises(OutsideLimits) as refusal:
+        problem(limits=limits(q_max=1.55))
+    assert (refusal.value.target, refusal.value.joint) == ("start", ROBOT.joint_names[2])
+
+
+def test_limits_may_be_the_robots_own_and_the_ends_on_them() -> None:
+    at_limit = np.where(np.arange(6) % 2 == 0, ROBOT.limits.q_max, ROBOT.limits.q_min)
+    task = problem(goal=at_limit, limits=limits(v_max=ROBOT.limits.v_max * (1 + 1e-10)))
+    assert (np.asarray(task.goal) == at_limit).all()
+
+
+def test_a_mechanical_objective_wants_an_upper_bound_only() -> None:
+    assert problem(objective="mechanical", duration_max=2.0).duration_min is None
+
+
+def test_targets_may_be_lists_poses_and_mixed() -> None:
+    assert np.asarray(problem(start=START.tolist()).start).tolist() == START.tolist()
+    task = problem(start=tcp_pose(START), goal=GOAL)
+    assert isinstance(task.start, Pose) and not isinstance(task.goal, Pose)
+
+
+def test_nothing_can_be_changed_afterwards() -> None:
+    """Neither fields nor the arrays in them, and the caller's own arrays stay the caller's."""
+    start = START.copy()
+    task = problem(start=start)
+    start[0] = 9.0
+    assert np.asarray(task.start)[0] == START[0]
+    with pytest.raises(FrozenInstanceError):
+        task.deadline = 1.0  # type: ignore[misc]
+    for array in (task.start, task.arm.gravity, task.arm.T_flange_tcp, task.arm.payload.com, Pose(ROTATED).T):
+        assert isinstance(array, np.ndarray)
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+
+
+@pytest.mark.parametrize(
+    "T",
+    [
+        np.eye(3),
+        np.where(np.eye(4) == 1, 1.001, 0.0),  # scaled
+        np.diag([1.0, 1.0, -1.0, 1.0]),  # mirrored
+        ROTATED + 1e-6 * np.eye(4)[:, ::-1],  # sheared
+        np.full((4, 4), math.nan),
+        ROTATED[:, ::-1],
+    ],
+    ids=["shape", "scaled", "mirrored", "sheared", "nan", "shuffled"],
+)
+def test_a_pose_must_be_rigid(T: Array) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        Pose(T)
+    assert refusal.value.field == "pose"
+
+
+def test_a_pose_must_be_homogeneous() -> None:
+    """The last row of a homogeneous matrix is 0 0 0 1: a matrix transposed by mistake has its position there."""
+    broken = ROTATED.copy()
+    broken[3, :3], broken[:3, 3] = broken[:3, 3].copy(), 0.0
+    with pytest.raises(InvalidProblem):
+        Pose(broken)
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"mass": -1.0}, "payload.mass"),
+        ({"mass": math.nan}, "payload.mass"),
+        ({"mass": 1.0, "com": [0, 0]}, "payload.com"),
+        ({"mass": 1.0, "com": [0, 0, math.inf]}, "payload.com"),
+        ({"mass": 1.0, "inertia": np.eye(2)}, "payload.inertia"),
+        ({"mass": 1.0, "inertia": np.diag([1.0, 1.0, -1e-3])}, "payload.inertia"),
+        ({"mass": 1.0, "inertia": np.diag([1.0, 1.0, 2.001])}, "payload.inertia"),
+        ({"mass": 1.0, "inertia": np.array([[1.0, 0.5, 0], [0, 1, 0], [0, 0, 1]])}, "payload.inertia"),
+    ],
+    ids=str,
+)
+def test_a_payload_must_be_a_body(given: dict[str, Any], field: str) -> None:
+    """Positive mass, principal moments of inertia that some distribution of mass has, and a symmetric tensor."""
+    with pytest.raises(InvalidProblem) as refusal:
+        Payload(**given)
+    assert refusal.value.field == field
+
+
+def test_bodies_on_the_border_are_bodies() -> None:
+    """A point has no inertia, and of a flat disc one principal moment is the sum of the others."""
+    Payload(mass=3.0)
+    Payload(mass=1.0, inertia=np.diag([0.01, 0.01, 0.02]))
+    Payload(mass=0.0)
+
+
+def test_the_field_can_be_read_by_the_caller_of_problem() -> None:
+    """Everything above is one family: what `Problem` raises is an `InvalidProblem`."""
+    with pytest.raises(InvalidProblem):
+        problem_with(start=outside(0, 1.0), goal=GOAL)

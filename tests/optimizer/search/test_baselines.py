@@ -1,0 +1,320 @@
+"""The baselines' laws of motion against their textbook figures, and what is told about them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import ruckig
+
+from models.registry import load_robot
+from models.robot import Array, Limits
+from optimizer.problem.arm import Payload
+from optimizer.problem.problem import Problem
+from optimizer.search.baselines import baselines, guesses, motion_energy, nearest, saving, within_limits
+from optimizer.solution import Baseline
+from optimizer.trajectories import quadrature
+from optimizer.trajectories.ruckig_motion import time_optimal
+from optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
+from tests.optimizer.moves import problem_with
+
+EXACT = 1e-12  # relative; closed forms in double precision
+# rad; Ruckig solves its phases from polynomial roots and accepts a position within 1e-8 of the target
+RUCKIG_POSITION = 1e-7
+RATE = 1e-9  # relative; Ruckig's states are cubic polynomials evaluated in double precision
+QUADRATURE = 1e-4  # relative; corners of |x| fall inside quadrature panels of a seventieth of the duration
+BALANCE = 1e-6  # relative; shaft power is smooth within panels, but for friction's steep rise near rest
+
+ROBOT = load_robot("ur5e")
+NAMES = ["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]
+START = np.array([0.3, -1.4, 1.6, -0.9, -1.2, 0.5])
+GOAL = START + np.array([0.9, 0.5, -0.7, 0.3, 0.2, -1.0])
+DURATION = 1.3
+PANEL_NODES = 6
+
+
+def problem(start: Array = START, goal: Array = GOAL, **given: Any) -> Problem:
+    return problem_with(**{"start": start, "goal": goal} | given)
+
+
+def limits(**given: float | list[float] | Array) -> Limits:
+    """The robot's limits with some replaced: one number for all joints, or one each."""
+    return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
+
+
+def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Callable[[Array, Array], bool]]:
+    """Torques and potential energy by Pinocchio, and a path without limits."""
+    load = task.arm.payload
+    model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
+    data = model.createData()
+    return (
+        lambda q, v, a: np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]),
+        lambda q: float(pin.computePotentialEnergy(model, data, q)),
+        lambda q, v: True,
+    )
+
+
+def compare(task: Problem, duration: float = DURATION, ours: float = 60.0) -> dict[str, Baseline]:
+    goals = np.asarray(task.goal)[None]
+    return {each.name: each for each in baselines(task, np.asarray(task.start), goals, duration, ours, *oracle(task))}
+
+
+def one_joint(travel: float) -> Array:
+    """A goal to which only the elbow moves."""
+    goal = START.copy()
+    goal[2] -= travel
+    return goal
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_motion_is_what_it_says(name: str) -> None:
+    """Ends, rest, weights; and over every panel the integrals of a and v are the changes of v and q."""
+    motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
+    assert motion.q[0] == pytest.approx(START, abs=EXACT)
+    assert motion.q[-1] == pytest.approx(GOAL, abs=RUCKIG_POSITION)
+    assert np.abs(motion.v[[0, -1]]).max() < RATE
+    assert motion.weights.sum() == pytest.approx(motion.duration, rel=EXACT)
+    shape = (-1, PANEL_NODES, 6)
+    weights = motion.weights.reshape(-1, PANEL_NODES, 1)
+    q, v, a = motion.q.reshape(shape), motion.v.reshape(shape), motion.a.reshape(shape)
+    assert np.abs((weights * v).sum(axis=1) - (q[:, -1] - q[:, 0])).max() < RUCKIG_POSITION
+    assert np.abs((weights * a).sum(axis=1) - (v[:, -1] - v[:, 0])).max() < RUCKIG_POSITION
+    for samples, peak in ((motion.v, motion.peak_v), (motion.a, motion.peak_a)):
+        assert (np.abs(samples).max(axis=0) <= peak * (1 + RATE)).all()
+        # the samples lie at most a seventieth of the duration apart: a parabola's top is missed by less than 1 %
+        assert np.abs(samples).max(axis=0) == pytest.approx(peak, rel=0.01)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_durations(name: str) -> None:
+    own = {
+        "ruckig": time_optimal(problem().arm.active_limits, START, GOAL).duration,
+        "controller_default": controller_default(problem(), START, GOAL).duration,
+    }
+    motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
+    expected = own.get(name, DURATION)
+    assert motion.duration == pytest.approx(expected, rel=EXACT)
+
+
+def test_quintic_peaks() -> None:
+    """1.875 Δ/T, 5.7735 Δ/T², 60 Δ/T³."""
+    motion, travel = quintic(START, GOAL, DURATION), np.abs(GOAL - START)
+    assert motion.peak_v == pytest.approx(1.875 * travel / DURATION, rel=EXACT)
+    assert motion.peak_a == pytest.approx(5.773502691896258 * travel / DURATION**2, rel=EXACT)
+    assert motion.peak_jerk == pytest.approx(60 * travel / DURATION**3, rel=EXACT)
+    assert np.abs(motion.a[[0, -1]]).max() == 0
+
+
+def test_trapezoid_in_thirds() -> None:
+    """Unless a limit objects: 1.5 Δ/T and 4.5 Δ/T²; its jerk is unbounded where a joint moves."""
+    goal = GOAL.copy()
+    goal[4] = START[4]
+    motion, travel = trapezoid(problem(goal=goal), START, goal, DURATION), np.abs(goal - START)
+    assert motion.peak_v == pytest.approx(1.5 * travel / DURATION, rel=EXACT)
+    assert motion.peak_a == pytest.approx(4.5 * travel / DURATION**2, rel=EXACT)
+    assert motion.peak_jerk.tolist() == [math.inf] * 4 + [0.0, math.inf]
+
+
+def test_trapezoid_keeps_to_limits_where_it_can() -> None:
+    """The blend that a limit asks for meets that limit exactly; where speed and acceleration disagree, thirds stay."""
+    goal = one_joint(1.0)
+    slow = trapezoid(problem(goal=goal, limits=limits(v_max=1.2)), START, goal, 1.0)
+    assert slow.peak_v.max() == pytest.approx(1.2, rel=EXACT)
+    lazy = trapezoid(problem(goal=goal, limits=limits(a_max=4.2)), START, goal, 1.0)
+    assert lazy.peak_a.max() == pytest.approx(4.2, rel=1e-9)  # by a square root near its branch point at 4
+    for impossible in (limits(v_max=1.2, a_max=4.2), limits(v_max=0.9), limits(a_max=3.9)):
+        motion = trapezoid(problem(goal=goal, limits=impossible), START, goal, 1.0)
+        assert motion.peak_v.max() == pytest.approx(1.5, rel=EXACT)
+
+
+def test_ruckig_takes_its_textbook_time() -> None:
+    """One joint that reaches all three limits: T = Δ/v + v/a + a/j."""
+    motion = time_optimal(problem().arm.active_limits, START, one_joint(2.5))
+    v, a, j = math.pi, 10.0, 200.0
+    assert motion.duration == pytest.approx(2.5 / v + v / a + a / j, rel=RATE)
+    assert (motion.peak_v[2], motion.peak_a[2], motion.peak_jerk[2]) == pytest.approx((v, a, j), rel=RATE)
+
+
+def test_ruckig_keeps_its_limits_and_its_word() -> None:
+    """Over random moves and limits: no rate above its limit, the leading joint on one, and Ruckig's own duration."""
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        own = limits(v_max=rng.uniform(0.3, 3.0, 6), a_max=rng.uniform(1.0, 10.0, 6), j_max=rng.uniform(10, 200, 6))
+        start, goal = rng.uniform(-3.0, 3.0, (2, 6))
+        motion = time_optimal(problem(start, goal, limits=own).arm.active_limits, start, goal)
+        ratios = np.array([motion.peak_v / own.v_max, motion.peak_a / own.a_max, motion.peak_jerk / own.j_max])
+        assert ratios.max() == pytest.approx(1.0, rel=RATE)
+        given = ruckig.InputParameter(6)
+        given.current_position, given.target_position = start.tolist(), goal.tolist()
+        given.max_velocity, given.max_acceleration = own.v_max.tolist(), own.a_max.tolist()
+        given.max_jerk = own.j_max.tolist()
+        theirs = ruckig.Trajectory(6)
+        ruckig.Ruckig(6).calculate(given, theirs)
+        assert motion.duration == theirs.duration
+
+
+def test_slowing_scales_the_rates() -> None:
+    """Twice the duration: v/2, a/4, jerk/8 on the same path."""
+    motion = time_optimal(problem().arm.active_limits, START, GOAL)
+    slowed = motion.scaled_to(2 * motion.duration)
+    for name, factor in {"q": 1, "t": 2, "weights": 2, "v": 1 / 2, "a": 1 / 4}.items():
+        assert getattr(slowed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
+    for name, factor in {"peak_v": 1 / 2, "peak_a": 1 / 4, "peak_jerk": 1 / 8}.items():
+        assert getattr(slowed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("travel", "duration"),
+    [
+        (2.0, 2.0 / 1.0472 + 1.0472 / 1.3963),  # reaches its speed
+        (0.4, 2 * math.sqrt(0.4 / 1.3963)),  # turns before
+        (1.0472**2 / 1.3963, 2 * 1.0472 / 1.3963),  # just reaches it: both formulas agree
+    ],
+)
+def test_controller_default_duration(travel: float, duration: float) -> None:
+    """A move of one joint, from the UR's default 1.0472 rad/s and 1.3963 rad/s²."""
+    motion = controller_default(problem(), START, one_joint(travel))
+    assert motion.duration == pytest.approx(duration, rel=EXACT)
+    assert motion.peak_a.max() == pytest.approx(1.3963, rel=EXACT)
+    assert motion.peak_v.max() <= 1.0472 * (1 + EXACT)
+
+
+def test_controller_default_is_led_by_one_axis() -> None:
+    """The longest travel sets the pace, the others keep in step on a straight line; tighter limits count."""
+    travel = np.abs(GOAL - START)
+    motion = controller_default(problem(), START, GOAL)
+    assert motion.duration == pytest.approx(travel.max() / 1.0472 + 1.0472 / 1.3963, rel=EXACT)
+    assert motion.peak_v == pytest.approx(1.0472 * travel / travel.max(), rel=EXACT)
+    tight = controller_default(problem(limits=limits(v_max=0.5, a_max=1.0)), START, GOAL)
+    assert tight.duration == pytest.approx(travel.max() / 0.5 + 0.5 / 1.0, rel=EXACT)
+
+
+def test_nearest_goal() -> None:
+    """Least time at the speed limits first, then least travel."""
+    near, turned = GOAL.copy(), GOAL.copy()
+    turned[5] += 2 * math.pi
+    assert nearest(problem(), START, np.array([turned, near])) == pytest.approx(near)
+    detour = near.copy()
+    detour[4] += 0.1  # not the joint that needs longest: the same time, more travel
+    assert nearest(problem(), START, np.array([detour, near])) == pytest.approx(near)
+    other = near.copy()
+    other[5] = START[5]
+    other[3] += 2.0  # less time with a slow last joint, though more travel
+    slow_wrist = problem(limits=limits(v_max=[3, 3, 3, 3, 3, 0.1]))
+    assert nearest(slow_wrist, START, np.array([near, other])) == pytest.approx(other)
+
+
+def test_energies_balance() -> None:
+    """total = sum of parts for every baseline, with payload and tilted gravity."""
+    payload = Payload(mass=3.0, com=np.array([0.0, 0.05, 0.1]), inertia=np.diag([0.01, 0.01, 0.01]))
+    task = problem(payload=payload, gravity=np.array([3.0, -5.0, -7.9]))
+    torques, potential, _ = oracle(task)
+    for motion in guesses(task, START, GOAL, DURATION).values():
+        energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential).electrical
+        assert energy.parts_sum == pytest.approx(energy.total, rel=BALANCE)
+
+
+@pytest.mark.parametrize("friction", list(ROBOT.friction_laws))
+def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
+    """Each law's own loss, ∫ v · friction(v) dt, from the motion's samples."""
+    task = problem(friction=friction)
+    torques, potential, _ = oracle(task)
+    motion = quintic(START, GOAL, DURATION)
+    energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), potential)
+    loss = motion.weights @ (motion.v * ROBOT.friction_laws[friction].torque(motion.v))
+    assert energy.per_joint.friction == pytest.approx(loss, rel=EXACT)
+
+
+def test_energies_are_converged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Against twenty times as many quadrature panels, over random moves."""
+    rng = np.random.default_rng(6)
+    for _ in range(5):
+        start, goal = rng.uniform(-3.0, 3.0, (2, 6))
+        task = problem(start, goal)
+        coarse = compare(task, 2.0)
+        with monkeypatch.context() as patch:
+            patch.setattr(quadrature, "PANELS", 20 * quadrature.PANELS)
+            fine = compare(task, 2.0)
+        for name in NAMES:
+            assert coarse[name].electrical == pytest.approx(fine[name].electrical, rel=QUADRATURE)
+            assert coarse[name].mechanical == pytest.approx(fine[name].mechanical, rel=QUADRATURE)
+
+
+@pytest.mark.parametrize("objective", ["electrical", "mechanical"])
+def test_report(objective: str) -> None:
+    """All five, in order, each with its saving of the objective, however the comparison ends."""
+    task = problem(objective=objective, duration_min=DURATION, duration_max=DURATION)
+    report = compare(task)
+    assert list(report) == NAMES
+    for each in report.values():
+        assert each.saving == pytest.approx(1 - 60.0 / getattr(each, objective), rel=EXACT)
+    assert compare(task, ours=1e6)["quintic"].saving < 0
+
+
+def test_savings_keep_their_sign() -> None:
+    """Regeneration may leave less than nothing to pay; a baseline of no duration has nothing to save."""
+    assert saving(30.0, 60.0) == 0.5
+    assert saving(-2.0, -1.0) == 1.0
+    assert saving(-1.0, -2.0) == -0.5
+    assert saving(5.0, 0.0) == 0.0
+
+
+def test_within_limits_in_time() -> None:
+    """A second and more is comfortable; in less than Ruckig's own time nothing is within the limits."""
+    comfortable, hasty = compare(problem()), compare(problem(), duration=0.5)
+    assert [name for name in NAMES if comfortable[name].within_limits] == ["quintic", "ruckig", "ruckig_slowed"]
+    assert comfortable["ruckig"].duration > 0.5
+    assert [name for name in NAMES if hasty[name].within_limits] == ["ruckig"]
+    assert hasty["ruckig_slowed"].duration == pytest.approx(0.5, rel=EXACT)
+
+
+def test_within_limits_of_torque() -> None:
+    """Ruckig does not know torque: with a torque limit just below its peak it is out, just above it is in."""
+    free = problem()
+    torques, *_ = oracle(free)
+    motion = time_optimal(free.arm.active_limits, START, GOAL)
+    tau = torques(motion.q, motion.v, motion.a)
+    peaks = np.abs(tau + ROBOT.friction.torque(motion.v)).max(axis=0)
+    for factor, inside in ((1 - 1e-5, False), (1 + 1e-5, True)):
+        assert within_limits(problem(limits=limits(tau_max=peaks * factor)), motion, tau) is inside
+
+
+def test_trapezoids_pass_without_a_jerk_limit() -> None:
+    """Only their jerk rules them out; Ruckig then moves without jerk phases."""
+    robot = replace(ROBOT, limits=limits(j_max=math.inf))
+    report = compare(problem(robot=robot))
+    assert all(each.within_limits for each in report.values())
+    bang_bang = time_optimal(problem(robot=robot).arm.active_limits, START, one_joint(0.4))
+    assert bang_bang.duration == pytest.approx(2 * math.sqrt(0.4 / 10.0), rel=RATE)
+
+
+def test_no_travel() -> None:
+    """Where the arm already is: those in our duration hold it there, the others are done at once for nothing."""
+    task = problem(goal=START)
+    report = compare(task)
+    torques, *_ = oracle(task)
+    none = np.zeros((1, 6))
+    current = torques(START[None], none, none)[0] / ROBOT.drives.torque_constant
+    holding = DURATION * (36.7 + ROBOT.drives.copper @ current**2)
+    for name in ("trapezoid", "quintic", "ruckig_slowed"):
+        assert report[name].duration == pytest.approx(DURATION, rel=EXACT)
+        assert report[name].electrical == pytest.approx(holding, rel=EXACT)
+        assert report[name].mechanical == 0
+    for name in ("ruckig", "controller_default"):
+        assert (report[name].duration, report[name].electrical, report[name].saving) == (0, 0, 0)
+    assert all(each.within_limits for each in report.values())
+
+
+def test_next_to_no_travel() -> None:
+    """Down to rounding every figure stays finite."""
+    for travel in (1e-6, 1e-9, 1e-12, 1e-15):
+        goal = START + travel
+        for motion in guesses(problem(goal=goal), START, goal, DURATION).values():
+            assert isinstance(motion, SampledMotion)
+            assert all(np.isfinite(part).all() for part in (motion.t, motion.weights, motion.q, motion.v, motion.a))
+        assert all(math.isfinite(each.saving) for each in compare(problem(goal=goal)).values())
