@@ -1,12 +1,11 @@
 """Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls, cages of bars.
 
-Task `index` of a seed is the first of the draws of (seed, index) that can be solved: neither end hits anything, and a
-planner with ample time finds a way between them.
+PreparedProblem `index` of a seed is the first of the draws of (seed, index) that can be solved: neither end hits
+anything, and a planner with ample time finds a way between them.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import count
@@ -18,7 +17,8 @@ from scipy.spatial.transform import Rotation
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import ways_around
+from optimizer.collision.path_planner import plan_paths
+from optimizer.deadline import Deadline
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.problem.arm import Arm
@@ -57,7 +57,7 @@ class CellTask:
 
 
 def cell_task(seed: int, index: int) -> CellTask:
-    """Task `index` of a seed; the kinds of cells take turns."""
+    """PreparedProblem `index` of a seed; the kinds of cells take turns."""
     cell = CELLS[index % len(CELLS)]
     table = Obstacle("table", Box(np.array([2.0, 2.0, 0.04])), _at(0, 0, -0.03))
     for draw in count():
@@ -74,7 +74,7 @@ def cell_task(seed: int, index: int) -> CellTask:
         q_start = from_[int(rng.integers(len(from_)))]
         # the nearest configuration of the goal that can be come to
         for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
-            if ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE, 1, model=model):
+            if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, model=model):
                 blocked = model.least(np.linspace(q_start, q_goal, 200), 0.0) < 0
                 return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
     raise AssertionError

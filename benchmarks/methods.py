@@ -16,20 +16,20 @@ from optimizer.exceptions import JoulepathError
 from optimizer.methods import METHODS
 from optimizer.optimize import optimize, warm_up
 from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Method, Problem
+from optimizer.problem.problem import MethodName, Problem
 
 # within half a turn of zero, as the paper's poses are [rad]
 RANGE = np.pi
 DEADLINE = 60.0
 
 
-def measure(count: int, seed: int) -> dict[Method, list[tuple[float, float]]]:
+def measure(count: int, seed: int) -> dict[MethodName, list[tuple[float, float]]]:
     """(energy [J], processor time [s]) of every method on `count` random moves; NaN where there is no motion."""
     robot = load_robot("ur5e")
     compile_kernel(robot)
     warm_up(robot.name)
     rng = np.random.default_rng(seed)
-    table: dict[Method, list[tuple[float, float]]] = {method: [] for method in METHODS}
+    table: dict[MethodName, list[tuple[float, float]]] = {method: [] for method in METHODS}
     for start, goal in rng.uniform(-RANGE, RANGE, (count, 2, robot.nq)):
         for method, rows in table.items():
             began = time.process_time()

@@ -60,13 +60,13 @@ class Replay:
 
     duration: float
     energy: Energy
-    shares: dict[str, float]
+    ratios: dict[str, float]
     end_error: float
 
     @property
     def worst(self) -> float:
         """The greatest share of any limit."""
-        return max(self.shares.values())
+        return max(self.ratios.values())
 
 
 def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> Replay:

@@ -24,7 +24,7 @@ from optimizer import Problem, optimize
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.problem.arm import Arm
 from optimizer.replay.evaluate import Evaluation, evaluate
-from optimizer.replay.recording import Configurations
+from optimizer.replay.recording import Waypoints
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "paper.md"
@@ -69,7 +69,7 @@ def configurations() -> Array:
 
 def there_and_back(arm: Arm, q: Array) -> Evaluation:
     """The paper's motion: home, q (6,), home, at constant joint speed."""
-    return evaluate(arm, Configurations(np.array([HOME, q, HOME]), np.array(SECONDS), "linear"))
+    return evaluate(arm, Waypoints(np.array([HOME, q, HOME]), np.array(SECONDS), "linear"))
 
 
 def powers(arm: Arm) -> Array:
@@ -170,7 +170,7 @@ def table_1() -> list[str]:
 
 
 def table_2() -> list[str]:
-    """Configurations, and ours that reaches the same pose exactly and is nearest."""
+    """Waypoints, and ours that reaches the same pose exactly and is nearest."""
     robot = load_robot("ur5e")
     solver = inverse_kinematics_for(robot)
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
-import time
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -28,10 +27,11 @@ from benchmarks.peers.casadi_opti import CasadiOptiGrid
 from benchmarks.tasks import Move, move
 from models.registry import load_robot
 from models.robot import Array, Robot
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.sqp_method import Guess
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.trajectories import bspline
@@ -66,14 +66,16 @@ class Search:
     def __init__(self, task: Move) -> None:
         self.move, self.task = (
             task,
-            Task.of(Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal)),
+            PreparedProblem.of(
+                Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal)
+            ),
         )
         self.best: Spline | None = None
         self.energy = np.inf
 
     def improve(self, guess: Guess) -> float:
         """The energy from a first guess, inf where it leads nowhere; kept if it is the least."""
-        deadline = time.perf_counter() + PATIENCE
+        deadline = Deadline.after(PATIENCE)
         spline = FreeSpline(self.task, self.move.q_start, self.move.q_goal, deadline).improve(guess).spline
         if spline is None:
             return float("inf")

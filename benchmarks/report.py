@@ -196,8 +196,8 @@ def _success(found: Figures) -> list[list[str]]:
         [
             "B-spline's energy over the time-scaled line's, same duration",
             "≤ 1 %",
-            f"at most {found['dearer']:+.2%}",
-            verdict(found["dearer"] <= 0.01),
+            f"at most {found['relative_excess']:+.2%}",
+            verdict(found["relative_excess"] <= 0.01),
             f"{found['compared']} compared",
         ],
     ]

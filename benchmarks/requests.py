@@ -24,7 +24,7 @@ from benchmarks.service import Answer, Client, Service, running
 from benchmarks.tasks import KINDS, Ask, asks
 
 ANSWERED = 0.99  # share that must be answered with a motion
-DEARER = 1e-2  # how far above the time-scaled motion's energy ours may be
+NO_BETTER = 1e-2  # how far above the time-scaled motion's energy ours may be
 PROBLEM = "application/problem+json"
 TOO_SHORT = "duration-too-short"
 
@@ -44,7 +44,7 @@ class Outcome:
     candidates: int = 0
     solves: int = 0
     optimal: bool = False
-    dearer: float | None = None  # ours over the time-scaled motion's energy, minus 1
+    relative_excess: float | None = None  # ours over the time-scaled motion's energy, minus 1
     bytes: int = 0
 
     @property
@@ -74,11 +74,11 @@ def examine(task: Ask, answer: Answer) -> Outcome:
 
 
 def compare_with_line(client: Client, task: Ask, outcome: Outcome, duration: float) -> None:
-    """Ask for the time-scaled motion of the same duration, and note how much dearer ours is."""
+    """Ask for the time-scaled motion of the same duration, and note how much relative_excess ours is."""
     answer = client.optimize({**task.body, "method": "time_scaling", "duration": duration})
     content = answer.content
     if answer.status == 200:
-        outcome.dearer = outcome.energy / objective(content) - 1
+        outcome.relative_excess = outcome.energy / objective(content) - 1
     elif answer.status >= 500 or not answer.headers.get("content-type", "").startswith(PROBLEM):
         outcome.faults.append(f"time scaling: {answer.status}")
 
@@ -105,7 +105,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """The figures of a run."""
     solved = [o for o in outcomes if o.status == 200]
     valid = [o for o in solved if not o.faults]
-    dearer = [o.dearer for o in outcomes if o.dearer is not None]
+    relative_excess = [o.relative_excess for o in outcomes if o.relative_excess is not None]
     return {
         "count": len(outcomes),
         "answered": len(solved),
@@ -124,10 +124,12 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "candidates": Spread.of([o.candidates for o in solved]),
         "solves": Spread.of([o.solves for o in solved]),
         "megabytes": Spread.of([o.bytes / 1e6 for o in solved]),
-        "compared": len(dearer),
-        "dearer": max(dearer, default=0.0),
-        "dearest": max((o for o in outcomes if o.dearer is not None), key=lambda o: o.dearer or 0.0).name
-        if dearer
+        "compared": len(relative_excess),
+        "relative_excess": max(relative_excess, default=0.0),
+        "dearest": max(
+            (o for o in outcomes if o.relative_excess is not None), key=lambda o: o.relative_excess or 0.0
+        ).name
+        if relative_excess
         else "",
     }
 
@@ -137,8 +139,10 @@ def misses(figures: dict[str, Any]) -> list[str]:
     found = list(figures["faults"])
     if figures["share"] < ANSWERED:
         found.append(f"only {figures['share']:.2%} answered with a valid certificate: at least {ANSWERED:.0%} must be")
-    if figures["dearer"] > DEARER:
-        found.append(f"{figures['dearer']:.2%} dearer than the time-scaled motion in {figures['dearest']}")
+    if figures["relative_excess"] > NO_BETTER:
+        found.append(
+            f"{figures['relative_excess']:.2%} relative_excess than the time-scaled motion in {figures['dearest']}"
+        )
     return found
 
 
@@ -162,7 +166,7 @@ def tell(figures: dict[str, Any]) -> None:
     print(f"candidates looked at                   {figures['candidates'].told('', 0)}")
     print(f"programmes solved                      {figures['solves'].told('', 0)}")
     print(
-        f"B-spline over time-scaled, worst       {figures['dearer']:+.2%} of {figures['compared']} compared, "
+        f"B-spline over time-scaled, worst       {figures['relative_excess']:+.2%} of {figures['compared']} compared, "
         f"same duration {figures['dearest'] and '(' + figures['dearest'] + ')'}"
     )
 

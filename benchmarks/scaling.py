@@ -15,13 +15,14 @@ from benchmarks.figures import Spread, exponent
 from benchmarks.tasks import ask, move, moves
 from models.registry import load_robot
 from models.robot import Array, Robot
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.sqp_method import Guess
 from optimizer.optimize import optimize, warm_up
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.pose import Pose
@@ -44,12 +45,12 @@ def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
             points = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
             began = time.perf_counter()
             solver = FreeSpline(
-                Task.of(
+                PreparedProblem.of(
                     Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal)
                 ),
                 task.q_start,
                 task.q_goal,
-                began + PATIENCE,
+                Deadline.after(PATIENCE),
             )
             outcome = solver.improve(Guess(space, points, 0.0))
             walls.append(time.perf_counter() - began)
@@ -70,7 +71,9 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
         for task in (move(seed, 0, robot), *moves(seed, count, robot)):
             began = time.perf_counter()
             problem = Problem(arm=Arm(robot=robot, collisions=False), start=task.q_start, goal=task.q_goal)
-            outcome = FreeSpline(Task.of(problem), task.q_start, task.q_goal, began + PATIENCE).solve()
+            outcome = FreeSpline(
+                PreparedProblem.of(problem), task.q_start, task.q_goal, Deadline.after(PATIENCE)
+            ).solve()
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
             solved += outcome.status == "solved"

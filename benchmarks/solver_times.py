@@ -18,22 +18,23 @@ from benchmarks.figures import Spread
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
 from optimizer.collision.model import CollisionModel
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods import solver_for
-from optimizer.methods.method import Attempt
+from optimizer.methods.method import SolveResult
 from optimizer.nlp.clearance_constraint import RESERVE
 from optimizer.optimize import warm_up
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
-from optimizer.problem.problem import Method, Problem
+from optimizer.problem.problem import MethodName, Problem
 
 PATIENCE = 60.0  # s
-METHODS: tuple[Method, ...] = ("bspline", "time_scaling")
+METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")
 
 
-def solve(move: Move, method: Method, collisions: bool = False) -> tuple[float, Attempt]:
+def solve(move: Move, method: MethodName, collisions: bool = False) -> tuple[float, SolveResult]:
     """Wall time [s] and outcome of one candidate."""
-    task = Task.of(
+    task = PreparedProblem.of(
         Problem(
             arm=Arm(robot=load_robot("ur5e"), collisions=collisions),
             start=move.q_start,
@@ -42,11 +43,11 @@ def solve(move: Move, method: Method, collisions: bool = False) -> tuple[float, 
         )
     )
     began = time.perf_counter()
-    outcome = solver_for(task, move.q_start, move.q_goal, began + PATIENCE).solve()
+    outcome = solver_for(task, move.q_start, move.q_goal, Deadline.after(PATIENCE)).solve()
     return time.perf_counter() - began, outcome
 
 
-def measure(seed: int, count: int, method: Method) -> dict[str, Any]:
+def measure(seed: int, count: int, method: MethodName) -> dict[str, Any]:
     """All tasks of a seed by one method."""
     solve(next(moves(seed, 1)), method)
     runs = [(move, *solve(move, method)) for move in moves(seed, count)]

@@ -46,7 +46,7 @@ class Ask:
 
 
 def move(seed: int, index: int, robot: Robot | None = None) -> Move:
-    """Task `index` of a seed: joint to joint."""
+    """PreparedProblem `index` of a seed: joint to joint."""
     limits = (robot or load_robot("ur5e")).limits
     rng = np.random.default_rng([seed, index])
     lower, upper = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
@@ -60,7 +60,7 @@ def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
 
 
 def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -> Ask:
-    """Task `index` of a seed: a request with default settings between targets that the arm reaches.
+    """PreparedProblem `index` of a seed: a request with default settings between targets that the arm reaches.
 
     A target is the pose, or the joints, of a configuration drawn evenly from the whole joint range, and drawn again
     where the arm would be in itself. Kinds alternate

@@ -22,7 +22,7 @@ from optimizer.optimize import optimize
 from optimizer.pareto import Front, pareto
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf
@@ -32,12 +32,12 @@ __all__ = [
     "AnyOf",
     "Arm",
     "BranchFilter",
+    "ConeOrientedPose",
     "DeadlineExceeded",
     "DurationTooShort",
     "Front",
     "InvalidProblem",
     "JoulepathError",
-    "LoosePose",
     "NoReachableTarget",
     "NoTrajectory",
     "OutsideLimits",

@@ -18,7 +18,7 @@ from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.losses import breakdown
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Single, single
@@ -126,7 +126,7 @@ def _end_error(
     the angle to the nearest orientation allowed.
     """
     T_reached = _tcp(problem, reached, model, data)
-    if isinstance(target, LoosePose):
+    if isinstance(target, ConeOrientedPose):
         position = float(np.linalg.norm(T_reached[:3, 3] - target.position))
         return position, _worst(excess_angle(target, T_reached[:3, :3]), float(np.abs(reached - named).max()))
     if isinstance(target, Pose):

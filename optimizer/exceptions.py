@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from models.robot import Array
-    from optimizer.solution import Candidate, Clearance, UnreachableTarget
+    from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 # arm configurations that an error lists at most: an end of free orientation has hundreds
 MOST_BRANCHES = 64
@@ -124,7 +124,7 @@ class NoReachableTarget(JoulepathError):
     def __init__(self, target: str, unreachable: Sequence[UnreachableTarget]) -> None:
         super().__init__(
             f"The arm can go to none of the {target}'s {len(unreachable)} targets: "
-            "do for one of them what its entry in `unreachable` says."
+            "do for one of them what its candidate in `unreachable` says."
         )
         self.target, self.unreachable = target, list(unreachable)
 
@@ -180,7 +180,7 @@ class TorqueInfeasible(JoulepathError):
 class NoTrajectory(JoulepathError):
     """Every candidate failed; `candidates` tells why."""
 
-    def __init__(self, candidates: Sequence[Candidate]) -> None:
+    def __init__(self, candidates: Sequence[CandidateReport]) -> None:
         super().__init__("No candidate gave a motion within the limits: relax a limit or allow a longer duration.")
         self.candidates = list(candidates)
 
@@ -189,7 +189,7 @@ class NoCollisionFreeTrajectory(NoTrajectory):
     """Every candidate failed, some for what is in the way. `best` is what the motion that came nearest to none runs
     into, `start` and `goal` are its ends' branches; `depth` [m] is how far these bodies would have to part."""
 
-    def __init__(self, candidates: Sequence[Candidate], best: Clearance, start: str, goal: str) -> None:
+    def __init__(self, candidates: Sequence[CandidateReport], best: Clearance, start: str, goal: str) -> None:
         super().__init__(candidates)
         self.args = (
             "No motion was found that hits nothing: clear what `pair` names out of the way, move the start or the "
@@ -202,6 +202,6 @@ class NoCollisionFreeTrajectory(NoTrajectory):
 class DeadlineExceeded(JoulepathError):
     """Nothing verified in time; `candidates` tells how far the search came."""
 
-    def __init__(self, candidates: Sequence[Candidate]) -> None:
+    def __init__(self, candidates: Sequence[CandidateReport]) -> None:
         super().__init__("The deadline passed before any motion was verified: allow a longer deadline.")
         self.candidates = list(candidates)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import AbstractContextManager
 from functools import cache
 
 from threadpoolctl import ThreadpoolController
 
 from models.registry import load_robot
+from optimizer.deadline import Clock
 from optimizer.energy.kernel import kernel_for
 from optimizer.methods import METHODS
 from optimizer.problem.arm import Arm
@@ -16,7 +18,7 @@ from optimizer.search.run import Run
 from optimizer.solution import Solution
 
 
-def optimize(problem: Problem) -> Solution:
+def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
     """Find the motion of least energy between the problem's targets, certified against every limit.
 
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
@@ -24,7 +26,7 @@ def optimize(problem: Problem) -> Solution:
     InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
     """
     with one_thread():
-        return Run(problem).solution()
+        return Run(problem, clock=clock).solution()
 
 
 def one_thread() -> AbstractContextManager[object]:

@@ -23,6 +23,7 @@ from typing import Literal
 
 import numpy as np
 
+from optimizer.deadline import Clock
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
 from optimizer.optimize import one_thread
 from optimizer.problem.problem import Problem
@@ -83,7 +84,7 @@ class _Node:
         return None if self.answer is None else self.answer.trajectory.spline
 
 
-def pareto(problem: Problem, n: int) -> Front:
+def pareto(problem: Problem, n: int, clock: Clock = time.perf_counter) -> Front:
     """The front of the objective's energy over duration, from at most `n` durations (2 … 100).
 
     `problem` bounds the duration or leaves it free; the front ends where the objective is least. The mechanical
@@ -96,14 +97,14 @@ def pareto(problem: Problem, n: int) -> Front:
     if problem.duration_min is not None and problem.duration_min == problem.duration_max:
         raise InvalidProblem("duration", "A front runs over durations: leave duration out or give a range.")
     with one_thread():
-        return _Search(problem, n).front()
+        return _Search(problem, n, clock).front()
 
 
 class _Search:
     """A front being worked on."""
 
-    def __init__(self, problem: Problem, n: int) -> None:
-        self.began = time.perf_counter()
+    def __init__(self, problem: Problem, n: int, clock: Clock) -> None:
+        self.clock, self.began = clock, clock()
         self.problem, self.n = problem, n
         self.nodes: list[_Node] = []
         self.solves = 0
@@ -115,8 +116,8 @@ class _Search:
         self.race.prepare()
         fastest = self.race.fastest()
         if fastest is None:
-            candidates = [entry.report() for entry in self.race.entries]
-            late = time.perf_counter() > self.race.deadline
+            candidates = [candidate.report() for candidate in self.race.candidates]
+            late = self.race.deadline.passed
             raise DeadlineExceeded(candidates) if late else NoTrajectory(candidates)
         spline, problem = fastest[1], self.problem
         if problem.duration_max is not None and spline.duration > problem.duration_max:
@@ -137,7 +138,7 @@ class _Search:
 
     def left(self) -> float:
         """Time left [s]."""
-        return self.began + self.problem.deadline - time.perf_counter()
+        return self.began + self.problem.deadline - self.clock()
 
     def run(self, known: list[Spline], least: float | None = None, most: float | None = None) -> Run:
         """A run between two durations, with its share of the time that is left."""
@@ -153,6 +154,7 @@ class _Search:
                 duration_max=problem.duration_max if most is None else most,
             ),
             known,
+            self.clock,
         )
 
     def solve(self, duration: float, known: list[Spline]) -> _Node:
@@ -163,7 +165,7 @@ class _Search:
         """Work on a run, and note what comes of it; `duration` [s] is where it belongs if nothing does."""
         try:
             answer = run.solution()
-            node = _Node(answer.duration, answer, run.task.objective_of(answer.energy))
+            node = _Node(answer.duration, answer, run.prepared.objective_of(answer.energy))
         except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
             node = _Node(duration, None, reason=str(error))
         self.solves += run.solves
@@ -181,8 +183,8 @@ class _Search:
         self.entered.add(key)
         run = self.run([])
         run.prepare()
-        entry = between(run.task, run.entries, q_start, q_goal)
-        spline = run.fastest_of(entry)
+        candidate = between(run.prepared, run.candidates, q_start, q_goal)
+        spline = run.fastest_of(candidate)
         self.solves += run.solves
         if spline is None or not distinct(left.duration, spline.duration):
             return False
@@ -244,13 +246,13 @@ class _Search:
                 points.append(node.answer)
                 least = node.energy
         if not points:
-            raise DeadlineExceeded([entry.report() for entry in self.race.entries])
+            raise DeadlineExceeded([candidate.report() for candidate in self.race.candidates])
         return Front(
             status="optimal" if complete and all(point.status == "optimal" for point in points) else "feasible",
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],
-            wall_time=time.perf_counter() - self.began,
+            wall_time=self.clock() - self.began,
             nlp_solves=self.solves + self.race.solves,
         )
 

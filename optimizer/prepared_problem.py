@@ -11,36 +11,37 @@ from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.collision.clearance_proof import clearance
 from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.collision.path_planner import ways_around
+from optimizer.collision.path_planner import plan_paths
+from optimizer.deadline import Deadline
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.plant import Plant
 from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import PathLimits, path_limits, path_limits_of
-from optimizer.nlp.clearance_constraint import KeepAway
+from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list, path_constraints_of
+from optimizer.nlp.clearance_constraint import ClearanceConstraint
 from optimizer.problem.problem import Problem
 from optimizer.solution import Clearance, Energy
 from optimizer.trajectories.spline import Spline, sample
 
 # what a second costs where the shortest duration is looked for [W]: a hundred times what energy could make up for
-HASTE = 1e4
+TIME_WEIGHT = 1e4
 # samples at which contact is looked for, and a distance [m] there that leaves no doubt until the certificate
 CONTACT_SAMPLES, CLEAR = 96, 0.02
 # pairs further apart than that [m] are left out of the programme until a motion brings them nearer
 WATCHED = 0.15
 # nearer to something than this beyond the margins [m], a motion is taken to be held off by it
-GRAZING = 5e-3
+NEAR_CONTACT = 5e-3
 # rounding of a share of a limit
 SHARE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
-class Task(Plant):
+class PreparedProblem(Plant):
     """A problem ready to be worked on: shared by all candidates of one request."""
 
     problem: Problem
 
     @classmethod
-    def of(cls, problem: Problem) -> Task:
+    def of(cls, problem: Problem) -> PreparedProblem:
         """The problem, ready to be worked on."""
         return cls(problem.arm, problem)
 
@@ -64,22 +65,24 @@ class Task(Plant):
         return self.parameters(**{self.problem.objective: 1.0})
 
     @cached_property
-    def path(self) -> PathLimits | None:
+    def path(self) -> PathConstraints | None:
         """Limits along the path but for clearance, None where there are none."""
-        return path_limits_of(self.arm)
+        return path_constraints_of(self.arm)
 
-    def guarded(self, pairs: Indices) -> PathLimits:
+    def with_clearance(self, pairs: Indices) -> PathConstraints:
         """Limits along the path, clearance of these pairs of the collision model too."""
-        return PathLimits(self._placements, [*path_limits(self.arm), KeepAway(self.collisions, pairs)])
+        return PathConstraints(
+            self._placements, [*path_constraint_list(self.arm), ClearanceConstraint(self.collisions, pairs)]
+        )
 
-    def near(self, spline: Spline) -> Indices:
+    def active_pairs(self, spline: Spline) -> Indices:
         """The pairs that come so near each other in a motion that they are worth watching."""
-        return np.flatnonzero(self._gaps(spline, WATCHED).min(axis=0) < WATCHED)
+        return np.flatnonzero(self._pair_distances(spline, WATCHED).min(axis=0) < WATCHED)
 
-    def _gaps(self, spline: Spline, within: float) -> Array:
+    def _pair_distances(self, spline: Spline, within: float) -> Array:
         """Distances (CONTACT_SAMPLES, pairs) [m] along a motion, exact up to `within`."""
         q = sample(spline, np.linspace(0.0, spline.duration, CONTACT_SAMPLES))[0]
-        return self.collisions.gaps(self.collisions.frames(q), within=within).distance
+        return self.collisions.pair_distances(self.collisions.frames(q), within=within).distance
 
     @cached_property
     def collisions(self) -> CollisionModel:
@@ -90,14 +93,14 @@ class Task(Plant):
     def _placements(self) -> Array:
         return joint_placements(self.problem.arm.robot.model)
 
-    def ways(self, q_start: Array, q_goal: Array, deadline: float) -> list[Array]:
+    def planned_paths(self, q_start: Array, q_goal: Array, deadline: Deadline) -> list[Array]:
         """Joint paths from q_start to q_goal (nq,) that hit nothing, found before `deadline`; looked for once."""
         key = q_start.tobytes() + q_goal.tobytes()
         if key not in self._ways:
-            self._ways[key] = ways_around(self.arm, q_start, q_goal, deadline, model=self.collisions)
+            self._ways[key] = plan_paths(self.arm, q_start, q_goal, deadline, model=self.collisions)
         return self._ways[key]
 
-    def has_ways(self, q_start: Array, q_goal: Array) -> bool:
+    def has_planned_paths(self, q_start: Array, q_goal: Array) -> bool:
         """Whether ways from q_start to q_goal have been looked for and found."""
         return bool(self._ways.get(q_start.tobytes() + q_goal.tobytes()))
 
@@ -105,15 +108,15 @@ class Task(Plant):
     def _ways(self) -> dict[bytes, list[Array]]:
         return {}
 
-    def grazes(self, q: Array) -> bool:
+    def is_near_contact(self, q: Array) -> bool:
         """Whether q (k, nq) come so near to something that it is likely to keep them from being better."""
-        return self.problem.arm.collisions and self.collisions.least(q, GRAZING) < GRAZING
+        return self.problem.arm.collisions and self.collisions.least(q, NEAR_CONTACT) < NEAR_CONTACT
 
-    def hit(self, spline: Spline) -> Clearance | None:
+    def worst_violation(self, spline: Spline) -> Clearance | None:
         """Where the motion comes nearest, if it is not proven to keep its margins there."""
         if not self.problem.arm.collisions:
             return None
-        gaps = self._gaps(spline, CLEAR)
+        gaps = self._pair_distances(spline, CLEAR)
         least = float(gaps.min(initial=np.inf))
         if least >= CLEAR:
             return None
@@ -124,9 +127,9 @@ class Task(Plant):
         found = clearance(self.collisions, spline)
         return found if found is not None and found.min_clearance < 0 else None
 
-    def keeps_path(self, q: Array, v: Array) -> bool:
+    def satisfies_path_constraints(self, q: Array, v: Array) -> bool:
         """Whether samples q, v (k, nq) hold the limits along the path and, as far as samples tell, hit nothing."""
-        if self.path is not None and (self.path.shares(q, v) > 1 + SHARE_TOLERANCE).any():
+        if self.path is not None and (self.path.ratios(q, v) > 1 + SHARE_TOLERANCE).any():
             return False
         if not self.problem.arm.collisions:
             return True
@@ -135,7 +138,7 @@ class Task(Plant):
     @cached_property
     def fastest_parameters(self) -> Array:
         """Parameters that make the duration the cost; a little energy beside it conditions the programme."""
-        return self.parameters(electrical=1.0, time=HASTE)
+        return self.parameters(electrical=1.0, time=TIME_WEIGHT)
 
     def objective_of(self, energy: Energy) -> float:
         """The part of an energy that is minimised [J]."""

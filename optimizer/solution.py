@@ -128,7 +128,7 @@ CandidateStatus = Literal["solved", "pruned", "infeasible", "failed", "unvisited
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateReport:
     """A start and goal pair: what became of it, its proven bound and the energy found (of the objective) [J].
 
     `start_target` and `goal_target` are indices as in `Branch.target`.
@@ -176,7 +176,7 @@ class Clearance:
     time: float
 
     @property
-    def words(self) -> str:
+    def message(self) -> str:
         """What comes too near what."""
         first, second = self.pair
         return f"{first} and {second} are {max(-self.sampled, 0.0):.4f} m nearer each other than they may be"
@@ -244,7 +244,7 @@ class Solution:
     energy: Energy
     lower_bound: float
     baselines: list[Baseline]
-    candidates: list[Candidate]
+    candidates: list[CandidateReport]
     unreachable: list[UnreachableTarget]
     certificate: Certificate
     solver: SolverReport

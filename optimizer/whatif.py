@@ -10,9 +10,10 @@ import time
 from dataclasses import dataclass, replace
 
 from optimizer.certificate import certify
+from optimizer.deadline import Clock, Deadline
 from optimizer.exceptions import JoulepathError
 from optimizer.optimize import one_thread, optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem, narrowed
 from optimizer.search.run import SLACK, Run
 from optimizer.solution import Certificate, Energy, Solution
@@ -32,30 +33,30 @@ class Changed:
     error: JoulepathError | None
 
 
-def whatif(base: Solution, problem: Problem) -> Changed:
+def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> Changed:
     """Hold the answer `base` against `problem`, the same motion asked of a changed arm of as many joints.
 
     The changed problem is solved on its own. Where the base's motion holds on the changed arm and costs less than what
     was found, it is solved again from that motion: re-optimising never costs more than not to. `problem.deadline` [s]
     holds for all of it.
     """
-    began = time.perf_counter()
-    spline, task = base.trajectory.spline, Task.of(problem)
-    energy = task.energy(spline)
+    deadline = Deadline.after(problem.deadline, clock)
+    spline, prepared = base.trajectory.spline, PreparedProblem.of(problem)
+    energy = prepared.energy(spline)
     asked = narrowed(problem, base.start.target, base.goal.target)
     certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
     try:
-        found = optimize(problem)
+        found = optimize(problem, clock)
     except JoulepathError as error:
         return Changed(energy, certificate, None, error)
-    left = problem.deadline - (time.perf_counter() - began)
-    same, best = task.objective_of(energy), task.objective_of(found.energy)
+    left = deadline.left
+    same, best = prepared.objective_of(energy), prepared.objective_of(found.energy)
     if certificate.valid and same < best * (1 - SLACK) and left > 0:
         try:
             with one_thread():
-                again = Run(replace(problem, deadline=left), [spline]).solution()
+                again = Run(replace(problem, deadline=left), [spline], clock).solution()
         except JoulepathError:
             # too little time was left: the first answer stands
             return Changed(energy, certificate, found, None)
-        found = min(found, again, key=lambda each: task.objective_of(each.energy))
+        found = min(found, again, key=lambda each: prepared.objective_of(each.energy))
     return Changed(energy, certificate, found, None)

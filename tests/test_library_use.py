@@ -19,7 +19,7 @@ PUBLIC = {
     "Front",
     "InvalidProblem",
     "JoulepathError",
-    "LoosePose",
+    "ConeOrientedPose",
     "NoReachableTarget",
     "NoTrajectory",
     "OutsideLimits",

@@ -9,12 +9,15 @@ from app.convert.fields import fields
 from app.convert.solution import _gap, _objective, baseline_fields, to_response
 from app.schemas import request as asked
 from app.schemas.compare import ROW_FIELDS, CompareRequest
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 from optimizer.solution import Solution
 
 
 def to_comparison(
-    request: CompareRequest, request_id: str, found: Mapping[Method, Solution], failed: Mapping[Method, dict[str, Any]]
+    request: CompareRequest,
+    request_id: str,
+    found: Mapping[MethodName, Solution],
+    failed: Mapping[MethodName, dict[str, Any]],
 ) -> dict[str, Any]:
     """The answer of `POST /compare`: what every method found, at least one, or the problem that it met."""
     energies = {method: _objective(request, solution) for method, solution in found.items()}
@@ -52,7 +55,7 @@ def to_comparison(
     }
 
 
-def single(request: CompareRequest, method: Method) -> asked.OptimizeRequest:
+def single(request: CompareRequest, method: MethodName) -> asked.OptimizeRequest:
     """The request to `POST /optimize` that a row of a comparison answers."""
     shared = {name: getattr(request, name) for name in asked.MotionRequest.model_fields}
     # each part has been validated

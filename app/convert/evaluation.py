@@ -13,11 +13,11 @@ from app.convert.motion_csv import FIRST_ROW, MotionCsv
 from app.convert.solution import energy_fields
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, Nearest
 from optimizer.exceptions import InvalidProblem
-from optimizer.replay.evaluate import Evaluation, Samples, Stretch
-from optimizer.replay.recording import Configurations, Log, in_blocks
+from optimizer.replay.evaluate import Evaluation, IntervalEnergy, Samples
+from optimizer.replay.recording import Log, Waypoints, in_blocks
 
 
-def to_motion(request: EvaluateRequest) -> Configurations | Log:
+def to_motion(request: EvaluateRequest) -> Waypoints | Log:
     """The motion of a request. Raises InvalidProblem."""
     if request.trajectory is not None:
         given = request.trajectory
@@ -30,7 +30,7 @@ def to_motion(request: EvaluateRequest) -> Configurations | Log:
     return _configurations(request, np.array(q), 0)
 
 
-def _motion_of_csv(settings: EvaluateCsvSettings, table: MotionCsv) -> Configurations | Log:
+def _motion_of_csv(settings: EvaluateCsvSettings, table: MotionCsv) -> Waypoints | Log:
     if not table.has_time:
         return _configurations(settings, table.configurations(), FIRST_ROW)
     if settings.model_fields_set & {"time_per_segment", "interpolation"}:
@@ -40,10 +40,10 @@ def _motion_of_csv(settings: EvaluateCsvSettings, table: MotionCsv) -> Configura
     return Log(table.log(), FIRST_ROW)
 
 
-def _configurations(settings: EvaluateSettings, q: Any, first_row: int) -> Configurations:
+def _configurations(settings: EvaluateSettings, q: Any, first_row: int) -> Waypoints:
     if settings.time_per_segment is None:
-        raise InvalidProblem("time_per_segment", "Configurations without times need time_per_segment.")
-    return Configurations(q, np.array(settings.time_per_segment), settings.interpolation, first_row)
+        raise InvalidProblem("time_per_segment", "Waypoints without times need time_per_segment.")
+    return Waypoints(q, np.array(settings.time_per_segment), settings.interpolation, first_row)
 
 
 def to_evaluate_response(request_id: str, robot: str, result: Evaluation) -> dict[str, Any]:
@@ -67,7 +67,7 @@ def to_evaluate_response(request_id: str, robot: str, result: Evaluation) -> dic
     }
 
 
-def _stretch(stretch: Stretch) -> dict[str, Any]:
+def _stretch(stretch: IntervalEnergy) -> dict[str, Any]:
     return {
         **fields(stretch, "start", "end"),
         "energy": energy_fields(stretch.energy),

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from optimizer.solution import Candidate, UnreachableTarget
+from optimizer.solution import CandidateReport, UnreachableTarget
 
 
-def candidate_fields(candidate: Candidate) -> dict[str, Any]:
+def candidate_fields(candidate: CandidateReport) -> dict[str, Any]:
     """One entry of `candidates`."""
     ends = ("start", "start_target", "goal", "goal_target", "q_start", "q_goal")
     return fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")

@@ -9,13 +9,13 @@ from app.convert.fields import fields
 from app.convert.scene import carried, to_scene, tool_parts
 from app.schemas.ik import IKRequest
 from models.robot import Robot
-from optimizer.collision.model import Contact
+from optimizer.collision.model import ClosestPair
 from optimizer.kinematics.inverse import IKSolution
 from optimizer.problem.arm import Arm, Payload
 
 
 def to_ik_response(
-    request: IKRequest, request_id: str, solutions: Sequence[IKSolution], contacts: Sequence[Contact]
+    request: IKRequest, request_id: str, solutions: Sequence[IKSolution], contacts: Sequence[ClosestPair]
 ) -> dict[str, Any]:
     """The answer of `POST /ik`."""
     return {

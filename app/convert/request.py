@@ -7,10 +7,10 @@ import numpy as np
 from app.convert.arm import to_arm
 from app.convert.pose import to_matrix, to_rotation
 from app.schemas import request as asked
+from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
 from app.schemas.orientation import InCone
-from app.schemas.orientation import LoosePose as LoosePoseSchema
 from optimizer.problem.branches import BranchFilter
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -57,19 +57,19 @@ def to_target(target: asked.Target) -> Target:
 def _single(target: asked.JointTarget | asked.PoseTarget) -> Single:
     if isinstance(target, asked.JointTarget):
         return np.array(target.q)
-    return _loose(target.pose) if isinstance(target.pose, LoosePoseSchema) else Pose(to_matrix(target.pose))
+    return _loose(target.pose) if isinstance(target.pose, ConeOrientedPoseSchema) else Pose(to_matrix(target.pose))
 
 
-def _loose(pose: LoosePoseSchema) -> LoosePose:
+def _loose(pose: ConeOrientedPoseSchema) -> ConeOrientedPose:
     position, orientation = np.array(pose.position), pose.orientation
     if isinstance(orientation, str):
-        return LoosePose(position)
+        return ConeOrientedPose(position)
     if isinstance(orientation, InCone):
         cone = orientation.cone
-        return LoosePose(position, np.array(cone.axis), np.array(cone.direction), cone.half_angle)
+        return ConeOrientedPose(position, np.array(cone.axis), np.array(cone.direction), cone.half_angle)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = to_rotation(orientation), position
-    return LoosePose.about(Pose(T), np.array(orientation.free_about))
+    return ConeOrientedPose.about(Pose(T), np.array(orientation.free_about))
 
 
 def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]:

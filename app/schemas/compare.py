@@ -10,13 +10,13 @@ from pydantic_core import PydanticCustomError
 from app.schemas.common import Response, described, part
 from app.schemas.request import MotionRequest
 from app.schemas.response import Baseline, OptimizeResponse
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 
-ALL: list[Method] = list(get_args(Method))
+ALL: list[MethodName] = list(get_args(MethodName))
 _PROBLEM = {"type": "/problems/duration-too-short", "title": "Duration too short", "status": 422}
 
 
-def _different(methods: list[Method]) -> list[Method]:
+def _different(methods: list[MethodName]) -> list[MethodName]:
     if len(set(methods)) < len(methods):
         raise PydanticCustomError("repeated", "Give each method once")
     return methods
@@ -25,7 +25,7 @@ def _different(methods: list[Method]) -> list[Method]:
 class CompareRequest(MotionRequest):
     """A motion from rest at `start` to rest at `goal`, by several methods; `deadline` is for all of them together."""
 
-    methods: Annotated[list[Method], Field(min_length=1), AfterValidator(_different)] = described(
+    methods: Annotated[list[MethodName], Field(min_length=1), AfterValidator(_different)] = described(
         "Methods to compare; the table keeps their order.", None, ["bspline", "lagrange"], default=ALL
     )
     answers: bool = described(
@@ -36,7 +36,7 @@ class CompareRequest(MotionRequest):
 class Row(Response):
     """One method: what it found, or, in `problem`, why nothing; then the other figures are null."""
 
-    method: Method = described("The method.", None, "lagrange")
+    method: MethodName = described("The method.", None, "lagrange")
     status: Literal["optimal", "feasible"] | None = described("As `POST /optimize` answers it.", None, "optimal")
     duration: float | None = described("Length of the motion.", "s", 2.29)
     electrical: float | None = described("Energy drawn from the bus.", "J", 161.0)
@@ -72,6 +72,6 @@ class CompareResponse(Response):
         "J",
         146.6,
     )
-    best: Method = described("The method of least energy.", None, "bspline")
+    best: MethodName = described("The method of least energy.", None, "bspline")
     methods: Annotated[list[Row], Field(min_length=1)] = part("A row per method, in the order asked for.")
     baselines: Annotated[list[Baseline], Field(min_length=1)] = part("What others spend, against the best method.")

@@ -318,7 +318,7 @@ class MethodNotAllowed(Problem):
     """The path does not take that HTTP method. Use one from the `Allow` header."""
 
     type: Literal["/problems/method-not-allowed"] = _fixed("/problems/method-not-allowed", "type")
-    title: Literal["Method not allowed"] = _fixed("Method not allowed", "title")
+    title: Literal["MethodName not allowed"] = _fixed("MethodName not allowed", "title")
     status: Literal[405] = _fixed(405, "status")
 
 

@@ -130,7 +130,7 @@ class MotionEnergy(Response):
     mean_power: float = described("Mean power drawn from the supply.", "W", 51.0)
 
 
-class Stretch(Response):
+class IntervalEnergy(Response):
     """A segment of the motion, or all of it."""
 
     start: float = described("When it starts, from the motion's start.", "s", 0.0)
@@ -205,8 +205,8 @@ class EvaluateResponse(Response):
     )
     robot: str = described("Name of the robot.", None, "ur5e")
     duration: float = described("Duration of the motion.", "s", 3.0)
-    total: Stretch = part("The motion as a whole.")
-    segments: list[Stretch] = part(
+    total: IntervalEnergy = part("The motion as a whole.")
+    segments: list[IntervalEnergy] = part(
         "Its segments from configuration to configuration, or the whole of a trajectory; empty where there are more "
         "than ten thousand."
     )

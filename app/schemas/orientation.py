@@ -97,7 +97,7 @@ Orientation = Annotated[
 ]
 
 
-class LoosePose(Positioned):
+class ConeOrientedPose(Positioned):
     """A position, and an orientation that is free in part."""
 
     orientation: Orientation = described(
@@ -112,6 +112,6 @@ TargetPose = Annotated[
     Annotated[QuaternionPose, Tag("by quaternion")]
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")]
-    | Annotated[LoosePose, Tag("by orientation")],
+    | Annotated[ConeOrientedPose, Tag("by orientation")],
     by_field("quaternion", "rpy", "rotvec", "orientation"),
 ]

@@ -10,7 +10,7 @@ from pydantic import Field
 from app.schemas.answers import KeptAnswer
 from app.schemas.common import Response, described, part
 from app.schemas.request import MAX_DURATION, DurationRange, OptimizeRequest
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 
 _HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 _LABEL = "left/up/no_flip"
@@ -80,7 +80,7 @@ class ParetoResponse(Response):
         "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
     )
     robot: str = described("Name of the robot.", None, "ur5e")
-    method: Method = described("How the motions are parametrised.", None, "bspline")
+    method: MethodName = described("How the motions are parametrised.", None, "bspline")
     objective: Literal["electrical", "mechanical"] = described("Whose energy it is.", None, "electrical")
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: every duration chosen was solved, every point is optimal. `feasible`: verified, but cut short.",

@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 
 MAX_DURATION = 600.0
 """Longest motion [s]."""
@@ -196,7 +196,7 @@ class MotionRequest(ArmRequest):
 class OptimizeRequest(MotionRequest):
     """A motion from rest at `start` to rest at `goal`, by one method."""
 
-    method: Method = described(
+    method: MethodName = described(
         "How the motion is parametrised. `bspline`: every joint a free B-spline. `time_scaling`: the straight line in "
         "joint space with an optimised time law. `lagrange`: every joint one polynomial, by its values at Chebyshev "
         "nodes. `uniform_scaling`: the time-optimal motion slowed evenly. `polynomial_ga`: one polynomial each, bred "

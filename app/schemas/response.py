@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.common import Response, described, part
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 
 Joints = list[float]
 Samples = list[float]
@@ -236,7 +236,7 @@ class OptimizeResponse(Response):
         "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
     )
     robot: str = described("Name of the robot.", None, "ur5e")
-    method: Method = described("How the motion is parametrised.", None, "bspline")
+    method: MethodName = described("How the motion is parametrised.", None, "bspline")
     objective: Literal["electrical", "mechanical"] = described("What was minimised.", None, "electrical")
     duration: float = described("Length of the motion.", "s", 1.8)
     status: Literal["optimal", "feasible"] = described(

@@ -17,7 +17,7 @@ from app.tasks.task import answer, json_reply
 from optimizer.exceptions import JoulepathError
 from optimizer.methods import METHODS
 from optimizer.optimize import optimize
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 from optimizer.solution import Solution
 
 # a method whose share has been used up by others still says so itself [s]
@@ -40,8 +40,8 @@ class CompareTask:
         return answer(self.request_id, lambda: self._compare(time.perf_counter() + deadline))
 
     def _compare(self, end: float) -> Reply:
-        found: dict[Method, Solution] = {}
-        replies: dict[Method, Reply] = {}
+        found: dict[MethodName, Solution] = {}
+        replies: dict[MethodName, Reply] = {}
         waiting = [method for method in METHODS if method in self.request.methods]
         while waiting:
             share = max(end - time.perf_counter(), 0.0) / len(waiting)
@@ -56,5 +56,7 @@ class CompareTask:
             found[method] = solution
         if not found:
             return replies[self.request.methods[0]]
-        failed: dict[Method, dict[str, Any]] = {method: orjson.loads(reply.body) for method, reply in replies.items()}
+        failed: dict[MethodName, dict[str, Any]] = {
+            method: orjson.loads(reply.body) for method, reply in replies.items()
+        }
         return json_reply(to_comparison(self.request, self.request_id, found, failed))

@@ -14,7 +14,7 @@ from app.convert.request import to_problem
 from app.convert.solution import to_response
 from app.engine.reply import Reply
 from app.schemas.pareto import ParetoRequest
-from app.tasks.stored_answers import Shelf
+from app.tasks.stored_answers import AnswerCollector
 from app.tasks.task import answer
 from optimizer.pareto import Front, pareto
 from optimizer.solution import Solution
@@ -34,7 +34,7 @@ class ParetoTask:
 
     def _solve(self, deadline: float) -> Reply:
         front = pareto(to_problem(self.request, deadline), self.request.points)
-        shelf = Shelf()
+        shelf = AnswerCollector()
         points = [self._point(point, shelf) for point in front.points]
         if self.wanted == "csv":
             return Reply(200, _table(points).encode(), {"Content-Type": "text/csv; charset=utf-8"}, shelf.kept())
@@ -51,7 +51,7 @@ class ParetoTask:
             "solver": fields(front, "wall_time", "nlp_solves"),
         }
 
-    def _point(self, point: Solution, shelf: Shelf) -> dict[str, Any]:
+    def _point(self, point: Solution, shelf: AnswerCollector) -> dict[str, Any]:
         energy = point.energy
         totals = {"electrical": energy.electrical.total, "mechanical": energy.mechanical.total}
         return {

@@ -11,7 +11,7 @@ MOST_BYTES = 1 << 27
 """Of all answers that one refers to, before they are compressed."""
 
 
-class Shelf:
+class AnswerCollector:
     """Collects whole answers for a reply that refers to them."""
 
     def __init__(self) -> None:

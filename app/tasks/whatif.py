@@ -19,7 +19,7 @@ from app.http.problem_details import problem_reply
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import Change, WhatifRequest
-from app.tasks.stored_answers import Shelf
+from app.tasks.stored_answers import AnswerCollector
 from app.tasks.task import answer, json_reply
 from optimizer.certificate import ENERGY_FLOOR
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
@@ -58,7 +58,7 @@ class _Work:
         self.began = time.perf_counter()
         self.end = self.began + deadline
         self.runs = 1 + len(request.changes)
-        self.shelf = Shelf()
+        self.shelf = AnswerCollector()
 
     def share(self) -> float:
         """Time [s] of the next run."""

@@ -74,7 +74,7 @@ def main() -> None:
             rows[-1] |= {
                 "energy": found.energy.electrical.total,
                 "duration": found.duration,
-                "shares": found.shares,
+                "shares": found.ratios,
                 "worst": found.worst,
             }
     solved = [row for row in rows if "energy" in row]

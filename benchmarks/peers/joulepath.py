@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import time
-
 from benchmarks.motion import SplineMotion
 from models.robot import Array, Robot
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
 from optimizer.methods import solver_for
 from optimizer.optimize import optimize, warm_up
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.trajectories.spline import Spline
@@ -31,8 +30,8 @@ class Candidate:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
-        task = Task.of(Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal))
-        return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
+        task = PreparedProblem.of(Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal))
+        return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
 
 
 class Answer:
@@ -71,10 +70,10 @@ class Line:
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
         """As `Peer` has it."""
-        task = Task.of(
+        task = PreparedProblem.of(
             Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal, method="time_scaling")
         )
-        return _motion(solver_for(task, q_start, q_goal, time.perf_counter() + PATIENCE).solve().spline)
+        return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
 
 
 def _prepare(robot: Robot) -> None:

@@ -111,7 +111,7 @@ class _Proof:
         t = np.concatenate([*parts, spans[-1:]])
         times = self.at(t)
         n, p = len(t), len(self.model.pairs)
-        balls = self.model.gaps(times.frames, within=-np.inf).distance
+        balls = self.model.pair_distances(times.frames, within=-np.inf).distance
         self.sampled(times, np.arange(n), balls.argmin(axis=1))
         v, _, h = self.rates(t[:-1], t[1:])
         passed = (v * h[:, None]) @ self.levers.T

@@ -17,7 +17,7 @@ from optimizer.problem.arm import Arm
 
 
 @dataclass(frozen=True)
-class Contact:
+class ClosestPair:
     """The pair of bodies that is nearest: `distance` [m] less the margin asked for, below zero by how deep they are."""
 
     pair: tuple[str, str]
@@ -25,7 +25,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Nearest:
+class WitnessPoints:
     """Of k pairs: signed distance (k,) [m], unit normal (k, 3) from first to second, a point (k, 3) of its line."""
 
     distance: Array
@@ -34,7 +34,7 @@ class Nearest:
 
 
 @dataclass(frozen=True)
-class Gaps:
+class PairDistances:
     """Of p pairs at n configurations: distances (n, p) [m], and which k of them are exact: configuration and column.
 
     The others are the bounding balls', which are less than the bodies'.
@@ -43,7 +43,7 @@ class Gaps:
     distance: Array
     configuration: Indices
     column: Indices
-    nearest: Nearest
+    nearest: WitnessPoints
 
 
 class CollisionModel:
@@ -113,13 +113,13 @@ class CollisionModel:
         Pairs whose bounding balls are further apart than `within` [m] get the balls' distance instead, which is less.
         """
         frames = self.frames(q)
-        found = self.gaps(frames, within=within)
+        found = self.pair_distances(frames, within=within)
         gradient = np.zeros((*found.distance.shape, self.nq))
         exact = found.configuration, found.column
         gradient[exact] = self.gradients(frames, *exact, found.nearest)
         return found.distance, gradient
 
-    def gaps(self, frames: Array, pairs: Indices | None = None, within: float = np.inf) -> Gaps:
+    def pair_distances(self, frames: Array, pairs: Indices | None = None, within: float = np.inf) -> PairDistances:
         """Signed distances of `pairs` (p,), or of every pair, at every one of `frames` (n, nq + 1, 4, 4).
 
         Exact are those of the pairs whose bounding balls are at most `within` [m] apart.
@@ -136,13 +136,13 @@ class CollisionModel:
         configuration, column = np.nonzero(distance <= within)
         nearest = self.nearest(frames, configuration, pairs[column])
         distance[configuration, column] = nearest.distance
-        return Gaps(distance, configuration, column, nearest)
+        return PairDistances(distance, configuration, column, nearest)
 
     def least(self, q: Array, within: float) -> float:
         """The least distance [m] over all pairs at q (n, nq), or, where it exceeds `within`, something above that."""
-        return float(self.gaps(self.frames(q), within=within).distance.min(initial=np.inf))
+        return float(self.pair_distances(self.frames(q), within=within).distance.min(initial=np.inf))
 
-    def contacts(self, q: Sequence[Array] | Array, within: float = np.inf) -> list[Contact]:
+    def contacts(self, q: Sequence[Array] | Array, within: float = np.inf) -> list[ClosestPair]:
         """The nearest pair at each of q (n, nq): none at all where nothing is compared.
 
         Where nothing is nearer than `within` [m], only a lower bound on the distance is found, and not always the pair.
@@ -153,12 +153,12 @@ class CollisionModel:
         # many of them differ by full turns alone, which move nothing
         moved = (np.round(frames[:, 1:, :3], 9) + 0.0).reshape(len(frames), -1)
         _, first, which = np.unique(moved, axis=0, return_index=True, return_inverse=True)
-        distance = self.gaps(frames[first], within=within).distance
+        distance = self.pair_distances(frames[first], within=within).distance
         nearest = distance.argmin(axis=1)
-        contacts = [Contact(self.names(int(k)), float(d[k])) for k, d in zip(nearest, distance, strict=True)]
+        contacts = [ClosestPair(self.names(int(k)), float(d[k])) for k, d in zip(nearest, distance, strict=True)]
         return [contacts[k] for k in which.ravel()]
 
-    def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: Nearest) -> Array:
+    def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints) -> Array:
         """Derivatives (k, nq) of distances by the joints: n · (axis × (point - origin)) of every joint in between.
 
         The nearest points' own shift over the bodies does not count: the distance is stationary in it.
@@ -169,11 +169,11 @@ class CollisionModel:
         turning -= np.einsum("kji,ki->kj", np.cross(axes, origins)[configuration], found.normal)
         return np.asarray(turning * self.between[pair])
 
-    def nearest(self, frames: Array, configuration: Indices, pair: Indices) -> Nearest:
+    def nearest(self, frames: Array, configuration: Indices, pair: Indices) -> WitnessPoints:
         """Distances of pairs (k,) at configurations (k,) of `frames`."""
         first, second = self.pairs[pair].T
         k = len(pair)
-        result = Nearest(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
+        result = WitnessPoints(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
         kinds = self._kinds[pair]
         handlers = (self._segments, self._box_first, self._box_second, self._planes, self._others)
         for kind, handler in enumerate(handlers):

@@ -6,8 +6,6 @@ OMPL has it, run several times; each way found is shortened by OMPL's shortcuts.
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
@@ -16,11 +14,12 @@ from ompl import util as ou
 from models.robot import Array
 from optimizer.collision.model import CollisionModel, collision_model
 from optimizer.collision.state_validity import FreeSpace
+from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
 
 # how far the joints may leave the range between start and goal [rad], in turn from run to run: what is near comes
 # first, and no way winds a joint
-ROOMS = (0.7, 1.6, 2.8)
+BOUND_MARGINS = (0.7, 1.6, 2.8)
 # a way is looked at this densely [rad], and keeps this much [m] more than the margins; less where the ends keep less
 STEP, RESERVE = 0.03, (5e-3, 5e-4)
 # longest branch of the planner's trees [rad], and states it looks at before a run is given up
@@ -31,16 +30,16 @@ RUNS, SHORTCUTS = 3, 40
 SAME = 0.5
 # samples of two ways and steps from the one to the other, by which it is told whether anything stands between them, and
 # how deep [m] bodies may be in one another on that: motions around the same thing touch it and cut its corners
-DRAWN, DRAWN_STEPS, CUT = 33, 9, 0.02
+INTERPOLATED, INTERPOLATION_STEPS, ALLOWED_PENETRATION = 33, 9, 0.02
 # samples of a way, and the share of its length over which a corner is rounded
 SAMPLES, ROUNDING = 201, 0.06
 
 
-def ways_around(
+def plan_paths(
     arm: Arm,
     q_start: Array,
     q_goal: Array,
-    deadline: float,
+    deadline: Deadline,
     most: int = 2,
     seed: int = 1,
     model: CollisionModel | None = None,
@@ -48,7 +47,7 @@ def ways_around(
     """Up to `most` joint paths (k, nq) [rad] from q_start to q_goal (nq,) that hit nothing, the shortest first.
 
     Straight between their points, within the arm's limits and its tool's cone; looked at every STEP, which proves
-    nothing. None where an end itself is not clear or nothing is found before `deadline` (of `time.perf_counter`). The
+    nothing. None where an end itself is not clear or nothing is found before `deadline`. The
     seed decides what is found, as long as the deadline does not. `model` is the arm's own, where it is at hand.
     """
     model = collision_model(arm) if model is None else model
@@ -63,13 +62,13 @@ def ways_around(
     ou.RNG.setSeed(seed)
     found: list[Array] = []
     for run in range(RUNS * most):
-        if len(found) == most or time.perf_counter() > deadline:
+        if len(found) == most or deadline.passed:
             break
-        path = _plan(arm, space, q_start, q_goal, ROOMS[run % len(ROOMS)], deadline)
+        path = _plan(arm, space, q_start, q_goal, BOUND_MARGINS[run % len(BOUND_MARGINS)], deadline)
         if path is not None and not any(_same(path, other) for other in found):
             found.append(path)
         # the straight line is free, or no room is wide enough
-        if (found and len(found[0]) == 2) or (not found and run + 1 == len(ROOMS)):
+        if (found and len(found[0]) == 2) or (not found and run + 1 == len(BOUND_MARGINS)):
             break
     return sorted(found, key=lambda path: length(path, arm.active_limits.v_max))
 
@@ -90,18 +89,18 @@ def along(path: Array, duration: float, v_max: Array) -> tuple[Array, Array]:
     return q, s * duration
 
 
-def nothing_between(model: CollisionModel, path: Array, other: Array) -> bool:
+def interpolation_is_free(model: CollisionModel, path: Array, other: Array) -> bool:
     """Whether one way can be drawn straight onto another and hardly hits anything, (k, nq) each at the same times.
 
     Optimised, the two would then as a rule become the same motion.
     """
-    chosen = np.linspace(0, len(path) - 1, DRAWN).round().astype(int)
-    steps = np.linspace(0.0, 1.0, DRAWN_STEPS + 2)[1:-1, None, None]
+    chosen = np.linspace(0, len(path) - 1, INTERPOLATED).round().astype(int)
+    steps = np.linspace(0.0, 1.0, INTERPOLATION_STEPS + 2)[1:-1, None, None]
     drawn = (1 - steps) * path[chosen] + steps * other[chosen]
-    return model.least(drawn.reshape(-1, path.shape[1]), 0.0) >= -CUT
+    return model.least(drawn.reshape(-1, path.shape[1]), 0.0) >= -ALLOWED_PENETRATION
 
 
-def _plan(arm: Arm, space: FreeSpace, start: Array, goal: Array, room: float, deadline: float) -> Array | None:
+def _plan(arm: Arm, space: FreeSpace, start: Array, goal: Array, room: float, deadline: Deadline) -> Array | None:
     """One way (k, nq), shortened; None if there is none in that room before the deadline."""
     nq, limits = len(start), arm.active_limits
     states = ob.RealVectorStateSpace(nq)
@@ -122,7 +121,7 @@ def _plan(arm: Arm, space: FreeSpace, start: Array, goal: Array, room: float, de
         return space.free(q)
 
     def spent() -> bool:
-        return looked > MOST_STATES or time.perf_counter() > deadline
+        return looked > MOST_STATES or deadline.passed
 
     info = ob.SpaceInformation(states)
     info.setStateValidityChecker(free)

@@ -48,6 +48,7 @@ def digest(robot: Robot) -> str:
 
 
 def library_path(robot: Robot) -> Path:
+    """Path of a robot's compiled kernel."""
     return cache_directory() / f"{robot.name}-{digest(robot)}.so"
 
 
@@ -57,6 +58,7 @@ def seal_path(path: Path) -> Path:
 
 
 def is_intact(path: Path) -> bool:
+    """Whether the library is there and is the one that was sealed."""
     try:
         return seal_path(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
     except OSError:

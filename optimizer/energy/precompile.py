@@ -1,4 +1,4 @@
-"""`python -m optimizer.energy.precompile` compiles the kernels of all robots, so that no request meets the virtual machine."""
+"""`python -m optimizer.energy.precompile` compiles the kernels of all robots, so that no request is interpreted."""
 
 from __future__ import annotations
 

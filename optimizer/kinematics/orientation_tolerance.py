@@ -7,13 +7,13 @@ import pinocchio as pin
 from scipy.stats import qmc
 
 from models.robot import Array
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 # of the tool's axis against the direction: below it their common normal is any [1]
 PARALLEL = 1e-12
 
 
-def tilt(pose: LoosePose, R: Array) -> Array:
+def tilt(pose: ConeOrientedPose, R: Array) -> Array:
     """Rotation vector (3,) [rad], in the base frame, that takes `direction` to where R (3, 3) puts `axis`."""
     pointing = R @ pose.axis
     normal = np.cross(pose.direction, pointing)
@@ -24,12 +24,12 @@ def tilt(pose: LoosePose, R: Array) -> Array:
     return np.asarray(normal * (angle / sine))
 
 
-def excess_angle(pose: LoosePose, R: Array) -> float:
+def excess_angle(pose: ConeOrientedPose, R: Array) -> float:
     """Angle [rad] by which R (3, 3) lies beyond the orientations allowed: 0 for these."""
     return max(0.0, float(np.linalg.norm(tilt(pose, R))) - pose.half_angle)
 
 
-def nearest_orientation(pose: LoosePose, R: Array) -> Array:
+def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
     """The orientation allowed (3, 3) that is the least rotation away from R (3, 3)."""
     excess = excess_angle(pose, R)
     if excess == 0.0:
@@ -38,7 +38,7 @@ def nearest_orientation(pose: LoosePose, R: Array) -> Array:
     return np.asarray(pin.exp3(-beyond * (excess / np.linalg.norm(beyond))) @ R)
 
 
-def sample_orientations(pose: LoosePose, count: int) -> Array:
+def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
     """So many orientations allowed (count, 3, 3), spread evenly, always the same.
 
     The axis falls evenly on the cone's cap of the sphere, the rotation about it evenly on the circle.

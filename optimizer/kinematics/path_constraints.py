@@ -23,15 +23,15 @@ from optimizer.problem.tool_cone import ToolCone
 AT_REST = 1e-9
 
 
-class Shares(NamedTuple):
-    """Shares (n, c) of c limits, and their gradients by q and by v (n, c, nq)."""
+class ConstraintRatios(NamedTuple):
+    """ConstraintRatios (n, c) of c limits, and their gradients by q and by v (n, c, nq)."""
 
     value: Array
     by_q: Array
     by_v: Array
 
 
-class PathLimit(Protocol):
+class PathConstraint(Protocol):
     """A limit along the path: names of its c shares, and the shares at n states."""
 
     @property
@@ -39,17 +39,17 @@ class PathLimit(Protocol):
         """A name for every share."""
         ...
 
-    def shares(self, frames: Array, q: Array, v: Array) -> Array:
-        """Shares (n, c) for frames (n, nq + 1, 4, 4), q and v (n, nq)."""
+    def ratios(self, frames: Array, q: Array, v: Array) -> Array:
+        """ConstraintRatios (n, c) for frames (n, nq + 1, 4, 4), q and v (n, nq)."""
         ...
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
+    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
         """The same with gradients."""
         ...
 
 
 @dataclass(frozen=True)
-class ToolConeLimit:
+class ToolConeConstraint:
     """The direction `axis` (3,) of the last link, in its frame, stays within `half_angle` [rad] of `direction` (3,).
 
     `direction` is in the base frame; both are unit vectors. The ratio is the angle between them over the half angle.
@@ -62,21 +62,23 @@ class ToolConeLimit:
     names: ClassVar[tuple[str, ...]] = ("tool_cone",)
 
     @staticmethod
-    def of(arm: Arm, cone: ToolCone) -> ToolConeLimit:
+    def of(arm: Arm, cone: ToolCone) -> ToolConeConstraint:
         """The constraint of an arm's cone, its axis turned from the TCP's frame into the last link's."""
-        return ToolConeLimit(T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle)
+        return ToolConeConstraint(T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle)
 
-    def shares(self, frames: Array, q: Array, v: Array) -> Array:
-        """Shares (n, 1)."""
+    def ratios(self, frames: Array, q: Array, v: Array) -> Array:
+        """ConstraintRatios (n, 1)."""
         return (self._angle(frames[:, -1, :3, :3] @ self.axis) / self.half_angle)[:, None]
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
-        """Shares and gradients: the angle grows by -d(cos)/sin."""
+    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
+        """ConstraintRatios and gradients: the angle grows by -d(cos)/sin."""
         pointing = frames[:, -1, :3, :3] @ self.axis
         angle = self._angle(pointing)
         slope = -(self.direction @ direction_jacobian(frames, pointing))
         by_q = slope / (np.maximum(np.sin(angle), AT_REST) * self.half_angle)[:, None]
-        return Shares((angle / self.half_angle)[:, None], by_q[:, None], np.zeros((*v.shape[:1], 1, v.shape[1])))
+        return ConstraintRatios(
+            (angle / self.half_angle)[:, None], by_q[:, None], np.zeros((*v.shape[:1], 1, v.shape[1]))
+        )
 
     def _angle(self, pointing: Array) -> Array:
         """(n,) [rad]; by atan2, exact near zero and near a half turn too."""
@@ -85,7 +87,7 @@ class ToolConeLimit:
 
 
 @dataclass(frozen=True)
-class PointSpeed:
+class PointSpeedConstraint:
     """Points (c, 3) [m] fixed to a link, in its frame, move at most at `limit` [m/s] in the base frame."""
 
     name: str
@@ -98,13 +100,13 @@ class PointSpeed:
         """One name, repeated for every point."""
         return (self.name,) * len(self.points)
 
-    def shares(self, frames: Array, q: Array, v: Array) -> Array:
-        """Shares (n, c)."""
+    def ratios(self, frames: Array, q: Array, v: Array) -> Array:
+        """ConstraintRatios (n, c)."""
         velocities = [point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)]
         return np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1) / self.limit
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
-        """Shares and gradients."""
+    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
+        """ConstraintRatios and gradients."""
         value, by_q, by_v = [], [], []
         for x in self._positions(frames):
             J = point_jacobian(frames, self.link, x)
@@ -114,49 +116,49 @@ class PointSpeed:
             value.append(speed)
             by_q.append((along @ velocity_gradient(frames, J, v))[:, 0])
             by_v.append((along @ J)[:, 0])
-        return Shares(*(np.stack(each, axis=1) / self.limit for each in (value, by_q, by_v)))
+        return ConstraintRatios(*(np.stack(each, axis=1) / self.limit for each in (value, by_q, by_v)))
 
     def _positions(self, frames: Array) -> list[Array]:
         return [frames[:, self.link, :3, :3] @ point + frames[:, self.link, :3, 3] for point in self.points]
 
 
 @dataclass(frozen=True)
-class PathLimits:
+class PathConstraints:
     """All limits along the path of one arm whose joints are mounted at `placements` (nq, 4, 4)."""
 
     placements: Array
-    limits: Sequence[PathLimit]
+    limits: Sequence[PathConstraint]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """A name for every share."""
         return tuple(name for limit in self.limits for name in limit.names)
 
-    def shares(self, q: Array, v: Array) -> Array:
-        """Shares (n, c) at q, v (n, nq)."""
+    def ratios(self, q: Array, v: Array) -> Array:
+        """ConstraintRatios (n, c) at q, v (n, nq)."""
         frames = link_frames(self.placements, q)
-        return np.concatenate([limit.shares(frames, q, v) for limit in self.limits], axis=1)
+        return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
-    def linearised(self, q: Array, v: Array) -> Shares:
-        """Shares and gradients at q, v (n, nq)."""
+    def linearised(self, q: Array, v: Array) -> ConstraintRatios:
+        """ConstraintRatios and gradients at q, v (n, nq)."""
         frames = link_frames(self.placements, q)
         parts = [limit.linearised(frames, q, v) for limit in self.limits]
-        return Shares(*(np.concatenate(each, axis=1) for each in zip(*parts, strict=True)))
+        return ConstraintRatios(*(np.concatenate(each, axis=1) for each in zip(*parts, strict=True)))
 
 
-def path_limits(arm: Arm) -> list[PathLimit]:
+def path_constraint_list(arm: Arm) -> list[PathConstraint]:
     """Limits on where the tool points and how fast TCP and elbow move."""
-    limits: list[PathLimit] = []
+    limits: list[PathConstraint] = []
     if arm.tool_cone is not None:
-        limits.append(ToolConeLimit.of(arm, arm.tool_cone))
+        limits.append(ToolConeConstraint.of(arm, arm.tool_cone))
     if arm.tcp_speed is not None:
-        limits.append(PointSpeed("tcp_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], arm.tcp_speed))
+        limits.append(PointSpeedConstraint("tcp_speed", arm.robot.nq, T_last_tcp(arm)[None, :3, 3], arm.tcp_speed))
     if arm.elbow_speed is not None and arm.robot.elbow is not None:
-        limits.append(PointSpeed("elbow_speed", arm.robot.elbow.link, arm.robot.elbow.axis, arm.elbow_speed))
+        limits.append(PointSpeedConstraint("elbow_speed", arm.robot.elbow.link, arm.robot.elbow.axis, arm.elbow_speed))
     return limits
 
 
-def path_limits_of(arm: Arm) -> PathLimits | None:
+def path_constraints_of(arm: Arm) -> PathConstraints | None:
     """These limits together, None where there are none."""
-    limits = path_limits(arm)
-    return PathLimits(joint_placements(arm.robot.model), limits) if limits else None
+    limits = path_constraint_list(arm)
+    return PathConstraints(joint_placements(arm.robot.model), limits) if limits else None

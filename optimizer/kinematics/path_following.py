@@ -60,7 +60,7 @@ class PathPoint:
 def follow(
     arm: Arm, targets: Sequence[Pose] | Array, guess: Array, tolerance: float = 1e-6, near_singular: float = 1e-2
 ) -> list[PathPoint]:
-    """Configurations along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
+    """Waypoints along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
 
     The search for each point starts from the last one that was reached, first from `guess` (nq,) [rad], and once more
     from the guess where that fails. A point is reached within `tolerance` [m, rad]; `near_singular` is the least

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from models.robot import Array
-from optimizer.methods.duration_intervals import Window
+from optimizer.deadline import Deadline
+from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.lagrange import Lagrange
-from optimizer.methods.method import Solver
+from optimizer.methods.method import Method
 from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.methods.time_scaling import TimeScaling
 from optimizer.methods.uniform_scaling import UniformScaling
-from optimizer.prepared_problem import Task
-from optimizer.problem.problem import Method
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.problem import MethodName
 
-METHODS: dict[Method, type[Solver]] = {
+METHODS: dict[MethodName, type[Method]] = {
     "bspline": FreeSpline,
     "time_scaling": TimeScaling,
     "lagrange": Lagrange,
@@ -22,6 +23,12 @@ METHODS: dict[Method, type[Solver]] = {
 }
 
 
-def solver_for(task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None) -> Solver:
-    """The solver of the problem's method for a candidate from q_start to q_goal (nq,) in a window of durations."""
-    return METHODS[task.problem.method](task, q_start, q_goal, deadline, window)
+def solver_for(
+    prepared: PreparedProblem,
+    q_start: Array,
+    q_goal: Array,
+    deadline: Deadline,
+    interval: DurationInterval | None = None,
+) -> Method:
+    """The solver of the problem's method for a candidate from q_start to q_goal (nq,) in a interval of durations."""
+    return METHODS[prepared.problem.method](prepared, q_start, q_goal, deadline, interval)

@@ -7,14 +7,13 @@ guess, are this project's.
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import ClassVar
 
 from models.robot import Array
-from optimizer.collision.path_planner import along, length, nothing_between
-from optimizer.methods.method import Attempt
-from optimizer.methods.sqp_method import Guess, Programmed
+from optimizer.collision.path_planner import along, interpolation_is_free, length
+from optimizer.methods.method import SolveResult
+from optimizer.methods.sqp_method import Guess, SqpMethod
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline
@@ -34,52 +33,54 @@ PLANNING, PATIENCE = 0.1, 0.3
 # a way longer than the shortest by more than this is not tried
 DETOUR = 1.3
 # said of what came of one
-LED = ", led around what is in the way"
+FROM_PLANNED_PATH = ", from a planned collision-free path"
 
 
-class FreeSpline(Programmed):
+class FreeSpline(SqpMethod):
     """Solves a candidate over splines whose knots follow from where jerk switches."""
 
-    learns: ClassVar[tuple[BaselineName, ...]] = (
+    guess_baselines: ClassVar[tuple[BaselineName, ...]] = (
         "trapezoid",
         "quintic",
         "ruckig",
         "ruckig_slowed",
         "controller_default",
     )
-    adopts: ClassVar[tuple[BaselineName, ...]] = ("quintic", "ruckig", "ruckig_slowed")
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic", "ruckig", "ruckig_slowed")
 
-    def solve(self) -> Attempt:
+    def solve(self) -> SolveResult:
         """From the ground up; over knots made for haste where time is short or evenly spaced ones find nothing."""
         shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        tried: list[Attempt] = []
-        if not self.window.hurried and self.t_max >= TIGHT * shortest:
+        tried: list[SolveResult] = []
+        if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
             tried.append(self.improve(Guess(space, self._smoothed(space), 0.0)))
         if not tried or (tried[-1].status == "failed" and tried[-1].hit is None):
-            tried.append(self.improve(self.in_haste()))
+            tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status == "failed" and tried[-1].hit is not None:
             tried.append(self.around(tried[-1]))
         return replace(tried[-1], iterations=sum(a.iterations for a in tried), solves=sum(a.solves for a in tried))
 
-    def around(self, stuck: Attempt) -> Attempt:
+    def around(self, stuck: SolveResult) -> SolveResult:
         """From ways that hit nothing, the cheapest motion that comes of them; `stuck` itself where none does."""
-        task, space = self.task, bspline.uniform(COARSE)
-        v_max, now = task.problem.arm.active_limits.v_max, time.perf_counter()
-        left = max(self.deadline - now, 0.0)
-        ways = task.ways(self.q_start, self.q_goal, now + PLANNING * left)
-        found: list[Attempt] = []
+        prepared, space = self.prepared, bspline.uniform(COARSE)
+        v_max, left = prepared.problem.arm.active_limits.v_max, max(self.deadline.left, 0.0)
+        planning, patience = self.deadline.within(PLANNING * left), self.deadline.within(PATIENCE * left)
+        ways = prepared.planned_paths(self.q_start, self.q_goal, planning)
+        found: list[SolveResult] = []
         for way in ways:
-            if time.perf_counter() > now + PATIENCE * left or length(way, v_max) > DETOUR * length(ways[0], v_max):
+            if patience.passed or length(way, v_max) > DETOUR * length(ways[0], v_max):
                 break
             q, t = along(way, 1.0, v_max)
             motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
-            if any(nothing_between(task.collisions, q, motion) for motion in motions):
+            if any(interpolation_is_free(prepared.collisions, q, motion) for motion in motions):
                 continue
             points = space.fit(self.coordinates.from_joints(q), t)
-            outcome = self.improve(Guess(space, points, 0.0), guarded=True, deadline=now + PATIENCE * left)
-            found.append(replace(outcome, reason=f"{outcome.reason}{LED}"))
-        solved = [(task.objective_of(task.energy(a.spline)), k) for k, a in enumerate(found) if a.spline is not None]
+            outcome = self.improve(Guess(space, points, 0.0), guarded=True, deadline=patience)
+            found.append(replace(outcome, reason=f"{outcome.reason}{FROM_PLANNED_PATH}"))
+        solved = [
+            (prepared.objective_of(prepared.energy(a.spline)), k) for k, a in enumerate(found) if a.spline is not None
+        ]
         best = found[min(solved)[1]] if solved else stuck
         return replace(best, iterations=sum(a.iterations for a in found), solves=sum(a.solves for a in found))
 
@@ -88,17 +89,17 @@ class FreeSpline(Programmed):
         """More control points, placed where jerk switches, unless they are placed so already."""
         return len(found.control_points) == COARSE
 
-    def learn(self, q: Array, t: Array, fine: bool) -> Attempt:
+    def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,), over knots where jerk bends, or jumps if `fine`."""
         duration = float(t[-1])
         space = self.graded(duration, EXACT if fine else REFINED)
         guess = Guess(space, space.fit(self.coordinates.from_joints(q), t / duration), duration)
         # what was led around something would otherwise go back to where it is stuck
-        outcome = self.improve(guess, guarded=self.task.grazes(q))
-        led = outcome.status == "solved" and self.task.has_ways(self.q_start, self.q_goal)
-        return replace(outcome, reason=f"{outcome.reason}{LED}") if led else outcome
+        outcome = self.improve(guess, guarded=self.prepared.is_near_contact(q))
+        led = outcome.status == "solved" and self.prepared.has_planned_paths(self.q_start, self.q_goal)
+        return replace(outcome, reason=f"{outcome.reason}{FROM_PLANNED_PATH}") if led else outcome
 
-    def in_haste(self) -> Guess:
+    def time_optimal_guess(self) -> Guess:
         """The fastest motion under limits on speed, acceleration and jerk, in a space that holds its jerk's jumps."""
         line = self.coordinates
         fastest = time_optimal(line.limits, line.start, line.goal)

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.methods.method import Attempt
-from optimizer.methods.sqp_method import Guess, Programmed
+from optimizer.methods.method import SolveResult
+from optimizer.methods.sqp_method import Guess, SqpMethod
 from optimizer.solution import BaselineName
 from optimizer.trajectories.polynomial import polynomials
 from optimizer.trajectories.ruckig_motion import time_optimal
@@ -33,10 +33,10 @@ POSITION_REPAIR = 1.5
 ROUNDING = 1e-9
 
 
-class Lagrange(Programmed):
+class Lagrange(SqpMethod):
     """Solves a candidate over polynomials of degree NODES + 5."""
 
-    learns: ClassVar[tuple[BaselineName, ...]] = (
+    guess_baselines: ClassVar[tuple[BaselineName, ...]] = (
         "trapezoid",
         "quintic",
         "ruckig",
@@ -44,20 +44,20 @@ class Lagrange(Programmed):
         "controller_default",
     )
 
-    def solve(self) -> Attempt:
+    def solve(self) -> SolveResult:
         """From the fastest jerk-limited motion, then from the quintic if that finds nothing."""
         fastest = time_optimal(self.coordinates.limits, self.q_start, self.q_goal)
         if fastest.duration > 0:
-            first = self.learn(fastest.q, fastest.t, fine=False)
+            first = self.solve_from(fastest.q, fastest.t, fine=False)
             if first.status in ("solved", "out of time"):
                 return first
         else:
-            first = Attempt("failed", "not tried")
+            first = SolveResult("failed", "not tried")
         straight = quintic(self.q_start, self.q_goal, 1.0)
-        second = self.learn(straight.q, straight.t, fine=False)
+        second = self.solve_from(straight.q, straight.t, fine=False)
         return replace(second, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
 
-    def learn(self, q: Array, t: Array, fine: bool) -> Attempt:
+    def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,)."""
         space, duration = polynomials(NODES), float(t[-1])
         return self.improve(Guess(space, space.fit(q, t / duration), duration))
@@ -67,6 +67,6 @@ class Lagrange(Programmed):
         q = BSpline(spline.knots, spline.control_points, spline.degree)(
             np.linspace(0.0, spline.duration, POSITION_POINTS)
         )
-        limits = self.task.problem.arm.active_limits
+        limits = self.prepared.problem.arm.active_limits
         below, above = limits.q_min - q.min(axis=0), q.max(axis=0) - limits.q_max
         return tuple(np.where(beyond > ROUNDING, POSITION_REPAIR * beyond, 0.0) for beyond in (below, above))

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from models.robot import Array, Limits
-from optimizer.kinematics.path_constraints import PathLimits
+from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.sqp import FEASIBILITY
 
 # the solver works within limits tightened by this share, so that its own tolerance does not break the real ones
 MARGIN = 2 * FEASIBILITY
 
 
-def initial_bounds(path: PathLimits | None) -> Array:
+def initial_bounds(path: PathConstraints | None) -> Array:
     """How much of each limit along the path (c,) may be used at first."""
     return np.full(0 if path is None else len(path.names), 1 - MARGIN)
 

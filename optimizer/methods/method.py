@@ -9,8 +9,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from models.robot import Array
-from optimizer.methods.duration_intervals import Window, windows
-from optimizer.prepared_problem import Task
+from optimizer.deadline import Deadline
+from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.solution import BaselineName, Clearance
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.spline import Spline, fine_samples, sample
@@ -20,7 +21,7 @@ TORQUE_POINTS = 4
 
 
 @dataclass(frozen=True)
-class Attempt:
+class SolveResult:
     """What came of a candidate: the spline if it is solved, and what was spent on it.
 
     `iterations` are the method's own: of the SQP, generations, or energies evaluated. `hit` is what the best motion
@@ -36,15 +37,15 @@ class Attempt:
     hit: Clearance | None = None
 
 
-class Solver(ABC):
+class Method(ABC):
     """Solves one candidate, from q_start to q_goal (nq,), by one method, before `deadline`.
 
-    `window` says which durations are allowed and what is minimised; None: the problem's first.
+    `interval` says which durations are allowed and what is minimised; None: the problem's first.
     """
 
     # the baselines that are first guesses of a motion of this kind, and those that are motions of this kind
-    learns: ClassVar[tuple[BaselineName, ...]] = ()
-    adopts: ClassVar[tuple[BaselineName, ...]] = ()
+    guess_baselines: ClassVar[tuple[BaselineName, ...]] = ()
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ()
     # how many candidates are solved before the rest is left
     most_solved: ClassVar[int | None] = None
     # whether it ends where nothing nearby is better
@@ -53,15 +54,20 @@ class Solver(ABC):
     best_known: float = np.inf
 
     def __init__(
-        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+        self,
+        prepared: PreparedProblem,
+        q_start: Array,
+        q_goal: Array,
+        deadline: Deadline,
+        interval: DurationInterval | None = None,
     ) -> None:
-        self.task, self.deadline = task, deadline
+        self.prepared, self.deadline = prepared, deadline
         self.q_start, self.q_goal = q_start, q_goal
-        self.window = windows(task, q_goal)[0] if window is None else window
-        self.t_min, self.t_max = self.window.t_min, self.window.t_max
+        self.interval = duration_intervals(prepared, q_goal)[0] if interval is None else interval
+        self.t_min, self.t_max = self.interval.t_min, self.interval.t_max
 
     @abstractmethod
-    def solve(self) -> Attempt:
+    def solve(self) -> SolveResult:
         """The method, from the ground up."""
 
     @staticmethod
@@ -69,14 +75,14 @@ class Solver(ABC):
         """Whether `learn` may make more of what `solve` found."""
         return False
 
-    def learn(self, q: Array, t: Array, fine: bool) -> Attempt:
+    def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """An attempt from samples q (k, nq) at times t (k,) of a motion; `fine` where a first one fell short."""
-        return Attempt("failed", "the method takes no motion for a guess")
+        return SolveResult("failed", "the method takes no motion for a guess")
 
     def torque_peaks(self, spline: Spline) -> Array:
         """Greatest absolute motor torques (nq,) at the nodes of a motion and at the certificate's own instants."""
         # where a joint turns back, friction changes sign within a millisecond
         between, replayed = fine_samples(spline, TORQUE_POINTS)[1:], sample(spline, grid(spline.duration))
         q, v, a = (np.concatenate(both) for both in zip(between, replayed, strict=True))
-        tau = self.task.torques(q, v, a) + self.task.friction.torque(v)
+        tau = self.prepared.torques(q, v, a) + self.prepared.friction.torque(v)
         return np.asarray(np.abs(tau).max(axis=0))

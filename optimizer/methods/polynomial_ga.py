@@ -8,23 +8,23 @@ converged, so its answers never count as optimal.
 
 from __future__ import annotations
 
-import time
 from typing import Any, ClassVar
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.methods.duration_intervals import Window
-from optimizer.methods.method import Attempt, Solver
-from optimizer.prepared_problem import Task
+from optimizer.deadline import Deadline
+from optimizer.methods.duration_intervals import DurationInterval
+from optimizer.methods.method import Method, SolveResult
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.polynomial import polynomials
-from optimizer.trajectories.spline import peak_rates, slowed, spline_of, stretch
+from optimizer.trajectories.spline import peak_rates, retimed, spline_of, time_scale
 
 # degree 9: more values are more to search than a few seconds are enough for
 NODES = 4
 POPULATION, GENERATIONS, PARENTS, ELITE, TOURNAMENT = 80, 120, 24, 4, 4
 SEED = 0
-# how far values may leave the straight line: this share of the joint's travel, and this much in any case [rad]
+# how far values may leave the straight line: this share of the joint's displacement, and this much in any case [rad]
 TRAVEL_SHARE, LEAST_REACH = 0.25, 0.15
 # spread of the first population and of a mutation, as a share of that; how many genes mutate
 SPREAD, MUTATION, MUTATION_SHARE = 0.1, 0.08, 0.15
@@ -34,11 +34,11 @@ SLOWEST = 4.0
 RATES_HELD, TORQUE_HELD = 1 - 1e-3, 1 - 5e-3
 # what a limit broken by all of itself multiplies the cost by, beyond 1
 PENALTY = 20.0
-# a motion that still breaks torque between the nodes is slowed by this factor, so many times at most
+# a motion that still breaks torque between the nodes is retimed by this factor, so many times at most
 SLOWER, SLOWINGS = 1.01, 60
 
 
-class PolynomialGA(Solver):
+class PolynomialGA(Method):
     """Solves a candidate by breeding. Genes: departures from the straight line at the nodes, and the duration."""
 
     # each takes seconds: those of least bound, which are likeliest to be best
@@ -46,9 +46,14 @@ class PolynomialGA(Solver):
     converges: ClassVar[bool] = False
 
     def __init__(
-        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+        self,
+        prepared: PreparedProblem,
+        q_start: Array,
+        q_goal: Array,
+        deadline: Deadline,
+        interval: DurationInterval | None = None,
     ) -> None:
-        super().__init__(task, q_start, q_goal, deadline, window)
+        super().__init__(prepared, q_start, q_goal, deadline, interval)
         self.space = polynomials(NODES)
         x = self.space.at
         self._line = q_start + np.outer(x**3 * (10 - 15 * x + 6 * x**2), q_goal - q_start)
@@ -56,12 +61,12 @@ class PolynomialGA(Solver):
         self.generations = 0
         self.first_cost = np.inf
 
-    def solve(self) -> Attempt:
+    def solve(self) -> SolveResult:
         """Breed until the generations or the time are used up, and make the best motion hold every limit."""
         import pygad  # a request for another method need not wait for it
 
-        if time.perf_counter() > self.deadline:
-            return Attempt("out of time", "the deadline passed")
+        if self.deadline.passed:
+            return SolveResult("out of time", "the deadline passed")
         rng = np.random.default_rng(SEED)
         genes = NODES * len(self.q_start) + 1
         first = np.clip(rng.normal(0.0, SPREAD, (POPULATION, genes)), -1.0, 1.0)
@@ -94,15 +99,15 @@ class PolynomialGA(Solver):
 
     def costs(self, genes: Array) -> Array:
         """The cost [J] of every chromosome (P, n), (P,), with the penalties for what it breaks."""
-        limits = self.task.problem.arm.active_limits
+        limits = self.prepared.problem.arm.active_limits
         points, duration, late = self._decoded(genes)
         count, nq = len(points), points.shape[2]
         z = np.einsum("dkm,pmj->pkdj", self.space.at_nodes, points, optimize=True)
         z[:, :, 1] /= duration[:, None, None]
         z[:, :, 2] /= duration[:, None, None] ** 2
-        cost, tau = self.task.kernel.value(z.reshape(-1, 3 * nq), self.window.p)
+        cost, tau = self.prepared.kernel.value(z.reshape(-1, 3 * nq), self.interval.p)
         nodes = len(self.space.nodes)
-        total = duration * (cost.reshape(count, nodes) @ self.space.weights) + self.window.constant
+        total = duration * (cost.reshape(count, nodes) @ self.space.weights) + self.interval.constant
         torque = np.abs(tau).reshape(count, nodes, nq).max(axis=1) / (limits.tau_max * TORQUE_HELD)
         q = z[:, :, 0]
         beyond = np.maximum(limits.q_min - q.min(axis=1), q.max(axis=1) - limits.q_max) / self._reach
@@ -115,7 +120,7 @@ class PolynomialGA(Solver):
         values = self._line + genes[:, :-1].reshape(count, NODES, nq) * self._reach
         ends = np.ones((count, 1, 1))
         points = np.concatenate([ends * self.q_start, values, ends * self.q_goal], axis=1)
-        limits = self.task.problem.arm.active_limits
+        limits = self.prepared.problem.arm.active_limits
         peaks = np.abs(np.einsum("dgm,pmj->pdgj", self.space.at_grid, points, optimize=True)).max(axis=2)
         ratios = (peaks / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD)).max(axis=2)
         least = np.maximum((ratios ** (1 / np.arange(1, 4))).max(axis=1), self.t_min)
@@ -131,21 +136,21 @@ class PolynomialGA(Solver):
 
     def _next(self, ga: Any) -> str | None:
         self.generations += 1
-        return "stop" if time.perf_counter() > self.deadline else None
+        return "stop" if self.deadline.passed else None
 
-    def _held(self, genes: Array) -> Attempt:
-        """The motion of a chromosome, slowed until it holds every limit between the nodes too."""
-        limits = self.task.problem.arm.active_limits
+    def _held(self, genes: Array) -> SolveResult:
+        """The motion of a chromosome, retimed until it holds every limit between the nodes too."""
+        limits = self.prepared.problem.arm.active_limits
         points, duration, _ = self._decoded(genes[None])
         spline = spline_of(self.space, points[0], float(duration[0]))
-        needed = stretch(peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+        needed = time_scale(peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
         if needed > 1:
-            spline = slowed(spline, needed)
+            spline = retimed(spline, needed)
         for _ in range(SLOWINGS):
             if spline.duration > self.t_max or (self.torque_peaks(spline) <= limits.tau_max).all():
                 break
-            spline = slowed(spline, SLOWER)
+            spline = retimed(spline, SLOWER)
         if spline.duration > self.t_max or (self.torque_peaks(spline) > limits.tau_max).any():
-            return Attempt("failed", "bred no motion that holds the limits", self.generations, 1)
+            return SolveResult("failed", "bred no motion that holds the limits", self.generations, 1)
         reason = f"the best of {self.generations} generations"
-        return Attempt("solved", reason, self.generations, 1, spline)
+        return SolveResult("solved", reason, self.generations, 1, spline)

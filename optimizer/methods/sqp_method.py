@@ -11,32 +11,33 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
-from optimizer.kinematics.path_constraints import PathLimits
-from optimizer.methods.duration_intervals import Window
+from optimizer.deadline import Deadline
+from optimizer.kinematics.path_constraints import PathConstraints
+from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.limit_repair import MARGIN, initial_bounds, tightened
-from optimizer.methods.method import Attempt, Solver
+from optimizer.methods.method import Method, SolveResult
 from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import Programme
+from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import FEASIBILITY, solve
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Clearance
 from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, peak_rates, sample, slowed, spline_of, stretch
+from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, spline_of, time_scale
 
 # times that limits are tightened where the motion breaks them between the nodes, and by how much beyond the excess
 REPAIRS = 8
 REPAIR_MARGIN = 2e-4
 # torque is tightened by this multiple of its excess: the peak that is held down between two nodes comes up beside them
 TORQUE_REPAIR = 1.5
-# a motion is slowed by at most this factor in place of another solve
+# a motion is retimed by at most this factor in place of another solve
 MOST_STRETCH = 1 + 5e-4
 # first durations tried, in multiples of the shortest that the guess allows
 STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # samples at which limits along the path are looked at, and the multiple of an excess by which they are tightened
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
-DEARER = "its best motion hits something, and even so spends no less than the best found"
+NO_BETTER = "its best motion hits something, and even so spends no less than the best found"
 
 
 @dataclass(frozen=True)
@@ -48,95 +49,103 @@ class Guess:
     duration: float
 
 
-class Programmed(Solver):
+class SqpMethod(Method):
     """A method whose motions live in a linear space and are optimised by the SQP."""
 
     def __init__(
-        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+        self,
+        prepared: PreparedProblem,
+        q_start: Array,
+        q_goal: Array,
+        deadline: Deadline,
+        interval: DurationInterval | None = None,
     ) -> None:
-        super().__init__(task, q_start, q_goal, deadline, window)
-        self.coordinates = self._coordinates(task.problem.arm.active_limits.scaled(1 - MARGIN))
+        super().__init__(prepared, q_start, q_goal, deadline, interval)
+        self.coordinates = self._coordinates(prepared.problem.arm.active_limits.scaled(1 - MARGIN))
 
-    def improve(self, guess: Guess, guarded: bool = False, deadline: float = np.inf) -> Attempt:
+    def improve(self, guess: Guess, guarded: bool = False, deadline: Deadline | None = None) -> SolveResult:
         """Optimise from a guess, tightening the limits where the motion breaks them between the nodes.
 
         With `guarded`, for a guess that hits nothing, it keeps clear from the first step on. `deadline` is one earlier
         than the candidate's.
         """
-        window, kernel, deadline = self.window, self.task.kernel, min(deadline, self.deadline)
-        programme = Programme(kernel, guess.space, window.p, self.coordinates, self.t_min, self.t_max, window.constant)
+        interval, kernel = self.interval, self.prepared.kernel
+        deadline = self.deadline if deadline is None else deadline
+        program = NonlinearProgram(
+            kernel, guess.space, interval.p, self.coordinates, self.t_min, self.t_max, interval.constant
+        )
         pairs: Indices = np.zeros(0, dtype=np.intp)
         if guarded:
             guessed = spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
-            pairs = self.task.near(guessed)
-        path = self.task.guarded(pairs) if guarded else self.task.path
-        programme = replace(programme, path=path, room=initial_bounds(path))
-        limits = self.task.problem.arm.active_limits.scaled(1 - MARGIN)
+            pairs = self.prepared.active_pairs(guessed)
+        path = self.prepared.with_clearance(pairs) if guarded else self.prepared.path
+        program = replace(program, path=path, room=initial_bounds(path))
+        limits = self.prepared.problem.arm.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
-        duration = self._first_duration(programme, free, guess.duration)
+        duration = self._first_duration(program, free, guess.duration)
         iterations, multiplier, hit = 0, None, None
         for solves in range(1, REPAIRS + 1):
-            result = solve(programme, free, duration, multiplier, deadline)
+            result = solve(program, free, duration, multiplier, deadline)
             iterations += result.iterations
             if result.status == "out of time":
-                return Attempt("out of time", "the deadline passed", iterations, solves)
+                return SolveResult("out of time", "the deadline passed", iterations, solves)
             if result.violation > FEASIBILITY:
                 reason = f"found no motion of {guess.space.n} control points that holds the limits"
-                reason = reason if hit is None else f"found no way around: {hit.words}"
-                return Attempt("failed", reason, iterations, solves, hit=hit)
-            spline = spline_of(guess.space, programme.joint_points(result.free), result.duration)
+                reason = reason if hit is None else f"found no way around: {hit.message}"
+                return SolveResult("failed", reason, iterations, solves, hit=hit)
+            spline = spline_of(guess.space, program.joint_points(result.free), result.duration)
             excess = self._excess(spline)
             if excess is not None:
                 spline = self._stretched(spline, excess)
                 excess = self._excess(spline)
-            hit = self.task.hit(spline)
+            hit = self.prepared.worst_violation(spline)
             if (
                 hit is not None
                 and not len(pairs)
-                and self.task.objective_of(self.task.energy(spline)) >= self.best_known
+                and self.prepared.objective_of(self.prepared.energy(spline)) >= self.best_known
             ):
-                return Attempt("pruned", DEARER, iterations, solves)
-            beyond = self._beyond(spline, programme.path, hit)
+                return SolveResult("pruned", NO_BETTER, iterations, solves)
+            beyond = self._beyond(spline, program.path, hit)
             if excess is None and hit is None and not beyond.any():
-                return Attempt("solved", "converged", iterations, solves, spline, result.stationarity)
+                return SolveResult("solved", "converged", iterations, solves, spline, result.stationarity)
             if excess is not None:
                 limits = tightened(limits, excess)
-                programme = replace(programme, coordinates=self._coordinates(limits))
+                program = replace(program, coordinates=self._coordinates(limits))
             # pairs are watched only once something is hit, since most motions hit nothing
-            nearby = pairs if hit is None else np.union1d(pairs, self.task.near(spline))
-            programme = self._watched(programme, pairs, nearby, beyond, hit)
+            nearby = pairs if hit is None else np.union1d(pairs, self.prepared.active_pairs(spline))
+            program = self._watched(program, pairs, nearby, beyond, hit)
             pairs = nearby
             # the solver takes no step for positions alone: it bounds them
-            free = np.clip(result.free, programme.limits.q_min, programme.limits.q_max)
+            free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
             duration, multiplier = result.duration, result.multiplier
-        reason = "limits stay broken between the nodes" if hit is None else f"found no way around: {hit.words}"
-        return Attempt("failed", reason, iterations, REPAIRS, hit=hit)
+        reason = "limits stay broken between the nodes" if hit is None else f"found no way around: {hit.message}"
+        return SolveResult("failed", reason, iterations, REPAIRS, hit=hit)
 
     def _watched(
-        self, programme: Programme, pairs: Indices, nearby: Indices, beyond: Array, hit: Clearance | None
-    ) -> Programme:
-        """The programme with the limits along its path tightened, and all of `nearby` watched instead of `pairs`."""
-        room = programme.room - beyond
+        self, program: NonlinearProgram, pairs: Indices, nearby: Indices, beyond: Array, hit: Clearance | None
+    ) -> NonlinearProgram:
+        """The program with the limits along its path tightened, and all of `nearby` watched instead of `pairs`."""
+        room = program.room - beyond
         if len(nearby) > len(pairs):
-            path = self.task.guarded(nearby)
+            path = self.prepared.with_clearance(nearby)
             widened = initial_bounds(path)
             widened[np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))] = room
-            return replace(programme, path=path, room=widened)
-        if hit is not None and programme.path is not None and not beyond.any():
+            return replace(program, path=path, room=widened)
+        if hit is not None and program.path is not None and not beyond.any():
             # met nowhere, but not proven either: a hair more between the points that are held
-            room -= np.where(np.array(programme.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
-        return replace(programme, room=room)
+            room -= np.where(np.array(program.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
+        return replace(program, room=room)
 
-    def _beyond(self, spline: Spline, path: PathLimits | None, hit: Clearance | None) -> Array:
+    def _beyond(self, spline: Spline, path: PathConstraints | None, hit: Clearance | None) -> Array:
         """By how much each share of the limits along the path must shrink, (c,): they are broken between the points."""
         if path is None:
             return np.zeros(0)
         # clearance comes last, and where it is proven the motion keeps it
-        looked_at = path if hit is not None else self.task.path
+        looked_at = path if hit is not None else self.prepared.path
         share = np.zeros(len(path.names))
         if looked_at is not None:
             q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
-            share[: len(looked_at.names)] = looked_at.shares(q, v).max(axis=0)
+            share[: len(looked_at.names)] = looked_at.ratios(q, v).max(axis=0)
         beyond = share - 1
         return np.where(beyond > -REPAIR_MARGIN / 4, PATH_REPAIR * np.maximum(beyond, 0.0) + REPAIR_MARGIN, 0.0)
 
@@ -144,37 +153,37 @@ class Programmed(Solver):
         """What the space describes: every joint by itself."""
         return Coordinates.joints(self.q_start, self.q_goal, limits)
 
-    def _first_duration(self, programme: Programme, free: Array, least: float) -> float:
+    def _first_duration(self, program: NonlinearProgram, free: Array, least: float) -> float:
         """The cheapest of a few durations at which the guess holds the limits on speed, acceleration and jerk."""
-        limits = programme.limits
+        limits = program.limits
         rates = np.stack([limits.v_max, limits.a_max, limits.j_max])
-        peaks = np.abs(programme.kinematics(free)).max(axis=1)
-        shortest = max(stretch(peaks / rates), least, programme.t_min)
-        if shortest >= programme.t_max:
-            return programme.t_max
+        peaks = np.abs(program.kinematics(free)).max(axis=1)
+        shortest = max(time_scale(peaks / rates), least, program.t_min)
+        if shortest >= program.t_max:
+            return program.t_max
         durations = [shortest * stretch for stretch in STRETCHES]
-        if programme.t_max < LONGEST_DURATION:
-            durations.append(programme.t_max)
+        if program.t_max < LONGEST_DURATION:
+            durations.append(program.t_max)
         best, chosen = np.inf, shortest
         for duration in durations:
-            if duration > programme.t_max:
+            if duration > program.t_max:
                 continue
-            cost, tau = programme.value(free, duration)
+            cost, tau = program.value(free, duration)
             cost *= 1 + float(np.maximum(np.abs(tau) / limits.tau_max - 1, 0).max())
             if cost < best:
                 best, chosen = cost, duration
-            elif best < np.inf and duration < programme.t_max:
+            elif best < np.inf and duration < program.t_max:
                 break
         return chosen
 
     def _stretched(self, spline: Spline, factors: Limits) -> Spline:
-        """The motion slowed until speed, acceleration and jerk hold their limits, if that takes next to no time."""
-        needed = stretch(1 / np.stack([factors.v_max, factors.a_max, factors.j_max]))
-        return spline if needed > MOST_STRETCH or spline.duration * needed > self.t_max else slowed(spline, needed)
+        """The motion retimed until speed, acceleration and jerk hold their limits, if that takes next to no time."""
+        needed = time_scale(1 / np.stack([factors.v_max, factors.a_max, factors.j_max]))
+        return spline if needed > MOST_STRETCH or spline.duration * needed > self.t_max else retimed(spline, needed)
 
     def _excess(self, spline: Spline) -> Limits | None:
         """The factors (≤ 1) by which each limit must be tightened, positions by how much [rad]; None if all hold."""
-        limits = self.task.problem.arm.active_limits
+        limits = self.prepared.problem.arm.active_limits
         rates = peak_rates(spline)
         found = {
             "v_max": rates[0] / limits.v_max,

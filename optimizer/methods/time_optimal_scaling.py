@@ -17,7 +17,7 @@ import toppra
 from toppra import algorithm, constraint
 
 from models.robot import Array
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.bspline import greville
 
 logging.getLogger("toppra").setLevel(logging.ERROR)
@@ -28,7 +28,7 @@ TRUST = 0.98
 
 
 @dataclass(frozen=True)
-class ShortestLaw:
+class TimeOptimalScaling:
     """Fractions of the line GRID (31,) reached at `times` (31,) [s], from rest to rest."""
 
     times: Array
@@ -45,23 +45,23 @@ class ShortestLaw:
         return np.asarray(values)
 
 
-def shortest_law(task: Task, q_start: Array, q_goal: Array) -> ShortestLaw | None:
+def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> TimeOptimalScaling | None:
     """The shortest law under speed, acceleration and torque limits, None where there is none.
 
     The motor torque's limit is relaxed by the most that friction can lend: the result stays a bound.
     """
-    limits, model = task.problem.arm.active_limits, task.model
-    travel = q_goal - q_start
-    if not np.abs(travel).max() > 0:
-        return ShortestLaw(np.linspace(0.0, 1e-9, len(GRID)))
+    limits, model = prepared.problem.arm.active_limits, prepared.model
+    displacement = q_goal - q_start
+    if not np.abs(displacement).max() > 0:
+        return TimeOptimalScaling(np.linspace(0.0, 1e-9, len(GRID)))
     data = model.createData()
 
     def torque(q: Array, v: Array, a: Array) -> Array:
         return np.asarray(pin.rnea(model, data, q, v, a))
 
-    tau = limits.tau_max + task.friction.torque(limits.v_max)
-    none = np.zeros(len(travel))
-    path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([travel, travel]))
+    tau = limits.tau_max + prepared.friction.torque(limits.v_max)
+    none = np.zeros(len(displacement))
+    path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([displacement, displacement]))
     constraints = [
         *_rate_constraints(tuple(limits.v_max.tolist()), tuple(limits.a_max.tolist())),
         constraint.JointTorqueConstraint(torque, np.stack([-tau, tau], axis=1), none),
@@ -70,7 +70,7 @@ def shortest_law(task: Task, q_start: Array, q_goal: Array) -> ShortestLaw | Non
     if speed is None or not np.isfinite(speed).all():
         return None
     steps = 2 * np.diff(GRID) / (speed[1:] + speed[:-1])
-    return ShortestLaw(np.concatenate([[0.0], np.cumsum(steps)]))
+    return TimeOptimalScaling(np.concatenate([[0.0], np.cumsum(steps)]))
 
 
 @lru_cache(maxsize=32)

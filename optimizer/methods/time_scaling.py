@@ -10,7 +10,7 @@ from typing import ClassVar
 from models.robot import Limits
 from optimizer.methods import time_optimal_scaling as shortest_line
 from optimizer.methods.free_spline import COARSE, EXACT, FreeSpline
-from optimizer.methods.method import Attempt
+from optimizer.methods.method import SolveResult
 from optimizer.methods.sqp_method import Guess
 from optimizer.nlp.coordinates import Coordinates
 from optimizer.solution import BaselineName
@@ -23,19 +23,19 @@ class TimeScaling(FreeSpline):
     """Solves a candidate along its straight line, from the shortest law that torque allows there."""
 
     # a baseline off the straight line is no guess for a motion along it
-    learns: ClassVar[tuple[BaselineName, ...]] = ("trapezoid", "quintic")
-    adopts: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
+    guess_baselines: ClassVar[tuple[BaselineName, ...]] = ("trapezoid", "quintic")
+    accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
 
-    def solve(self) -> Attempt:
+    def solve(self) -> SolveResult:
         """From toppra's law on."""
-        hit = self.task.hit(quintic_spline(self.q_start, self.q_goal, 1.0))
+        hit = self.prepared.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
         if hit is not None:
-            return Attempt("infeasible", f"on the straight line, {hit.words}", hit=hit)
-        law = shortest_line.shortest_law(self.task, self.q_start, self.q_goal)
+            return SolveResult("infeasible", f"on the straight line, {hit.message}", hit=hit)
+        law = shortest_line.time_optimal_on_line(self.prepared, self.q_start, self.q_goal)
         if law is None:
-            return Attempt("infeasible", "the straight line needs more torque than the joints have")
+            return SolveResult("infeasible", "the straight line needs more torque than the joints have")
         if law.duration_bound > self.t_max:
-            return Attempt("infeasible", f"the straight line takes at least {law.duration_bound:.4f} s")
+            return SolveResult("infeasible", f"the straight line takes at least {law.duration_bound:.4f} s")
         self.t_min = max(self.t_min, law.duration_bound)
         line = self.coordinates
         space = self.graded(float(profile.shortest_duration(line.goal - line.start, line.limits)), EXACT)

@@ -1,4 +1,4 @@
-"""`uniform_scaling`: a given motion slowed evenly, by the factor at which it spends least.
+"""`uniform_scaling`: a given motion retimed evenly, by the factor at which it spends least.
 
 D. Meike, M. Pellicciari, G. Berselli, "Energy efficient use of multirobot production lines in the automotive industry:
 detailed system modeling and optimization", IEEE Trans. Autom. Sci. Eng. 11, 2014: one factor per motion scales the time
@@ -7,19 +7,19 @@ of what the controller would do. The motion given here is the time-optimal jerk-
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
-from optimizer.methods.duration_intervals import Window
-from optimizer.methods.method import Attempt, Solver
-from optimizer.prepared_problem import Task
+from optimizer.deadline import Deadline
+from optimizer.methods.duration_intervals import DurationInterval
+from optimizer.methods.method import Method, SolveResult
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import Spline, peak_rates, sample, stretch
+from optimizer.trajectories.spline import Spline, peak_rates, sample, time_scale
 
 # factors tried, each so many times the one before; the search ends when so many in a row spend more than the best
 RATIO, PATIENCE = 1.12, 8
@@ -30,41 +30,48 @@ NEARNESS = 1e-5
 RATES_HELD, TORQUE_HELD = 1 - 1e-9, 1 - 1e-4
 
 
-class UniformScaling(Solver):
+class UniformScaling(Method):
     """Solves a candidate by the factor that slows its time-optimal motion."""
 
     def __init__(
-        self, task: Task, q_start: Array, q_goal: Array, deadline: float, window: Window | None = None
+        self,
+        prepared: PreparedProblem,
+        q_start: Array,
+        q_goal: Array,
+        deadline: Deadline,
+        interval: DurationInterval | None = None,
     ) -> None:
-        super().__init__(task, q_start, q_goal, deadline, window)
-        self.given = time_optimal_spline(task.problem.arm.active_limits, q_start, q_goal)
+        super().__init__(prepared, q_start, q_goal, deadline, interval)
+        self.given = time_optimal_spline(prepared.problem.arm.active_limits, q_start, q_goal)
         q, self._v, a = sample(self.given, grid(self.given.duration))
         self._q = q
         still = np.zeros_like(q)
         # rigid-body torque is that of holding still plus a part quadratic in speed: a factor divides that by its square
-        self._holding = task.torques(q, still, still)
-        self._moving = task.torques(q, self._v, a) - self._holding
+        self._holding = prepared.torques(q, still, still)
+        self._moving = prepared.torques(q, self._v, a) - self._holding
         self._evaluations = 0
 
-    def solve(self) -> Attempt:
+    def solve(self) -> SolveResult:
         """The factor of least energy (or the least factor, in haste) at which limits, torque and duration hold."""
-        limits, length = self.task.problem.arm.active_limits, self.given.duration
-        hit = self.task.hit(self.given)
+        limits, length = self.prepared.problem.arm.active_limits, self.given.duration
+        hit = self.prepared.worst_violation(self.given)
         if hit is not None:
-            return Attempt("infeasible", f"the given motion hits something: {hit.words}", hit=hit)
-        needed = stretch(peak_rates(self.given) / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD))
+            return SolveResult("infeasible", f"the given motion hits something: {hit.message}", hit=hit)
+        needed = time_scale(
+            peak_rates(self.given) / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD)
+        )
         least, most = max(needed, self.t_min / length), self.t_max / length
         if least > most:
-            return Attempt("infeasible", f"slowed evenly, the motion takes at least {least * length:.4f} s")
+            return SolveResult("infeasible", f"retimed evenly, the motion takes at least {least * length:.4f} s")
         factors, costs = [least], [self._cost(least)]
         while factors[-1] < most and (np.isinf(costs).all() or len(costs) - int(np.argmin(costs)) <= PATIENCE):
-            if time.perf_counter() > self.deadline:
-                return Attempt("out of time", "the deadline passed", self._evaluations)
+            if self.deadline.passed:
+                return SolveResult("out of time", "the deadline passed", self._evaluations)
             factors.append(min(factors[-1] * RATIO, most))
             costs.append(self._cost(factors[-1]))
         best = int(np.argmin(costs))
         if np.isinf(costs[best]):
-            return Attempt("failed", "found no factor at which torque holds its limit", self._evaluations)
+            return SolveResult("failed", "found no factor at which torque holds its limit", self._evaluations)
         factor, low, high = factors[best], factors[max(best - 1, 0)], factors[min(best + 1, len(factors) - 1)]
         if high > low:
             found = minimize_scalar(
@@ -72,7 +79,7 @@ class UniformScaling(Solver):
             )
             if found.fun < costs[best]:
                 factor = float(found.x)
-        return Attempt("solved", "converged", self._evaluations, 1, self._slowed(factor))
+        return SolveResult("solved", "converged", self._evaluations, 1, self._slowed(factor))
 
     def _slowed(self, factor: float) -> Spline:
         # rounding must not leave the duration's bounds
@@ -82,10 +89,15 @@ class UniformScaling(Solver):
     def _cost(self, factor: float) -> float:
         """What is minimised; infinite where torque, or a limit along the path, is broken."""
         self._evaluations += 1
-        tau = self._holding + self._moving / factor**2 + self.task.friction.torque(self._v / factor)
-        if (np.abs(tau) > self.task.problem.arm.active_limits.tau_max * TORQUE_HELD).any():
+        tau = self._holding + self._moving / factor**2 + self.prepared.friction.torque(self._v / factor)
+        if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_HELD).any():
             return np.inf
-        if self.task.path is not None and (self.task.path.shares(self._q, self._v / factor) > TORQUE_HELD).any():
+        if (
+            self.prepared.path is not None
+            and (self.prepared.path.ratios(self._q, self._v / factor) > TORQUE_HELD).any()
+        ):
             return np.inf
         spline = self._slowed(factor)
-        return spline.duration if self.window.hurried else self.task.objective_of(self.task.energy(spline))
+        return (
+            spline.duration if self.interval.minimum_time else self.prepared.objective_of(self.prepared.energy(spline))
+        )

@@ -9,8 +9,8 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.bodies import Indices
-from optimizer.collision.model import CollisionModel, Gaps
-from optimizer.kinematics.path_constraints import Shares
+from optimizer.collision.model import CollisionModel, PairDistances
+from optimizer.kinematics.path_constraints import ConstraintRatios
 
 CLEARANCE = "clearance"
 # kept beyond the margins [m]: twice the gap that the proof leaves between what it proves and what is met
@@ -21,7 +21,7 @@ SCALE, COUNTED = 0.1, 0.06
 
 
 @dataclass(frozen=True)
-class KeepAway:
+class ClearanceConstraint:
     """Pairs (k,) of a collision model. The share is 1 where a pair is RESERVE beyond its margin, 0 where it is SCALE
     further: linear in the signed distance.
     """
@@ -34,20 +34,20 @@ class KeepAway:
         """The same name for every pair."""
         return (CLEARANCE,) * len(self.pairs)
 
-    def shares(self, frames: Array, q: Array, v: Array) -> Array:
-        """Shares (n, k)."""
-        return _share(self._gaps(frames).distance)
+    def ratios(self, frames: Array, q: Array, v: Array) -> Array:
+        """ConstraintRatios (n, k)."""
+        return _share(self._pair_distances(frames).distance)
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> Shares:
-        """Shares and gradients, which are zero for bodies further apart than counts."""
-        found = self._gaps(frames)
+    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
+        """ConstraintRatios and gradients, which are zero for bodies further apart than counts."""
+        found = self._pair_distances(frames)
         by_q = np.zeros((*found.distance.shape, q.shape[1]))
         gradients = self.model.gradients(frames, found.configuration, self.pairs[found.column], found.nearest)
         by_q[found.configuration, found.column] = gradients / -SCALE
-        return Shares(_share(found.distance), by_q, np.zeros_like(by_q))
+        return ConstraintRatios(_share(found.distance), by_q, np.zeros_like(by_q))
 
-    def _gaps(self, frames: Array) -> Gaps:
-        return self.model.gaps(frames, self.pairs, COUNTED)
+    def _pair_distances(self, frames: Array) -> PairDistances:
+        return self.model.pair_distances(frames, self.pairs, COUNTED)
 
 
 def _share(distance: Array) -> Array:

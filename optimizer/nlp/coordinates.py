@@ -8,7 +8,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 
-# travel below this counts as none where a shared time law is limited by the joints' own limits [rad]
+# displacement below this counts as none where a shared time law is limited by the joints' own limits [rad]
 SHORTEST_TRAVEL = 1e-12
 
 
@@ -34,12 +34,12 @@ class Coordinates:
     @staticmethod
     def straight_line(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
         """All joints share one time law s ∈ [0, 1] along the straight line from start to goal."""
-        travel = q_goal - q_start
-        length = np.maximum(np.abs(travel), SHORTEST_TRAVEL)
+        displacement = q_goal - q_start
+        length = np.maximum(np.abs(displacement), SHORTEST_TRAVEL)
         zero, one = np.zeros(1), np.ones(1)
         v_max, a_max, j_max = (np.array([(m / length).min()]) for m in (limits.v_max, limits.a_max, limits.j_max))
         shared = Limits(zero, one, v_max, a_max, j_max, limits.tau_max)
-        return Coordinates(q_start, travel[:, None], zero, one, shared)
+        return Coordinates(q_start, displacement[:, None], zero, one, shared)
 
     @property
     def r(self) -> int:
@@ -56,7 +56,7 @@ class Coordinates:
 
 
 @dataclass(frozen=True)
-class Leeway:
+class GoalConstraints:
     """How far the goal may move from where it is: lower ≤ rows · (goal - coordinates.goal) ≤ upper, linear.
 
     rows (c, r), lower and upper (c,), equal where the goal may not move that way; `radius` bounds every coordinate's.

@@ -1,4 +1,4 @@
-"""The nonlinear programme of one candidate: a B-spline between two configurations, its cost, limits and derivatives.
+"""The nonlinear program of one candidate: a B-spline between two configurations, its cost, limits and derivatives.
 
 Unknowns are the free control points s (m, r) and the duration T. The spline runs in coordinates s ∈ R^r with
 q = origin + directions · s: the joints themselves (r = nq) for a B-spline motion, or the fraction of the straight line
@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from models.robot import Array, Limits
 from optimizer.energy.kernel import Kernel
-from optimizer.kinematics.path_constraints import PathLimits, Shares
-from optimizer.nlp.coordinates import Coordinates, Leeway
+from optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints
+from optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from optimizer.trajectories.bspline import Basis
 
 Index = npt.NDArray[np.intp]
@@ -31,7 +31,7 @@ DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class Linearisation:
-    """Value and derivatives of a programme at one point; x = (free control points row by row, T).
+    """Value and derivatives of a program at one point; x = (free control points row by row, T).
 
     `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau_motor, `tau` (N, nq), and the means to
     differentiate single torques: `jacobian` (N, nq, 3, r), `rate` (N, 3, r) = ∂(s, v, a)/∂T.
@@ -46,16 +46,16 @@ class Linearisation:
 
 
 @dataclass(frozen=True)
-class Passage:
+class PathConstraintValues:
     """The basis' path points: q and v (M, nq), and the shares of the limits along the path there, with gradients."""
 
     q: Array
     v: Array
-    shares: Shares
+    ratios: ConstraintRatios
 
 
 @dataclass(frozen=True)
-class PathRows:
+class ActivePathConstraints:
     """Limits along the path that come near: path point and column (rows,), room left, gradients (rows, n) by x."""
 
     points: Index
@@ -65,13 +65,13 @@ class PathRows:
 
 
 @dataclass(frozen=True)
-class Programme:
-    """One candidate's programme.
+class NonlinearProgram:
+    """One candidate's program.
 
     `p` is the packed parameter vector of the kernel; the duration lies in [t_min, t_max], equal ends fix it. `constant`
-    [J] is a part of the cost that nothing changes: it keeps relative changes of the cost in proportion. With `leeway`
-    the goal is an unknown too: the last row of the free control points, at which the motion comes to rest.
-    Every share c of `path` stays within room (c,), 1 or a little less.
+    [J] is a part of the cost that nothing changes: it keeps relative changes of the cost in proportion. With
+    `goal_constraints` the goal is an unknown too: the last row of the free control points, at which the motion comes
+    to rest. Every share c of `path` stays within room (c,), 1 or a little less.
     """
 
     kernel: Kernel
@@ -81,8 +81,8 @@ class Programme:
     t_min: float
     t_max: float
     constant: float = 0.0
-    leeway: Leeway | None = None
-    path: PathLimits | None = None
+    goal_constraints: GoalConstraints | None = None
+    path: PathConstraints | None = None
     room: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
@@ -98,7 +98,7 @@ class Programme:
     @property
     def free_count(self) -> int:
         """Number of free control points, the goal among them where it may move."""
-        return self.basis.n - 2 * self.basis.resting + (self.leeway is not None)
+        return self.basis.n - 2 * self.basis.resting + (self.goal_constraints is not None)
 
     @cached_property
     def rates(self) -> Array:
@@ -112,13 +112,13 @@ class Programme:
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""
         ends = np.ones((self.basis.resting, 1))
-        inner, goal = (free, self.coordinates.goal) if self.leeway is None else (free[:-1], free[-1])
+        inner, goal = (free, self.coordinates.goal) if self.goal_constraints is None else (free[:-1], free[-1])
         return np.concatenate([ends * self.coordinates.start, inner, ends * goal])
 
     def free_columns(self, matrix: Array) -> Array:
         """Of a basis matrix (…, n), what multiplies the free control points (…, m)."""
         inner = matrix[..., self.basis.free]
-        if self.leeway is None:
+        if self.goal_constraints is None:
             return np.ascontiguousarray(inner)
         return np.concatenate([inner, matrix[..., -self.basis.resting :].sum(axis=-1, keepdims=True)], axis=-1)
 
@@ -213,39 +213,41 @@ class Programme:
         """First to third derivative of s by τ on the fine grid, (3, M, r)."""
         return self.basis.at_grid @ self.points(free)
 
-    def passage(self, free: Array, T: float) -> Passage:
+    def path_values(self, free: Array, T: float) -> PathConstraintValues:
         """The limits along the path at the basis' path points; nothing at all where there are none."""
         if self.path is None:
             none = np.zeros((0, self.kernel.nq))
-            return Passage(none, none, Shares(none[:, :0], none[:, None], none[:, None]))
+            return PathConstraintValues(none, none, ConstraintRatios(none[:, :0], none[:, None], none[:, None]))
         s, rising = self.basis.at_path @ self.points(free)
         q, v = self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
-        return Passage(q, v, self.path.linearised(q, v))
+        return PathConstraintValues(q, v, self.path.linearised(q, v))
 
-    def path_rows(self, passage: Passage, T: float, near: float) -> PathRows:
+    def active_path_constraints(
+        self, path_values: PathConstraintValues, T: float, near: float
+    ) -> ActivePathConstraints:
         """The shares that use more than `near` of their room."""
         if self.path is None:
             none = np.zeros(0, dtype=np.intp)
-            return PathRows(none, none, np.zeros(0), np.zeros((0, self.free_count * self.r + 1)))
-        shares = passage.shares
+            return ActivePathConstraints(none, none, np.zeros(0), np.zeros((0, self.free_count * self.r + 1)))
+        shares = path_values.ratios
         k, c = np.nonzero(shares.value > near * self.room)
         by_q, by_v = shares.by_q[k, c], shares.by_v[k, c]
         at, rising = self._path_free[:, k, :, None]
         P = self.coordinates.directions
         by_points = at * (by_q @ P)[:, None] + rising * (by_v @ P / T)[:, None]
-        by_time = -np.einsum("rj,rj->r", by_v, passage.v[k]) / T
+        by_time = -np.einsum("rj,rj->r", by_v, path_values.v[k]) / T
         gradients = np.hstack([by_points.reshape(len(k), self.free_count * self.r), by_time[:, None]])
-        return PathRows(k, c, self.room[c] - shares.value[k, c], gradients)
+        return ActivePathConstraints(k, c, self.room[c] - shares.value[k, c], gradients)
 
-    def path_hessian(self, passage: Passage, T: float, weights: Array) -> Array:
+    def path_hessian(self, path_values: PathConstraintValues, T: float, weights: Array) -> Array:
         """Hessian (n, n) of Σ weights · shares, weights (M, c), by finite differences of the shares' gradients."""
         k = np.flatnonzero(weights.any(axis=1))
         n = self.free_count * self.r + 1
         if self.path is None or not len(k):
             return np.zeros((n, n))
         nq = self.kernel.nq
-        v = passage.v[k]
-        y = np.hstack([passage.q[k], v])
+        v = path_values.v[k]
+        y = np.hstack([path_values.q[k], v])
         stepped = np.concatenate([y[None], y + DIFFERENCE * np.eye(2 * nq)[:, None]]).reshape(-1, 2 * nq)
         shares = self.path.linearised(stepped[:, :nq], stepped[:, nq:])
         w = np.tile(weights[k], (2 * nq + 1, 1))[..., None]

@@ -1,4 +1,4 @@
-"""The only place that calls a solver: sequential quadratic programming on a candidate's programme.
+"""The only place that calls a solver: sequential quadratic programming on a candidate's program.
 
 A dense SQP with exact Hessians. Each step solves a QP (DAQP, dual active set) over the rows that come near their limit;
 rows that the step would break are added and the QP is solved again. Peaks of speed, acceleration and jerk are rows
@@ -8,8 +8,6 @@ it converge from anywhere.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,13 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array
-from optimizer.nlp.nonlinear_program import Linearisation, Passage, Programme
+from optimizer.deadline import NEVER, Deadline
+from optimizer.nlp.nonlinear_program import Linearisation, NonlinearProgram, PathConstraintValues
 
 # rows enter the QP when they use more than this share of their limit
 NEAR = 0.8
 NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
-# a programme counts as feasible when no row exceeds its limit by more than this share
+# a program counts as feasible when no row exceeds its limit by more than this share
 FEASIBILITY = 1e-4
 # relative decrease of cost that a further step must promise
 PROGRESS = 5e-5
@@ -91,18 +90,18 @@ def _peaks(size: Array) -> npt.NDArray[np.bool_]:
 class _Solver:
     """One run of the SQP. Unknowns x: free control points row by row, then, if it is free, T / time_scale."""
 
-    def __init__(self, programme: Programme, clock: Callable[[], float], deadline: float) -> None:
-        self.p = programme
-        self.clock, self.deadline = clock, deadline
-        self.free_time = programme.t_max > programme.t_min
-        self.count = programme.free_count * programme.r
+    def __init__(self, program: NonlinearProgram, deadline: Deadline) -> None:
+        self.p = program
+        self.deadline = deadline
+        self.free_time = program.t_max > program.t_min
+        self.count = program.free_count * program.r
         self.n = self.count + int(self.free_time)
-        basis = programme.basis
-        self.grid_free = programme.free_columns(basis.at_grid)
+        basis = program.basis
+        self.grid_free = program.free_columns(basis.at_grid)
         self.anchors = basis.anchors[:, :, None]
-        self.tau_max = programme.limits.tau_max
+        self.tau_max = program.limits.tau_max
         self.orders = np.arange(1, 4)
-        self.active = np.zeros((*basis.at_grid.shape[:2], programme.r), dtype=bool)
+        self.active = np.zeros((*basis.at_grid.shape[:2], program.r), dtype=bool)
 
     def rates(self, T: float) -> Array:
         """Limits of the derivatives by τ, (3, r)."""
@@ -125,21 +124,21 @@ class _Solver:
             scale[-1] = time_scale
         line, kin = p.derivatives(free, T, multiplier), p.kinematics(free)
         cost_scale = 1.0 / max(abs(line.cost), 1e-9)
-        passage = p.passage(free, T)
-        violation = self.violations(kin, T, line.tau, passage.shares.value)
+        path_values = p.path_values(free, T)
+        violation = self.violations(kin, T, line.tau, path_values.ratios.value)
         penalty = np.full(len(violation), 0.1)
-        path_multiplier = np.zeros_like(passage.shares.value)
+        path_multiplier = np.zeros_like(path_values.ratios.value)
         curvature, stationarity, iterations = 0.0, np.inf, 0
         status: Status = "stalled"
         for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
-            if self.clock() > self.deadline:
+            if self.deadline.passed:
                 status = "out of time"
                 break
             g = line.gradient[: self.n] * scale * cost_scale
-            H = (line.hessian + p.path_hessian(passage, T, path_multiplier)) * cost_scale
+            H = (line.hessian + p.path_hessian(path_values, T, path_multiplier)) * cost_scale
             H[-1, -1] += curvature
             H = _convex(H[: self.n, : self.n] * np.outer(scale, scale))
-            step = self._qp(H, g, line, passage, free, T, time_scale, kin / self.rates(T)[:, None, :])
+            step = self._qp(H, g, line, path_values, free, T, time_scale, kin / self.rates(T)[:, None, :])
             if step is None:
                 status = "infeasible"
                 break
@@ -174,15 +173,15 @@ class _Solver:
                 trial_T = min(max(trial_T, p.t_min), p.t_max)  # rounding must not leave the bounds
                 trial_cost, trial_tau = p.value(trial, trial_T)
                 trial_kin = p.kinematics(trial)
-                trial_passage = p.passage(trial, trial_T)
-                trial_violation = self.violations(trial_kin, trial_T, trial_tau, trial_passage.shares.value)
+                trial_path_values = p.path_values(trial, trial_T)
+                trial_violation = self.violations(trial_kin, trial_T, trial_tau, trial_path_values.ratios.value)
                 if trial_cost * cost_scale + float(penalty @ trial_violation) <= merit + 1e-4 * alpha * descent + 1e-12:
                     break
                 alpha *= 0.5
             else:
                 status = "solved" if worst < FEASIBILITY and promised < 100 * PROGRESS else "stalled"
                 break
-            free, T, kin, passage, violation = trial, trial_T, trial_kin, trial_passage, trial_violation
+            free, T, kin, path_values, violation = trial, trial_T, trial_kin, trial_path_values, trial_violation
             line = p.derivatives(free, T, multiplier)
         return Result(status, free, T, line.cost, iterations, float(violation.max()), stationarity, multiplier)
 
@@ -214,39 +213,39 @@ class _Solver:
         p = self.p
         lower = np.maximum(np.tile(p.limits.q_min, p.free_count) - free.ravel(), -STEP)
         upper = np.minimum(np.tile(p.limits.q_max, p.free_count) - free.ravel(), STEP)
-        if p.leeway is not None:
+        if p.goal_constraints is not None:
             moved = free[-1] - p.coordinates.goal
-            lower[-p.r :] = np.maximum(lower[-p.r :], -p.leeway.radius - moved)
-            upper[-p.r :] = np.minimum(upper[-p.r :], p.leeway.radius - moved)
+            lower[-p.r :] = np.maximum(lower[-p.r :], -p.goal_constraints.radius - moved)
+            upper[-p.r :] = np.minimum(upper[-p.r :], p.goal_constraints.radius - moved)
         if self.free_time:
             lower = np.append(lower, max(p.t_min - T, -0.5 * T) / time_scale)
             upper = np.append(upper, min(p.t_max - T, T) / time_scale)
         return lower, upper
 
     def _leeway_rows(self, free: Array) -> tuple[Array, Array, Array]:
-        """Rows (c, n) that keep the goal within its leeway, and the least and most that each may change."""
-        leeway = self.p.leeway
-        if leeway is None:
+        """Rows (c, n) that keep the goal within its goal_constraints, and the least and most that each may change."""
+        goal_constraints = self.p.goal_constraints
+        if goal_constraints is None:
             return np.zeros((0, self.n)), np.zeros(0), np.zeros(0)
-        A = np.zeros((len(leeway.rows), self.n))
-        A[:, self.count - self.p.r : self.count] = leeway.rows
-        moved = leeway.rows @ (free[-1] - self.p.coordinates.goal)
-        return A, leeway.lower - moved, leeway.upper - moved
+        A = np.zeros((len(goal_constraints.rows), self.n))
+        A[:, self.count - self.p.r : self.count] = goal_constraints.rows
+        moved = goal_constraints.rows @ (free[-1] - self.p.coordinates.goal)
+        return A, goal_constraints.lower - moved, goal_constraints.upper - moved
 
     def _qp(
         self,
         H: Array,
         g: Array,
         line: Linearisation,
-        passage: Passage,
+        path_values: PathConstraintValues,
         free: Array,
         T: float,
         time_scale: float,
         ratio: Array,
     ) -> _Step | None:
         k, j, torque_sign, A_torque, b_torque = self._torque_rows(line, T, time_scale)
-        path_rows = self.p.path_rows(passage, T, NEAR_PATH)
-        A_path = path_rows.gradients
+        active_path_constraints = self.p.active_path_constraints(path_values, T, NEAR_PATH)
+        A_path = active_path_constraints.gradients
         A_path[:, -1] *= time_scale
         lower, upper = self._bounds(free, T, time_scale)
         size = np.abs(ratio)
@@ -258,8 +257,8 @@ class _Solver:
         hard = self.n + len(A_goal)
         equal = self.n + np.flatnonzero(least_goal == most_goal)
         A = np.concatenate([A_goal, A_path[:, : self.n], A_torque, self._kinematic_rows(places, sign, T, time_scale)])
-        b = np.concatenate([path_rows.room, b_torque, 1 - size[places]])
-        before = len(path_rows.room) + len(k)
+        b = np.concatenate([active_path_constraints.room, b_torque, 1 - size[places]])
+        before = len(active_path_constraints.room) + len(k)
         soft = False
         working = np.concatenate([np.zeros(hard + before, dtype=bool), self.active[places]])
         for attempt in range(QP_ROUNDS):
@@ -297,12 +296,20 @@ class _Solver:
             places = tuple(np.concatenate(both) for both in zip(places, fresh, strict=True))  # type: ignore[assignment]
             sign = np.concatenate([sign, fresh_sign])
         mu = np.maximum(info["lam"][hard:], 0.0)
-        path, torque, kinematic = np.split(mu, [len(path_rows.room), before])
+        path, torque, kinematic = np.split(mu, [len(active_path_constraints.room), before])
         self.active[...] = False
         held = kinematic > 0
         self.active[tuple(place[held] for place in places)] = True
         return _Step(
-            x, soft, places, kinematic, (k, j), torque_sign, torque, (path_rows.points, path_rows.columns), path
+            x,
+            soft,
+            places,
+            kinematic,
+            (k, j),
+            torque_sign,
+            torque,
+            (active_path_constraints.points, active_path_constraints.columns),
+            path,
         )
 
 
@@ -319,13 +326,12 @@ def _convex(H: Array) -> Array:
 
 
 def solve(
-    programme: Programme,
+    program: NonlinearProgram,
     free: Array,
     duration: float,
     multiplier: Array | None = None,
-    deadline: float = np.inf,
-    clock: Callable[[], float] = time.perf_counter,
+    deadline: Deadline = NEVER,
 ) -> Result:
-    """Minimise a programme's cost from a first guess: free control points (m, r) and a duration [s]."""
-    duration = min(max(duration, programme.t_min), programme.t_max)
-    return _Solver(programme, clock, deadline).solve(free, duration, multiplier)
+    """Minimise a program's cost from a first guess: free control points (m, r) and a duration [s]."""
+    duration = min(max(duration, program.t_min), program.t_max)
+    return _Solver(program, deadline).solve(free, duration, multiplier)

@@ -46,6 +46,7 @@ def placement(name: str, T: Array) -> Array:
 
 
 def numbers(name: str, values: object, shape: tuple[int, ...]) -> Array:
+    """A read-only array of that shape, -1 standing for any length. Raises InvalidProblem, with the field named."""
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):

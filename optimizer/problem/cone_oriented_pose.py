@@ -16,7 +16,7 @@ SHORTEST_AXIS = 1e-9
 
 
 @dataclass(frozen=True)
-class LoosePose:
+class ConeOrientedPose:
     """The TCP at `position` (3,) [m] in the base frame, turned so that `axis` is within `half_angle` of `direction`.
 
     `axis` (3,) is fixed to the tool, in the TCP frame; `direction` (3,) is in the base frame; both are normalised. A
@@ -44,9 +44,9 @@ class LoosePose:
             )
 
     @staticmethod
-    def about(pose: Pose, axis: Array) -> LoosePose:
+    def about(pose: Pose, axis: Array) -> ConeOrientedPose:
         """That pose, or any that a rotation about `axis` (3,), given in the TCP frame, makes of it."""
-        return LoosePose(pose.T[:3, 3], axis, pose.T[:3, :3] @ frozen(axis, (3,), "pose.orientation.axis"), 0.0)
+        return ConeOrientedPose(pose.T[:3, 3], axis, pose.T[:3, :3] @ frozen(axis, (3,), "pose.orientation.axis"), 0.0)
 
     @property
     def freedom(self) -> int:

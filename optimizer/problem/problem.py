@@ -16,7 +16,7 @@ from optimizer.problem.targets import Target, members, validated
 if TYPE_CHECKING:
     from optimizer.problem.branches import Label
 
-Method = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
+MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
 Objective = Literal["electrical", "mechanical"]
 
 
@@ -35,7 +35,7 @@ class Problem:
     arm: Arm
     start: Target
     goal: Target
-    method: Method = "bspline"
+    method: MethodName = "bspline"
     objective: Objective = "electrical"
     duration_min: float | None = None
     duration_max: float | None = None

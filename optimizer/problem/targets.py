@@ -8,13 +8,13 @@ from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.arrays import frozen
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 
 # of `AnyOf`
 MOST_TARGETS = 64
 
-Single = Array | Pose | LoosePose
+Single = Array | Pose | ConeOrientedPose
 
 
 @dataclass(frozen=True)
@@ -55,18 +55,18 @@ def validated(arm: Arm, name: str, target: Target) -> Target:
     Raises InvalidProblem, also for a start whose orientation is free, or OutsideLimits for joint positions out of
     range; those of an AnyOf are merely unreachable.
     """
-    if name == "start" and any(isinstance(member, LoosePose) for member in members(target)):
+    if name == "start" and any(isinstance(member, ConeOrientedPose) for member in members(target)):
         raise InvalidProblem(name, "Only a goal's orientation may be free: give the start's in full.")
     if isinstance(target, AnyOf):
         nq = (arm.robot.nq,)
         fields = [f"{name}.any_of.{k}.q" for k in range(len(target.targets))]
         return AnyOf(
             tuple(
-                member if isinstance(member, Pose | LoosePose) else frozen(member, nq, field)
+                member if isinstance(member, Pose | ConeOrientedPose) else frozen(member, nq, field)
                 for member, field in zip(target.targets, fields, strict=True)
             )
         )
-    if isinstance(target, Pose | LoosePose):
+    if isinstance(target, Pose | ConeOrientedPose):
         return target
     q = frozen(target, (arm.robot.nq,), f"{name}.q")
     arm.check_inside(name, q)

@@ -24,10 +24,10 @@ from optimizer.energy.losses import breakdown, power_flow
 from optimizer.energy.plant import Plant
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from optimizer.problem.arm import Arm
-from optimizer.replay.limit_report import LimitReport, LimitWatch
-from optimizer.replay.nearest_contact import ContactWatch, Nearest
-from optimizer.replay.piecewise_motion import Pieces, pieces
-from optimizer.replay.recording import BLOCK, Configurations, Log
+from optimizer.replay.limit_report import LimitMonitor, LimitReport
+from optimizer.replay.nearest_contact import ClearanceMonitor, LeastClearance
+from optimizer.replay.piecewise_motion import PiecewiseMotion, piecewise_motion
+from optimizer.replay.recording import BLOCK, Log, Waypoints
 from optimizer.solution import Energy, StorageUse
 from optimizer.trajectories.quadrature import LOBATTO, LOBATTO_WEIGHTS
 
@@ -42,7 +42,7 @@ Sum = TypeVar("Sum")
 
 
 @dataclass(frozen=True)
-class Stretch:
+class IntervalEnergy:
     """Energy of a segment, or of the whole motion, from `start` to `end` [s] after the motion's start.
 
     `kinetic_start`, `kinetic_end` [J]: kinetic energy, rotors included, just after the start and just before the end.
@@ -96,17 +96,17 @@ class Evaluation:
     compared.
     """
 
-    total: Stretch
-    segments: list[Stretch]
+    total: IntervalEnergy
+    segments: list[IntervalEnergy]
     segment_count: int
     speed_jumps: int
     limits: list[LimitReport]
     samples: Samples | None
-    nearest: Nearest | None
+    nearest: LeastClearance | None
 
 
 def evaluate(
-    arm: Arm, motion: Configurations | Log, sample_period: float | None = None, deadline: float = np.inf
+    arm: Arm, motion: Waypoints | Log, sample_period: float | None = None, deadline: float = np.inf
 ) -> Evaluation:
     """Energy, limits and, with a `sample_period` [s], samples of a motion, in `deadline` seconds of wall time.
 
@@ -117,21 +117,21 @@ def evaluate(
 
 
 class _Evaluator:
-    def __init__(self, plant: Plant, motion: Configurations | Log, period: float | None, end: float) -> None:
+    def __init__(self, plant: Plant, motion: Waypoints | Log, period: float | None, end: float) -> None:
         self._plant, self._motion, self._period, self._end = plant, motion, period, end
         self._arm, self._charge = plant.arm, plant.arm.bus.initial
         self._data = plant.model.createData()
-        self._watch = LimitWatch(plant.arm)
-        self._contact = ContactWatch(plant.arm) if plant.arm.collisions else None
-        self._count = motion.segments if isinstance(motion, Configurations) else 1
-        self._stretches: dict[int, Stretch] = {}
+        self._watch = LimitMonitor(plant.arm)
+        self._contact = ClearanceMonitor(plant.arm) if plant.arm.collisions else None
+        self._count = motion.segments if isinstance(motion, Waypoints) else 1
+        self._stretches: dict[int, IntervalEnergy] = {}
         self._samples: list[Samples] = []
         self._sampled = 0
         self._jumps = 0
 
     def run(self) -> Evaluation:
         last = None
-        for stretch in pieces(self._plant.arm, self._motion):
+        for stretch in piecewise_motion(self._plant.arm, self._motion):
             if time.monotonic() > self._end:
                 raise DeadlineExceeded([])
             self._account(stretch, last)
@@ -150,7 +150,7 @@ class _Evaluator:
             nearest=None if self._contact is None else self._contact.nearest,
         )
 
-    def _account(self, stretch: Pieces, before: Pieces | None) -> None:
+    def _account(self, stretch: PiecewiseMotion, before: PiecewiseMotion | None) -> None:
         """Adds energy and limits of some pieces; `before` are those that came just before."""
         panels = _panels(stretch)
         lengths = np.repeat(np.diff(stretch.breaks) / panels, panels)
@@ -162,10 +162,10 @@ class _Evaluator:
         piece = np.repeat(piece, len(LOBATTO))
         q, v, a, jerk = stretch.at(piece, x)
         tau = self._plant.torques(q, v, a)
-        self._watch.see(stretch.breaks[piece] + x, q, v, a, jerk, tau)
+        self._watch.update(stretch.breaks[piece] + x, q, v, a, jerk, tau)
 
         if self._contact is not None:
-            self._contact.see(stretch)
+            self._contact.update(stretch)
         jumps = self._watch.see_breaks(stretch, before)
         self._jumps += len(jumps)
         joints = power_flow(tau, v, self._arm.drives, self._arm.friction_law).joints
@@ -194,7 +194,9 @@ class _Evaluator:
                 self._charged(float(charge[begin])),
                 kinetic=kinetic_end - kinetic_start - jumped,
             )
-            part = Stretch(float(stretch.breaks[low]), float(stretch.breaks[high]), energy, kinetic_start, kinetic_end)
+            part = IntervalEnergy(
+                float(stretch.breaks[low]), float(stretch.breaks[high]), energy, kinetic_start, kinetic_end
+            )
             known = self._stretches.get(int(segment[low]))
             self._stretches[int(segment[low])] = part if known is None else _joined([known, part])
 
@@ -207,7 +209,7 @@ class _Evaluator:
         bus = self._arm.bus
         return replace(self._arm, bus=replace(bus, initial=charge)) if bus.mode == "storage" else self._arm
 
-    def _sample(self, stretch: Pieces, period: float, charge: Callable[[Array], Array]) -> None:
+    def _sample(self, stretch: PiecewiseMotion, period: float, charge: Callable[[Array], Array]) -> None:
         """Adds the samples that lie before the pieces' end; `charge` of the store [J] at a time."""
         # what lies within a millionth of a period of the end is rounding, not a sample of its own
         stop = int(np.ceil(stretch.breaks[-1] / period - 1e-6))
@@ -219,7 +221,7 @@ class _Evaluator:
         self._add_samples(stretch, t, charge(t))
         self._sampled = max(stop, self._sampled)
 
-    def _add_samples(self, stretch: Pieces, t: Array, charge: Array) -> None:
+    def _add_samples(self, stretch: PiecewiseMotion, t: Array, charge: Array) -> None:
         if not len(t):
             return
         piece = np.clip(np.searchsorted(stretch.breaks, t, side="right") - 1, 0, len(stretch.segment) - 1)
@@ -231,14 +233,14 @@ class _Evaluator:
         self._samples.append(Samples(t, q, v, a, tau, flow.tau_motor, power, charge))
 
 
-def _panels(stretch: Pieces) -> npt.NDArray[np.int64]:
+def _panels(stretch: PiecewiseMotion) -> npt.NDArray[np.int64]:
     """How many quadrature panels (m,) each piece is divided into: more where there are few pieces."""
     lengths = np.diff(stretch.breaks)
     even = max(BLOCK // len(lengths), 1)
     return np.clip(np.ceil(lengths / LONGEST_PANEL), even, max(MOST_PANELS, even)).astype(np.int64)
 
 
-def _joined(parts: Iterable[Stretch]) -> Stretch:
+def _joined(parts: Iterable[IntervalEnergy]) -> IntervalEnergy:
     """Stretches that follow each other as one."""
     parts = list(parts)
     first, last = parts[0], parts[-1]
@@ -250,7 +252,7 @@ def _joined(parts: Iterable[Stretch]) -> Stretch:
         mean_power=sum(part.energy.mean_power * part.duration for part in parts) / duration,
         storage=_storage([energy.storage for energy in energies if energy.storage is not None]),
     )
-    return Stretch(first.start, last.end, energy, first.kinetic_start, last.kinetic_end)
+    return IntervalEnergy(first.start, last.end, energy, first.kinetic_start, last.kinetic_end)
 
 
 def _storage(uses: list[StorageUse]) -> StorageUse | None:

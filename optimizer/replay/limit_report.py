@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array
-from optimizer.kinematics.path_constraints import path_limits_of
+from optimizer.kinematics.path_constraints import path_constraints_of
 from optimizer.problem.arm import Arm
-from optimizer.replay.piecewise_motion import Pieces
+from optimizer.replay.piecewise_motion import PiecewiseMotion
 from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, ratios
 
 LimitName = Literal["position", "velocity", "acceleration", "jerk", "torque", "tool_cone", "tcp_speed", "elbow_speed"]
@@ -42,13 +42,13 @@ class LimitReport:
         return self.ratio <= 1 + RATIO_TOLERANCE
 
 
-class LimitWatch:
+class LimitMonitor:
     """Sees a motion go by and keeps the worst of every limit."""
 
     def __init__(self, arm: Arm) -> None:
         self._limits, self._joints, self._friction = arm.active_limits, arm.robot.joint_names, arm.friction_law
         self._worst: dict[LimitName, LimitReport] = {}
-        self._path = path_limits_of(arm)
+        self._path = path_constraints_of(arm)
         self._path_bounds: dict[str, float] = {
             name: bound
             for name, bound in {
@@ -59,7 +59,7 @@ class LimitWatch:
             if bound is not None
         }
 
-    def see(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
+    def update(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
         """Samples: t (k,) [s], the others (k, nq); tau is rigid body and rotor torque [N·m]."""
         tau_motor = tau + self._friction.torque(v)
         limits = self._limits
@@ -75,12 +75,12 @@ class LimitWatch:
             self._note(name, float(ratio[k, j]), int(j), float(t[k]), float(values[name][k, j]), float(bound))  # type: ignore[arg-type]
 
         if self._path is not None:
-            shares = self._path.shares(q, v)
+            shares = self._path.ratios(q, v)
             for path_name, share, at in zip(self._path.names, shares.max(axis=0), shares.argmax(axis=0), strict=True):
                 bound = self._path_bounds[path_name]
                 self._note(path_name, float(share), None, float(t[at]), float(share) * bound, bound)  # type: ignore[arg-type]
 
-    def see_breaks(self, pieces: Pieces, before: Pieces | None) -> npt.NDArray[np.int64]:
+    def see_breaks(self, pieces: PiecewiseMotion, before: PiecewiseMotion | None) -> npt.NDArray[np.int64]:
         """Where pieces meet. Returns those of the pieces (indices) at whose start the speed jumps."""
         piece = np.arange(len(pieces.segment))
         _, v_end, a_end, _ = pieces.at(piece, np.diff(pieces.breaks))

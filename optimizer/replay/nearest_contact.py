@@ -8,7 +8,7 @@ import numpy as np
 
 from optimizer.collision.model import collision_model
 from optimizer.problem.arm import Arm
-from optimizer.replay.piecewise_motion import Pieces
+from optimizer.replay.piecewise_motion import PiecewiseMotion
 
 # between samples at most [s], if a block of pieces is not so long that it would take more than MOST
 PERIOD, MOST = 0.01, 16384
@@ -19,7 +19,7 @@ CHECKS = 100_000
 
 
 @dataclass(frozen=True)
-class Nearest:
+class LeastClearance:
     """The least distance met [m], less the obstacle's margin, of which `pair` and when [s].
 
     Met at instants at most `spacing` [s] apart: between two of them the arm may come nearer.
@@ -31,14 +31,14 @@ class Nearest:
     spacing: float
 
 
-class ContactWatch:
+class ClearanceMonitor:
     """Sees a motion go by and keeps the least distance."""
 
     def __init__(self, arm: Arm) -> None:
         self._model = collision_model(arm)
-        self.nearest: Nearest | None = None
+        self.nearest: LeastClearance | None = None
 
-    def see(self, pieces: Pieces) -> None:
+    def update(self, pieces: PiecewiseMotion) -> None:
         """Consecutive pieces."""
         begin, end = float(pieces.breaks[0]), float(pieces.breaks[-1])
         t = np.linspace(begin, end, min(int(np.ceil((end - begin) / PERIOD)), MOST) + 1)
@@ -52,7 +52,7 @@ class ContactWatch:
             contacts = self._model.contacts(q[low : low + at_once], within)
             for k, contact in enumerate(contacts, low):
                 if self.nearest is None or contact.distance < self.nearest.distance:
-                    self.nearest = Nearest(contact.distance, contact.pair, float(t[k]), spacing)
+                    self.nearest = LeastClearance(contact.distance, contact.pair, float(t[k]), spacing)
             within = within if self.nearest is None else min(within, self.nearest.distance)
         if self.nearest is not None:
             self.nearest = replace(self.nearest, spacing=spacing)

@@ -22,7 +22,7 @@ from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from models.robot import Array, Limits
 from optimizer.problem.arm import Arm
-from optimizer.replay.recording import BLOCK, Configurations, Log, LogBlock
+from optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints
 from optimizer.trajectories.time_scalings import blend_time
 
 # A cubic spline forgets a row's value by a factor of 3.7 from row to row: 48 rows further on, 1e-27 of it is left, and
@@ -31,7 +31,7 @@ OVERLAP = 48
 
 
 @dataclass(frozen=True)
-class Pieces:
+class PiecewiseMotion:
     """Consecutive polynomial pieces: `breaks` (m + 1,) [s] from the motion's start, `segment` (m,) that each is in.
 
     `q`, `v`, `a`, `jerk` hold coefficients (degree + 1, m, nq), highest power first, of the time since the piece's
@@ -46,9 +46,9 @@ class Pieces:
     jerk: Array
 
     @staticmethod
-    def of(curve: PPoly, segment: npt.NDArray[np.int64]) -> Pieces:
-        """Pieces of a curve and its derivatives."""
-        return Pieces(curve.x, segment, *(curve.derivative(k).c if k else curve.c for k in range(4)))
+    def of(curve: PPoly, segment: npt.NDArray[np.int64]) -> PiecewiseMotion:
+        """PiecewiseMotion of a curve and its derivatives."""
+        return PiecewiseMotion(curve.x, segment, *(curve.derivative(k).c if k else curve.c for k in range(4)))
 
     def at(self, piece: npt.NDArray[np.int64], x: Array) -> tuple[Array, Array, Array, Array]:
         """q, v, a, jerk (k, nq) at x (k,) [s] into the pieces (k,)."""
@@ -56,7 +56,7 @@ class Pieces:
         return q, v, a, jerk
 
 
-def pieces(arm: Arm, motion: Configurations | Log) -> Iterator[Pieces]:
+def piecewise_motion(arm: Arm, motion: Waypoints | Log) -> Iterator[PiecewiseMotion]:
     """The motion's pieces in the order of time. Raises InvalidTable or InvalidProblem."""
     if isinstance(motion, Log):
         yield from _log(arm, motion)
@@ -68,24 +68,24 @@ def pieces(arm: Arm, motion: Configurations | Log) -> Iterator[Pieces]:
         # its knots are the configurations' times; the stubs know no list of derivatives
         curve = make_interp_spline(ends, motion.q, k=5, bc_type=(at_rest, at_rest))  # type: ignore[arg-type]
         powers = [curve(ends[:-1], order) / math.factorial(order) for order in range(5, -1, -1)]
-        yield Pieces.of(PPoly(np.stack(powers), ends), np.arange(motion.segments))
+        yield PiecewiseMotion.of(PPoly(np.stack(powers), ends), np.arange(motion.segments))
         return
     for low in range(0, motion.segments, BLOCK):
         rows = slice(low, min(low + BLOCK, motion.segments))
         yield _segments(motion, arm.active_limits, rows, ends[low])
 
 
-def _segments(motion: Configurations, limits: Limits, rows: slice, start: float) -> Pieces:
-    """Segments that are straight lines in joint space: q_start + s(t) · travel."""
+def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> PiecewiseMotion:
+    """Segments that are straight lines in joint space: q_start + s(t) · displacement."""
     q, T = motion.q[rows], motion.times[rows]
-    travel = motion.q[rows.start + 1 : rows.stop + 1] - q
+    displacement = motion.q[rows.start + 1 : rows.stop + 1] - q
     segment = np.arange(rows.start, rows.stop)
     if motion.interpolation == "linear":
         law, lengths = [1 / T, 0 * T], T
     elif motion.interpolation == "quintic":
         law, lengths = [6 / T**5, -15 / T**4, 10 / T**3, 0 * T, 0 * T, 0 * T], T
     else:
-        blend = blend_time(limits, travel, T)
+        blend = blend_time(limits, displacement, T)
         speed = 1 / (T - blend)
         bend = speed / (2 * blend)
         cruise = np.maximum(T - 2 * blend, 0.0)
@@ -98,13 +98,13 @@ def _segments(motion: Configurations, limits: Limits, rows: slice, start: float)
         lengths = np.stack([blend, cruise, blend], axis=1).ravel()
         real = lengths > 1e-12 * np.repeat(T, 3)
         law, lengths = [part[real] for part in law], lengths[real]
-        q, travel, segment = (np.repeat(each, 3, axis=0)[real] for each in (q, travel, segment))
-    coefficients = np.stack(law)[:, :, None] * travel
+        q, displacement, segment = (np.repeat(each, 3, axis=0)[real] for each in (q, displacement, segment))
+    coefficients = np.stack(law)[:, :, None] * displacement
     coefficients[-1] += q
-    return Pieces.of(PPoly(coefficients, start + np.concatenate([[0.0], np.cumsum(lengths)])), segment)
+    return PiecewiseMotion.of(PPoly(coefficients, start + np.concatenate([[0.0], np.cumsum(lengths)])), segment)
 
 
-def _log(arm: Arm, log: Log) -> Iterator[Pieces]:
+def _log(arm: Arm, log: Log) -> Iterator[PiecewiseMotion]:
     """A log in stretches, each with rows on either side that its spline needs and its pieces leave out."""
     held: LogBlock | None = None
     begin = 0
@@ -119,14 +119,14 @@ def _log(arm: Arm, log: Log) -> Iterator[Pieces]:
     yield _stretch(held, begin, len(held.t) - 1)
 
 
-def _stretch(block: LogBlock, begin: int, end: int) -> Pieces:
+def _stretch(block: LogBlock, begin: int, end: int) -> PiecewiseMotion:
     """The pieces from row `begin` to row `end` of the spline through all rows of the block."""
     q = CubicSpline(block.t, block.q)
     v = q.derivative() if block.v is None else CubicSpline(block.t, block.v)
     a = v.derivative() if block.a is None else CubicSpline(block.t, block.a)
     inside = (slice(None), slice(begin, end))
     curves = (curve.c[inside] for curve in (q, v, a, a.derivative()))
-    return Pieces(block.t[begin : end + 1], np.zeros(end - begin, dtype=np.int64), *curves)
+    return PiecewiseMotion(block.t[begin : end + 1], np.zeros(end - begin, dtype=np.int64), *curves)
 
 
 def _joined(first: LogBlock, second: LogBlock) -> LogBlock:

@@ -31,7 +31,7 @@ FAR_OUT = 2.0
 
 
 @dataclass(frozen=True)
-class Configurations:
+class Waypoints:
     """Joint positions q (n, nq) [rad] to go through, with `times` (n - 1,) [s], one for every segment between them.
 
     `times` may be one number for all. See `optimizer.pieces` for what each interpolation does.

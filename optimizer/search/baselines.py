@@ -36,13 +36,14 @@ def baselines(
     ours: float,
     torques: Torques,
     potential: Callable[[Array], float],
-    keeps_path: Callable[[Array, Array], bool],
+    satisfies_path_constraints: Callable[[Array, Array], bool],
 ) -> list[Baseline]:
     """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the position limits.
 
     `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
     (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
-    `keeps_path` says of samples q, v (k, nq) whether they hit nothing and hold the limits along the path.
+    `satisfies_path_constraints` says of samples q, v (k, nq) whether they hit nothing and hold the limits along the
+    path.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks
@@ -63,7 +64,7 @@ def baselines(
                 duration=motion.duration,
                 electrical=energy.electrical.total,
                 mechanical=energy.mechanical.total,
-                within_limits=within_limits(problem, motion, tau) and keeps_path(motion.q, motion.v),
+                within_limits=within_limits(problem, motion, tau) and satisfies_path_constraints(motion.q, motion.v),
                 saving=saving(ours, theirs),
             )
         )
@@ -83,11 +84,12 @@ def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) ->
 
 
 def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:
-    """The goal (nq,) of q_goals (m, nq) that all joints reach first at their speed limits; of equals, least travel."""
-    travel = np.abs(np.asarray(q_goals) - q_start)
-    times = (travel / problem.arm.active_limits.v_max).max(axis=1)
+    """The goal (nq,) of q_goals (m, nq) that all joints reach first at their speed limits; of equals, least
+    displacement."""
+    displacement = np.abs(np.asarray(q_goals) - q_start)
+    times = (displacement / problem.arm.active_limits.v_max).max(axis=1)
     # rounded, so that goals that differ by rounding only count as equals
-    return np.asarray(q_goals[np.lexsort((travel.sum(axis=1), np.round(times, 9)))[0]])
+    return np.asarray(q_goals[np.lexsort((displacement.sum(axis=1), np.round(times, 9)))[0]])
 
 
 def saving(ours: float, theirs: float) -> float:

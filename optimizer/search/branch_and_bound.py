@@ -2,46 +2,45 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 
-from optimizer.methods.method import Attempt
-from optimizer.prepared_problem import Task
-from optimizer.search.candidates import Entry
+from optimizer.deadline import Deadline
+from optimizer.methods.method import SolveResult
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.candidates import Candidate
 
 PRUNED = "its lower bound is not below the best energy found"
 
 
 def explore(
-    task: Task,
-    entries: Sequence[Entry],
-    attempt: Callable[[Entry], Attempt],
-    deadline: float,
-    clock: Callable[[], float] = time.perf_counter,
+    prepared: PreparedProblem,
+    candidates: Sequence[Candidate],
+    attempt: Callable[[Candidate], SolveResult],
+    deadline: Deadline,
     most_solved: int | None = None,
-) -> Entry | None:
+) -> Candidate | None:
     """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none.
 
     With `most_solved`, candidates beyond so many solved ones are left unless a bound rules them out.
     """
-    best = min((e for e in entries if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
-    for entry in sorted(entries, key=lambda e: (e.lower_bound, e.shortest)):
-        if entry.status != "unvisited" or entry.held_back:
+    best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
+    for candidate in sorted(candidates, key=lambda e: (e.lower_bound, e.shortest)):
+        if candidate.status != "unvisited" or candidate.deferred:
             continue
-        if best is not None and best.energy is not None and entry.lower_bound >= best.energy:
-            entry.status, entry.reason = "pruned", PRUNED
+        if best is not None and best.energy is not None and candidate.lower_bound >= best.energy:
+            candidate.status, candidate.reason = "pruned", PRUNED
             continue
-        if most_solved is not None and sum(e.status == "solved" for e in entries) >= most_solved:
-            entry.reason = f"the method solves no more than {most_solved} candidates"
+        if most_solved is not None and sum(e.status == "solved" for e in candidates) >= most_solved:
+            candidate.reason = f"the method solves no more than {most_solved} candidates"
             continue
-        if clock() > deadline:
+        if deadline.passed:
             break
-        entry.attempt = outcome = attempt(entry)
+        candidate.attempt = outcome = attempt(candidate)
         if outcome.status == "out of time":
             break
-        entry.status, entry.reason = outcome.status, outcome.reason
+        candidate.status, candidate.reason = outcome.status, outcome.reason
         if outcome.spline is not None:
-            entry.energy = task.objective_of(task.energy(outcome.spline))
-            if best is None or best.energy is None or entry.energy < best.energy:
-                best = entry
+            candidate.energy = prepared.objective_of(prepared.energy(outcome.spline))
+            if best is None or best.energy is None or candidate.energy < best.energy:
+                best = candidate
     return best

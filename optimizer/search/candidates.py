@@ -11,13 +11,13 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
-from optimizer.methods.method import Attempt
-from optimizer.prepared_problem import Task
+from optimizer.methods.method import SolveResult
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.targets import AnyOf
-from optimizer.search.end_feasibility import raise_if_none_is_left, rulings
-from optimizer.search.ends import End
+from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
+from optimizer.search.ends import EndConfiguration
 from optimizer.search.lower_bound import lower_bounds
-from optimizer.solution import Candidate, CandidateStatus
+from optimizer.solution import CandidateReport, CandidateStatus
 
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
@@ -25,18 +25,18 @@ MOST_PAIRS = 32768
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 UNVISITED = "not reached before the deadline"
-HELD_BACK = "other orientations promise more"
+DEFERRED = "other orientations have smaller lower bounds"
 
 
 @dataclass
-class Entry:
+class Candidate:
     """A start and goal pair and what is known of it; `energy` is exact, in the objective [J].
 
-    What is `held_back` is not explored: there are others like it that promise more.
+    What is `deferred` is not explored: there are others like it that promise more.
     """
 
-    start: End
-    goal: End
+    start: EndConfiguration
+    goal: EndConfiguration
     q_start: Array
     q_goal: Array
     lower_bound: float = 0.0
@@ -44,18 +44,18 @@ class Entry:
     status: CandidateStatus = "unvisited"
     reason: str = UNVISITED
     energy: float | None = None
-    attempt: Attempt | None = field(default=None, repr=False)
+    attempt: SolveResult | None = field(default=None, repr=False)
     holdable: bool = True
-    held_back: bool = False
+    deferred: bool = False
 
     @property
     def duration(self) -> float:
         """Length of the motion found [s]; NaN where none is."""
         return self.attempt.spline.duration if self.attempt and self.attempt.spline else np.nan
 
-    def report(self) -> Candidate:
+    def report(self) -> CandidateReport:
         """The candidate as it is answered."""
-        return Candidate(
+        return CandidateReport(
             start=self.start.label,
             goal=self.goal.label,
             q_start=self.q_start,
@@ -70,40 +70,43 @@ class Entry:
         )
 
 
-def pairs(task: Task, starts: Sequence[End], goals: Sequence[End]) -> list[Entry]:
+def pairs(
+    prepared: PreparedProblem, starts: Sequence[EndConfiguration], goals: Sequence[EndConfiguration]
+) -> list[Candidate]:
     """Every pair of branches with every winding that makes a motion of its own.
 
-    Dynamics does not know full turns: where both ends are poses, pairs of the same relative travel are one candidate,
+    Dynamics does not know full turns: where both ends are poses, pairs of the same relative displacement are one
+    candidate,
     and those that turn a joint by more than a full turn are left out, since the same pair of branches without that turn
     travels less in that joint and no further in the others, under a bound that is never higher.
-    Without `windings`, and to samples of a free orientation, the one of least travel.
+    Without `windings`, and to samples of a free orientation, the one of least displacement.
 
     Raises InvalidProblem when several targets make too many.
     """
-    result: list[Entry] = []
+    result: list[Candidate] = []
     for start in starts:
         for goal in goals:
-            windings = task.problem.windings and goal.loose is None
+            windings = prepared.problem.windings and goal.tolerance is None
             options = [
                 _joint_options(s, g, start.fixed or goal.fixed, windings)
                 for s, g in zip(start.choices, goal.choices, strict=True)
             ]
             if len(result) + math.prod(map(len, options)) > MOST_PAIRS:
                 raise InvalidProblem(
-                    "goal" if isinstance(task.problem.goal, AnyOf) else "start",
+                    "goal" if isinstance(prepared.problem.goal, AnyOf) else "start",
                     f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give fewer of them, a "
                     "`branch`, or `windings` false.",
                 )
             for combination in product(*options):
                 both = np.array(combination)
-                result.append(Entry(start, goal, both[:, 0], both[:, 1], held_back=goal.loose is not None))
-                if goal.loose is not None:
-                    result[-1].reason = HELD_BACK
+                result.append(Candidate(start, goal, both[:, 0], both[:, 1], deferred=goal.tolerance is not None))
+                if goal.tolerance is not None:
+                    result[-1].reason = DEFERRED
     return result
 
 
 def _joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
-    """(start, goal) of one joint for each relative travel, least travel first."""
+    """(start, goal) of one joint for each relative displacement, least displacement first."""
     both = sorted(product(starts, goals), key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])))
     if not windings:
         return both[:1]
@@ -117,31 +120,37 @@ def _joint_options(starts: list[float], goals: list[float], fixed: bool, winding
     return kept
 
 
-def bound(task: Task, entries: Sequence[Entry]) -> None:
-    """Rule out the pairs at whose ends the arm cannot be, and give every entry its lower bound and least duration.
+def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
+    """Rule out the pairs at whose ends the arm cannot be, and give every candidate its lower bound and least duration.
 
     Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible when no pair is left.
     """
     sides = {
-        name: list({id(end): end for end in (getattr(entry, name) for entry in entries)}.values())
+        name: list({id(end): end for end in (getattr(candidate, name) for candidate in candidates)}.values())
         for name in ("start", "goal")
     }
-    ruled = {name: rulings(task, np.array([end.q for end in ends])) for name, ends in sides.items()}
+    ruled = {name: check_configurations(prepared, np.array([end.q for end in ends])) for name, ends in sides.items()}
     ruled_out = {id(end): ruling for name in sides for end, ruling in zip(sides[name], ruled[name], strict=True)}
-    potential = {id(end): task.potential(end.q) for ends in sides.values() for end in ends}
-    travel = np.array([entry.q_goal - entry.q_start for entry in entries])
-    climb = np.array([potential[id(entry.goal)] - potential[id(entry.start)] for entry in entries])
-    hold = task.holding_power(np.array([entry.q_goal for entry in entries])) if task.problem.cycle else None
-    bounds, shortest = lower_bounds(task, travel, climb, hold)
-    for entry, value, least in zip(entries, bounds.tolist(), shortest.tolist(), strict=True):
-        entry.lower_bound, entry.shortest = value, least
+    potential = {id(end): prepared.potential(end.q) for ends in sides.values() for end in ends}
+    displacement = np.array([candidate.q_goal - candidate.q_start for candidate in candidates])
+    potential_gain = np.array(
+        [potential[id(candidate.goal)] - potential[id(candidate.start)] for candidate in candidates]
+    )
+    hold = (
+        prepared.holding_power(np.array([candidate.q_goal for candidate in candidates]))
+        if prepared.problem.cycle
+        else None
+    )
+    bounds, shortest = lower_bounds(prepared, displacement, potential_gain, hold)
+    for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
+        candidate.lower_bound, candidate.shortest = value, least
         for name in ("start", "goal"):
-            ruling = ruled_out[id(getattr(entry, name))]
+            ruling = ruled_out[id(getattr(candidate, name))]
             if ruling is not None:
-                entry.status, entry.reason = "infeasible", f"at the {name}, {ruling.reason}"
-                entry.lower_bound, entry.holdable = np.inf, False
+                candidate.status, candidate.reason = "infeasible", f"at the {name}, {ruling.reason}"
+                candidate.lower_bound, candidate.holdable = np.inf, False
                 break
-        if entry.holdable and not np.isfinite(value):
-            entry.status, entry.reason = "infeasible", f"takes at least {least:.4f} s"
+        if candidate.holdable and not np.isfinite(value):
+            candidate.status, candidate.reason = "infeasible", f"takes at least {least:.4f} s"
     for name, ends in sides.items():
         raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in ends], ruled[name])

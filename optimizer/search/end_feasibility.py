@@ -9,42 +9,44 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.model import Contact
+from optimizer.collision.model import ClosestPair
 from optimizer.exceptions import CollidingBranch, GoalInCollision, InvalidProblem, StartInCollision, TorqueInfeasible
 from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.path_constraints import ToolConeLimit
+from optimizer.kinematics.path_constraints import ToolConeConstraint
 from optimizer.nlp.clearance_constraint import RESERVE
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 
 # rounding of the angle in a cone, as a share of its half angle
 EDGE = 1e-9
 
 
 @dataclass(frozen=True)
-class Ruling:
+class InvalidReason:
     """Why the arm cannot be somewhere, in words, and what it is: an angle [rad] beyond the cone, a contact, a joint."""
 
     reason: str
-    cause: float | Contact | TorqueInfeasible
+    cause: float | ClosestPair | TorqueInfeasible
 
 
-def rulings(task: Task, q: Array) -> list[Ruling | None]:
+def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
     """What rules out each of the configurations q (n, nq), if anything does."""
-    result: list[Ruling | None] = [*_overloads(task, q)]
+    result: list[InvalidReason | None] = [*_overloads(prepared, q)]
     # the later ones are graver: they do not depend on the load
-    for k, contact in enumerate(task.collisions.contacts(q, within=RESERVE) if task.problem.arm.collisions else ()):
+    for k, contact in enumerate(
+        prepared.collisions.contacts(q, within=RESERVE) if prepared.problem.arm.collisions else ()
+    ):
         if contact.distance < RESERVE:
             first, second = contact.pair
             words = f"{first} and {second} are {RESERVE - contact.distance:.4f} m nearer each other than they may be"
-            result[k] = Ruling(words, contact)
-    for k, beyond in enumerate(_beyond_cone(task, q)):
+            result[k] = InvalidReason(words, contact)
+    for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:
-            result[k] = Ruling(f"the tool points {beyond:.4f} rad outside its cone", beyond)
+            result[k] = InvalidReason(f"the tool points {beyond:.4f} rad outside its cone", beyond)
     return result
 
 
 def raise_if_none_is_left(
-    name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[Ruling | None]
+    name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[InvalidReason | None]
 ) -> None:
     """Raise what rules out every branch (label, target, q) at the `name`, start or goal, if none is left.
 
@@ -66,29 +68,29 @@ def raise_if_none_is_left(
     colliding = [
         CollidingBranch(label, target, q, cause.pair, RESERVE - cause.distance)
         for (label, target, q), cause in zip(branches, causes, strict=True)
-        if isinstance(cause, Contact)
+        if isinstance(cause, ClosestPair)
     ]
     raise StartInCollision(colliding) if name == "start" else GoalInCollision(colliding)
 
 
-def _overloads(task: Task, q: Array) -> list[Ruling | None]:
+def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
     """Joints that cannot hold the load at q (n, nq)."""
-    tau_max, joints = task.problem.arm.active_limits.tau_max, task.problem.arm.robot.joint_names
+    tau_max, joints = prepared.problem.arm.active_limits.tau_max, prepared.problem.arm.robot.joint_names
     still = np.zeros_like(q)
-    needed = np.abs(task.torques(q, still, still))
-    found: list[Ruling | None] = []
+    needed = np.abs(prepared.torques(q, still, still))
+    found: list[InvalidReason | None] = []
     for k, j in enumerate((needed / tau_max).argmax(axis=1).tolist()):
         overload = needed[k, j] > tau_max[j]
         error = TorqueInfeasible(joints[j], float(needed[k, j]), float(tau_max[j]))
-        found.append(Ruling(f"{joints[j]} cannot hold the load", error) if overload else None)
+        found.append(InvalidReason(f"{joints[j]} cannot hold the load", error) if overload else None)
     return found
 
 
-def _beyond_cone(task: Task, q: Array) -> list[float]:
+def _beyond_cone(prepared: PreparedProblem, q: Array) -> list[float]:
     """How far [rad] the tool points outside its cone at q (n, nq); none where it is inside."""
-    problem = task.problem
+    problem = prepared.problem
     if problem.arm.tool_cone is None:
         return []
     frames = link_frames(joint_placements(problem.arm.robot.model), q)
-    share = ToolConeLimit.of(problem.arm, problem.arm.tool_cone).shares(frames, q, np.zeros_like(q))[:, 0]
+    share = ToolConeConstraint.of(problem.arm, problem.arm.tool_cone).ratios(frames, q, np.zeros_like(q))[:, 0]
     return [float(each) for each in np.where(share > 1 + EDGE, (share - 1) * problem.arm.tool_cone.half_angle, 0.0)]

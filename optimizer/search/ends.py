@@ -1,4 +1,4 @@
-"""Configurations at the start and the goal of a problem."""
+"""Waypoints at the start and the goal of a problem."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from models.robot import Array
 from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import inverse_kinematics_for, turns
 from optimizer.kinematics.orientation_tolerance import sample_orientations
-from optimizer.prepared_problem import Task
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.targets import AnyOf, Single
 from optimizer.solution import UnreachableTarget
@@ -23,10 +23,10 @@ INSIDE = 0.999
 
 
 @dataclass(frozen=True)
-class End:
+class EndConfiguration:
     """One branch at an end of the motion: its label, and for every joint the positions that the limits allow [rad].
 
-    `target` is the index, among the end's targets, of the one that it reaches; `loose` that target, where its
+    `target` is the index, among the end's targets, of the one that it reaches; `tolerance` that target, where its
     orientation is free in part and this is but a sample of it.
     """
 
@@ -35,25 +35,25 @@ class End:
     choices: list[list[float]]
     fixed: bool
     target: int = 0
-    loose: LoosePose | None = None
+    tolerance: ConeOrientedPose | None = None
 
 
-def ends(task: Task, name: str) -> tuple[list[End], list[UnreachableTarget]]:
+def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
     """The branches at `start` or `goal` that the problem allows, none of them singular; and, of several targets, those
     that have none.
 
     Raises NoReachableTarget when all of several have none, and of a single pose UnreachablePose or SingularPose;
     UnreachablePose also when the branch asked for does not reach the pose.
     """
-    target = getattr(task.problem, name)
+    target = getattr(prepared.problem, name)
     if not isinstance(target, AnyOf):
-        return _ends_of(task, name, target, 0, SAMPLES), []
-    loose = sum(isinstance(member, LoosePose) for member in target.targets)
-    reached: list[End] = []
+        return _ends_of(prepared, name, target, 0, SAMPLES), []
+    tolerance = sum(isinstance(member, ConeOrientedPose) for member in target.targets)
+    reached: list[EndConfiguration] = []
     unreachable: list[UnreachableTarget] = []
     for index, member in enumerate(target.targets):
         try:
-            reached += _ends_of(task, name, member, index, max(SAMPLES // max(loose, 1), LEAST_SAMPLES))
+            reached += _ends_of(prepared, name, member, index, max(SAMPLES // max(tolerance, 1), LEAST_SAMPLES))
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
     if not reached:
@@ -61,33 +61,40 @@ def ends(task: Task, name: str) -> tuple[list[End], list[UnreachableTarget]]:
     return reached, unreachable
 
 
-def _ends_of(task: Task, name: str, target: Single, index: int, samples: int) -> list[End]:
-    problem = task.problem
+def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, samples: int) -> list[EndConfiguration]:
+    problem = prepared.problem
     kinematics, limits = inverse_kinematics_for(problem.arm.robot), problem.arm.active_limits
-    if isinstance(target, LoosePose):
-        return _ends_of_samples(task, name, target, index, samples)
+    if isinstance(target, ConeOrientedPose):
+        return _ends_of_samples(prepared, name, target, index, samples)
     if not isinstance(target, Pose):
         problem.arm.check_inside(name, target)
-        return [End(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True, index)]
+        return [
+            EndConfiguration(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True, index)
+        ]
     solutions = kinematics.solve(target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name)
     solutions = [s for s in solutions if problem.allows(s.label)]
     if not solutions:
         raise UnreachablePose(
             name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
         )
-    return [End(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False, index) for s in solutions]
+    return [
+        EndConfiguration(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False, index) for s in solutions
+    ]
 
 
-def _ends_of_samples(task: Task, name: str, pose: LoosePose, index: int, samples: int) -> list[End]:
+def _ends_of_samples(
+    prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
+) -> list[EndConfiguration]:
     """The branches of orientations spread over those that the pose, and the tool's cone, allow."""
-    pose = _within_cone(task, pose)
-    found: list[End] = []
+    pose = _within_cone(prepared, pose)
+    found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
     for R in sample_orientations(pose, tried):
         try:
             found += [
-                replace(end, loose=pose) for end in _ends_of(task, name, pose.with_orientation(R), index, samples)
+                replace(end, tolerance=pose)
+                for end in _ends_of(prepared, name, pose.with_orientation(R), index, samples)
             ]
         except (UnreachablePose, SingularPose) as error:
             errors.append(error)
@@ -105,13 +112,13 @@ def _ends_of_samples(task: Task, name: str, pose: LoosePose, index: int, samples
     )
 
 
-def _within_cone(task: Task, pose: LoosePose) -> LoosePose:
+def _within_cone(prepared: PreparedProblem, pose: ConeOrientedPose) -> ConeOrientedPose:
     """The pose with no more freedom than the tool's cone leaves, where both are about the same axes: few orientations
     of a free pose would be in a narrow cone."""
-    cone = task.problem.arm.tool_cone
+    cone = prepared.problem.arm.tool_cone
     if cone is None:
         return pose
     free = pose.half_angle == np.pi
     if not free and not (np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)):
         return pose
-    return LoosePose(pose.position, cone.axis, cone.direction, min(pose.half_angle, INSIDE * cone.half_angle))
+    return ConeOrientedPose(pose.position, cone.axis, cone.direction, min(pose.half_angle, INSIDE * cone.half_angle))

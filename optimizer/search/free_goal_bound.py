@@ -2,14 +2,14 @@
 
 The orientation decides what the last three joints do; the bound leaves these their freedom and looks at the first
 three. Branch and bound over boxes of (q1, q2, q3): a box that cannot bring the fourth joint's origin near enough to the
-goal, or not far enough from it, holds no configuration; of any other, the joints travel at least to the box, and the
-climb is at least its climb less what the links can still sink. `lower_bounds` of the least travel and the least climb
+goal, or not far enough from it, holds no configuration; of any other, the joints displacement at least to the box,
+and the potential_gain is at least its potential_gain less what the links can still sink. `lower_bounds` of the least
+displacement and the least potential_gain
 then bounds every motion into the box, since it falls with neither. The least over all boxes bounds the family.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,10 +18,11 @@ from itertools import product
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import NEVER, Deadline
 from optimizer.energy.dwell import holding_power
-from optimizer.prepared_problem import Task
-from optimizer.problem.cone_oriented_pose import LoosePose
-from optimizer.search.candidates import Entry
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.search.candidates import Candidate
 from optimizer.search.lower_bound import lower_bounds
 
 INNER = 3
@@ -35,34 +36,36 @@ REACH_ANGLES = 240
 ANCHORS = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, 0.2, -0.3, 0.3)
 
 
-def family_bound_of(task: Task, entries: Sequence[Entry], deadline: float) -> float:
+def family_bound_of(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> float:
     """Bound of the motions to those goals whose orientation is free in part [J]; inf where there are none."""
-    poses = {e.goal.target: e.goal.loose for e in entries if e.goal.loose is not None}
-    starts = np.array(list({id(e.start): e.start.q for e in entries}.values()))
+    poses = {e.goal.target: e.goal.tolerance for e in candidates if e.goal.tolerance is not None}
+    starts = np.array(list({id(e.start): e.start.q for e in candidates}.values()))
     rounds = ROUNDS // max(len(poses), 1)
-    return min((family_bound(task, pose, starts, rounds, deadline) for pose in poses.values()), default=np.inf)
+    return min((family_bound(prepared, pose, starts, rounds, deadline) for pose in poses.values()), default=np.inf)
 
 
-def family_bound(task: Task, pose: LoosePose, starts: Array, rounds: int = ROUNDS, deadline: float = np.inf) -> float:
+def family_bound(
+    prepared: PreparedProblem, pose: ConeOrientedPose, starts: Array, rounds: int = ROUNDS, deadline: Deadline = NEVER
+) -> float:
     """What no motion from any of `starts` (s, nq) to any configuration of `pose` can go below [J].
 
-    Fewer rounds, or a deadline on `time.perf_counter`, give a weaker bound.
+    Fewer rounds, or a deadline, give a weaker bound.
     """
-    family = _Family(task, pose)
+    family = _Family(prepared, pose)
     side = np.pi / FIRST_BOXES
     centres = np.array(list(product(-np.pi + side * (2 * np.arange(FIRST_BOXES) + 1), repeat=INNER)))
     origin = np.repeat(np.arange(len(starts)), len(centres))
     centres = np.tile(centres, (len(starts), 1))
     halves = np.full_like(centres, side)
-    climbs = np.array([task.potential(q) for q in starts])
-    value = family.bounds(starts[origin], climbs[origin], centres, halves)
+    potential_gains = np.array([prepared.potential(q) for q in starts])
+    value = family.bounds(starts[origin], potential_gains[origin], centres, halves)
     for _ in range(rounds):
         # what holds no configuration is let go
         kept = np.isfinite(value)
         origin, centres, halves, value = origin[kept], centres[kept], halves[kept], value[kept]
         order = np.argsort(value, kind="stable")
         worst, rest = order[:SPLIT], order[SPLIT:]
-        if not len(order) or halves[order[0]].max() < SMALLEST or time.perf_counter() > deadline:
+        if not len(order) or halves[order[0]].max() < SMALLEST or deadline.passed:
             break
         # the side that blurs the fourth joint's place most
         widest = (halves[worst] * family.arms).argmax(axis=1)
@@ -72,7 +75,7 @@ def family_bound(task: Task, pose: LoosePose, starts: Array, rounds: int = ROUND
         fresh = np.concatenate([centres[worst] - step, centres[worst] + step])
         smaller = halves[parents] - np.concatenate([step, step])
         # a part's bound is at least the whole's
-        bounds = family.bounds(starts[origin[parents]], climbs[origin[parents]], fresh, smaller)
+        bounds = family.bounds(starts[origin[parents]], potential_gains[origin[parents]], fresh, smaller)
         value = np.concatenate([value[rest], np.maximum(bounds, value[parents])])
         origin = np.concatenate([origin[rest], origin[parents]])
         centres, halves = np.concatenate([centres[rest], fresh]), np.concatenate([halves[rest], smaller])
@@ -83,8 +86,8 @@ def family_bound(task: Task, pose: LoosePose, starts: Array, rounds: int = ROUND
 class _Family:
     """The configurations that reach a pose with any orientation that it allows."""
 
-    task: Task
-    pose: LoosePose
+    prepared: PreparedProblem
+    pose: ConeOrientedPose
 
     def bounds(self, starts: Array, potentials: Array, centres: Array, halves: Array) -> Array:
         """Bounds (b,) [J] on motions from starts (b, nq) into boxes (b, 3); inf where a box holds no configuration."""
@@ -98,32 +101,32 @@ class _Family:
         if inside.any():
             away = starts[inside, :INNER] - centres[inside]
             away = np.abs(away - 2 * np.pi * np.round(away / (2 * np.pi)))
-            travel = np.zeros((int(inside.sum()), starts.shape[1]))
-            travel[:, :INNER] = np.maximum(away - halves[inside], 0.0)
+            displacement = np.zeros((int(inside.sum()), starts.shape[1]))
+            displacement[:, :INNER] = np.maximum(away - halves[inside], 0.0)
             lowest = height[inside] - halves[inside] @ self._leverage
             hanging = -wrist[inside] @ self._gravity - blur[inside] * np.linalg.norm(self._gravity)
             for mass, from_wrist, floor in self._wrist_bodies:
                 # as low as it can hang from the fourth joint, and as low as it can be about the goal
                 lowest += mass * np.maximum(hanging - from_wrist * np.linalg.norm(self._gravity), floor)
-            climb = lowest - potentials[inside]
-            if self.task.problem.objective == "mechanical":
-                climb = np.maximum(climb, 0.0)  # that bound is |climb|, which is no less
-            hold = np.full_like(climb, self._least_hold)
-            value[inside], _ = lower_bounds(self.task, travel, climb, hold)
+            potential_gain = lowest - potentials[inside]
+            if self.prepared.problem.objective == "mechanical":
+                potential_gain = np.maximum(potential_gain, 0.0)  # that bound is |potential_gain|, which is no less
+            hold = np.full_like(potential_gain, self._least_hold)
+            value[inside], _ = lower_bounds(self.prepared, displacement, potential_gain, hold)
         return value
 
     @cached_property
     def _least_hold(self) -> float:
         """What standing still draws at least [W]: with no torque to hold."""
-        return float(holding_power(self.task.arm, np.zeros(self.task.problem.arm.robot.nq)))
+        return float(holding_power(self.prepared.arm, np.zeros(self.prepared.problem.arm.robot.nq)))
 
     @property
     def _gravity(self) -> Array:
-        return np.asarray(self.task.problem.arm.gravity)
+        return np.asarray(self.prepared.problem.arm.gravity)
 
     @cached_property
     def _placements(self) -> Array:
-        return np.array([placement.homogeneous for placement in self.task.model.jointPlacements][1:])
+        return np.array([placement.homogeneous for placement in self.prepared.model.jointPlacements][1:])
 
     @cached_property
     def arms(self) -> Array:
@@ -137,7 +140,7 @@ class _Family:
         lengths = np.linalg.norm(self._placements[1:INNER, :3, 3], axis=1)
         weights = np.zeros(INNER)
         for k in range(INNER):
-            body = self.task.model.inertias[k + 1]
+            body = self.prepared.model.inertias[k + 1]
             for j in range(k + 1):
                 weights[j] += body.mass * (float(np.linalg.norm(body.lever)) + float(lengths[j:k].sum()))
         return weights * float(np.linalg.norm(self._gravity))
@@ -148,17 +151,17 @@ class _Family:
         height = np.zeros(len(q))
         for j in range(INNER):
             T = T @ self._placements[j] @ _about_z(q[:, j])
-            body = self.task.model.inertias[j + 1]
+            body = self.prepared.model.inertias[j + 1]
             height -= body.mass * (T[:, :3, :3] @ body.lever + T[:, :3, 3]) @ self._gravity
         return (T @ self._placements[INNER])[:, :3, 3], height
 
     @cached_property
     def _tool(self) -> tuple[Array, Array]:
         """T_last_tcp (4, 4), and the TCP's chain: lengths [m] from the fourth joint to the fifth and to the sixth."""
-        model = self.task.model
+        model = self.prepared.model
         flange = model.frames[model.getFrameId("flange")].placement.homogeneous
         lengths = np.linalg.norm(self._placements[INNER + 1 :, :3, 3], axis=1)
-        return np.asarray(flange @ self.task.problem.arm.T_flange_tcp), lengths
+        return np.asarray(flange @ self.prepared.problem.arm.T_flange_tcp), lengths
 
     @cached_property
     def _shells(self) -> list[tuple[Array, float, float]]:
@@ -189,7 +192,7 @@ class _Family:
         T_last_tcp, lengths = self._tool
         g, strength = self._gravity, float(np.linalg.norm(self._gravity))
         tcp = float(np.linalg.norm(T_last_tcp[:3, 3]))
-        bodies = [self.task.model.inertias[k] for k in range(INNER + 1, self.task.problem.arm.robot.nq + 1)]
+        bodies = [self.prepared.model.inertias[k] for k in range(INNER + 1, self.prepared.problem.arm.robot.nq + 1)]
         levers = [float(np.linalg.norm(body.lever)) for body in bodies]
         at_goal = -float(self.pose.position @ g)
         # the last body stands still in the TCP frame: along the axis it cannot turn further than the cone lets it

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.robot import Array, FrictionLaw, Limits
 from optimizer.energy.dwell import linear_dwells
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.trajectories.seven_segment import shortest_duration
 
@@ -19,58 +19,67 @@ _KNEE_DEFICIT = 0.3003
 _BISECTIONS = 24
 
 
-def lower_bounds(task: Task, travel: Array, climb: Array, hold: Array | None = None) -> tuple[Array, Array]:
+def lower_bounds(
+    prepared: PreparedProblem, displacement: Array, potential_gain: Array, hold: Array | None = None
+) -> tuple[Array, Array]:
     """Bounds (P,) on the problem's objective [J] and least durations (P,) [s] for candidates.
 
-    travel (P, nq) [rad] is goal - start, climb (P,) [J] the gain of potential energy, `hold` (P,) [W] what holding the
+    displacement (P, nq) [rad] is goal - start, potential_gain (P,) [J] the gain of potential energy, `hold` (P,) [W]
+    what holding the
     goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds the longest allowed one has
     the bound inf.
 
-    Waiting draws constant - power · T on each of its linear pieces (see `optimizer.energy.dwell`): there it is a constant and
-    a power less for every second of the motion, and the least over the pieces is a bound for all durations.
+    Waiting draws constant - power · T on each of its linear pieces (see `optimizer.energy.dwell`): there it is a
+    constant and a power less for every second of the motion, and the least over the pieces is a bound for all
+    durations.
     """
-    problem = task.problem
-    shortest = np.maximum(shortest_duration(travel, problem.arm.active_limits), LEAST_DURATION)
+    problem = prepared.problem
+    shortest = np.maximum(shortest_duration(displacement, problem.arm.active_limits), LEAST_DURATION)
     t_min = np.maximum(shortest, problem.duration_min or 0.0)
     t_max = np.full_like(t_min, LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
     if problem.objective == "mechanical":
-        bound = mechanical(climb)
+        bound = mechanical(potential_gain)
     elif problem.cycle is None or hold is None:
-        bound = _least_drawn(task, travel, climb, t_min, t_max, np.zeros_like(climb))
+        bound = _least_drawn(prepared, displacement, potential_gain, t_min, t_max, np.zeros_like(potential_gain))
     else:
-        bound = np.full_like(climb, np.inf)
+        bound = np.full_like(potential_gain, np.inf)
         for piece in linear_dwells(problem.cycle, problem.arm, hold):
             low, high = np.maximum(t_min, piece.t_min), np.minimum(t_max, piece.t_max)
-            value = piece.constant + _least_drawn(task, travel, climb, low, high, piece.power)
+            value = piece.constant + _least_drawn(prepared, displacement, potential_gain, low, high, piece.power)
             bound = np.where(low <= high, np.minimum(bound, value), bound)
     return np.where(t_min > t_max, np.inf, bound), shortest
 
 
-def mechanical(climb: Array) -> Array:
+def mechanical(potential_gain: Array) -> Array:
     """Bound on ∫ Σ |tau_j v_j| dt [J]: it is at least |∫ tau · v dt|, the change of energy between two rests."""
-    return np.abs(climb)
+    return np.abs(potential_gain)
 
 
-def _least_drawn(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array, waiting: Array) -> Array:
+def _least_drawn(
+    prepared: PreparedProblem, displacement: Array, potential_gain: Array, t_min: Array, t_max: Array, waiting: Array
+) -> Array:
     """`electrical`, and besides what is drawn even where all of the motion's work comes for nothing.
 
     Where the supply takes nothing back and there is no store, drawn power is never negative; on an isolated bus it is
     never less than the electronics', for which the joints' surplus does nothing.
     """
-    arm = task.arm
-    bound = electrical(task, travel, climb, t_min, t_max, waiting)
+    arm = prepared.arm
+    bound = electrical(prepared, displacement, potential_gain, t_min, t_max, waiting)
     if arm.regeneration > 0 or arm.bus.mode == "storage":
         return bound
     rate = (arm.base_power if arm.bus.mode == "isolated" else 0.0) - waiting
     return np.maximum(bound, np.minimum(rate * t_min, rate * np.maximum(t_max, t_min)))
 
 
-def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Array, waiting: Array) -> Array:
-    """Bound on the electrical energy [J] of motions with the given joint travel (P, nq) and climb (P,) [J].
+def electrical(
+    prepared: PreparedProblem, displacement: Array, potential_gain: Array, t_min: Array, t_max: Array, waiting: Array
+) -> Array:
+    """Bound on the electrical energy [J] of motions with the given joint displacement (P, nq) and potential_gain (P,)
+    [J].
 
     `waiting` (P,) [W] is what a motion saves by every second that it takes: nothing without a cycle.
 
-    Energy ≥ ∫ P_net dt = base · T + climb + friction + copper + inverter on every bus:
+    Energy ≥ ∫ P_net dt = base · T + potential_gain + friction + copper + inverter on every bus:
 
     - shared: drawn = max(P_net, 0) ≥ P_net. With a share below 1 given back, max(P_net, 0) - share · max(-P_net, 0) =
       P_net + (1 - share) max(-P_net, 0) ≥ P_net. So too for a recuperating bus, whose share is its efficiency.
@@ -82,22 +91,23 @@ def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Arr
     Copper and inverter ≥ their constants.
 
     friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
-    The Coulomb part is at least coulomb · |travel|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
-    ∫ g'(h) m(h) dh, ∫ m(h) dh ≥ |travel|, and m(h) ≤ T - 2 t(h), where t(h) ≥ h / a_max (and half a jerk ramp more
+    The Coulomb part is at least coulomb · |displacement|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
+    ∫ g'(h) m(h) dh, ∫ m(h) dh ≥ |displacement|, and m(h) ≤ T - 2 t(h), where t(h) ≥ h / a_max (and half a jerk ramp
+    more
     above half its speed) is the least time from rest to speed h and back. As g' grows, the least integral fills m up to
-    its limit from h = 0 on, until the travel is reached at h = c:
+    its limit from h = 0 on, until the displacement is reached at h = c:
 
-        |travel| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
+        |displacement| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
 
-    This is the value of a linear programme whose right-hand side is linear in T, so it is convex in T, with slope
+    This is the value of a linear program whose right-hand side is linear in T, so it is convex in T, with slope
     g(c) - c g'(c). Bisection on the slope finds the least sum in [t_min, t_max].
     """
-    problem = task.problem
+    problem = prepared.problem
     friction, drives = problem.arm.friction_law, problem.arm.drives
     base = problem.arm.base_power + float(drives.inverter_constant.sum())
     base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
     rate = base - waiting
-    distance = np.abs(travel)
+    distance = np.abs(displacement)
     cruise = _Cruise(distance, friction, problem.arm.active_limits)
 
     low, high = t_min.copy(), np.maximum(t_max, t_min)
@@ -106,12 +116,12 @@ def electrical(task: Task, travel: Array, climb: Array, t_min: Array, t_max: Arr
         rising = rate + cruise.slope(middle) > 0
         high, low = np.where(rising, middle, high), np.where(rising, low, middle)
     # convex: the tangent at the lower end stays below the curve up to the upper end
-    value = rate * low + climb + distance @ friction.coulomb + cruise.loss(low)
+    value = rate * low + potential_gain + distance @ friction.coulomb + cruise.loss(low)
     return np.asarray(value + np.minimum(rate + cruise.slope(low), 0.0) * (high - low))
 
 
 class _Cruise:
-    """The least loss ∫ g(|v|) dt of joints that travel `distance` (P, nq) under acceleration and jerk limits."""
+    """The least loss ∫ g(|v|) dt of joints that displacement `distance` (P, nq) under acceleration and jerk limits."""
 
     def __init__(self, distance: Array, friction: FrictionLaw, limits: Limits) -> None:
         self.distance, self.friction, self.a = distance, friction, limits.a_max

@@ -16,12 +16,13 @@ from models.robot import Array, Limits
 CLOSEST = 1e-3
 
 
-def shortest_duration(travel: Array, limits: Limits) -> Array:
-    """Least time [s] of a rest-to-rest motion under speed, acceleration and jerk limits; travel (..., nq) → (...).
+def shortest_duration(displacement: Array, limits: Limits) -> Array:
+    """Least time [s] of a rest-to-rest motion under speed, acceleration and jerk limits; displacement (..., nq) →
+    (...).
 
     Every joint needs at least its own profile, and the arm at least what its slowest joint needs.
     """
-    return np.asarray(_durations(np.abs(travel), limits).max(axis=-1))
+    return np.asarray(_durations(np.abs(displacement), limits).max(axis=-1))
 
 
 def _durations(distance: Array, limits: Limits) -> Array:
@@ -36,17 +37,18 @@ def _durations(distance: Array, limits: Limits) -> Array:
 
 
 def _jerk_limited(speed: float, distance: float, jerk: float) -> float:
-    """Time [s] to travel a distance > 0 at a cruising speed that jerk alone limits the way to."""
+    """Time [s] to displacement a distance > 0 at a cruising speed that jerk alone limits the way to."""
     return float(distance / speed + 2 * np.sqrt(speed / jerk))
 
 
-def switches(travel: Array, duration: float, limits: Limits) -> Array:
-    """Where in [0, 1] the jerk of the leading joint switches when it takes `duration` [s] for travel (nq,), ascending.
+def switches(displacement: Array, duration: float, limits: Limits) -> Array:
+    """Where in [0, 1] the jerk of the leading joint switches when it takes `duration` [s] for displacement (nq,),
+    ascending.
 
-    The leading joint is the one whose own profile is longest; slowed to `duration`, it cruises at a lower speed. A
+    The leading joint is the one whose own profile is longest; retimed to `duration`, it cruises at a lower speed. A
     duration shorter than its own counts as its own.
     """
-    distance = np.abs(travel)
+    distance = np.abs(displacement)
     own = _durations(distance, limits)
     lead = int(own.argmax())
     duration = max(duration, float(own[lead]))

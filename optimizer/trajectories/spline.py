@@ -76,12 +76,12 @@ def peak_rates(spline: Spline) -> Array:
     return np.array(peaks)
 
 
-def stretch(ratios: Array) -> float:
+def time_scale(ratios: Array) -> float:
     """The factor on the duration that brings speed, acceleration and jerk, ratios (3, nq) of their limits, to these."""
     return float((ratios.max(axis=1) ** (1 / np.arange(1, 4))).max())
 
 
-def slowed(spline: Spline, factor: float) -> Spline:
+def retimed(spline: Spline, factor: float) -> Spline:
     """The same path and law in `factor` times the duration."""
     return replace(spline, knots=spline.knots * factor)
 

@@ -83,15 +83,16 @@ def trapezoid(problem: Problem, q_start: Array, q_goal: Array, duration: float) 
     return _trapezoid(q_start, q_goal, duration, blend)
 
 
-def blend_time(limits: Limits, travel: Array, duration: Array) -> Array:
-    """How long (...,) [s] trapezoids of speed over `travel` (..., nq) speed up, and slow down, in durations T (...,).
+def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
+    """How long (...,) [s] trapezoids of speed over `displacement` (..., nq) speed up, and slow down, in durations T
+    (...,).
 
     T/3 each: of all trapezoids that one has the least ∫ a² dt. Where T/3 breaks the speed limit it is less, where it
     breaks the acceleration limit more; where nothing holds both, T/3 stays.
     """
     # speed Δ / (T - b) ≤ v_max, and acceleration Δ / (b (T - b)) ≤ a_max
-    longest = np.minimum(duration / 2, duration - (np.abs(travel) / limits.v_max).max(axis=-1))
-    discriminant = duration**2 - 4 * (np.abs(travel) / limits.a_max).max(axis=-1)
+    longest = np.minimum(duration / 2, duration - (np.abs(displacement) / limits.v_max).max(axis=-1))
+    discriminant = duration**2 - 4 * (np.abs(displacement) / limits.a_max).max(axis=-1)
     shortest = np.where(discriminant >= 0, (duration - np.sqrt(np.maximum(discriminant, 0))) / 2, np.inf)
     blend = duration / 3
     return np.asarray(np.where(shortest <= longest, np.clip(blend, np.minimum(shortest, longest), longest), blend))
@@ -103,10 +104,10 @@ def controller_default(problem: Problem, q_start: Array, q_goal: Array) -> Sampl
     The joint that needs longest leads with a trapezoid; the others keep in step with it (UR script manual, `movej`).
     """
     limits, default = problem.arm.active_limits, problem.arm.robot.default_motion
-    travel = np.abs(q_goal - q_start)
+    displacement = np.abs(q_goal - q_start)
     # 1 / (greatest speed and acceleration of the law s(t) from 0 to 1 that all joints share)
-    slow = float((travel / np.minimum(limits.v_max, default.velocity)).max())
-    lazy = float((travel / np.minimum(limits.a_max, default.acceleration)).max())
+    slow = float((displacement / np.minimum(limits.v_max, default.velocity)).max())
+    lazy = float((displacement / np.minimum(limits.a_max, default.acceleration)).max())
     if slow == 0:
         return rest(q_start, 0.0)
     blend = lazy / slow
@@ -141,9 +142,10 @@ def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> 
     return _sampled(t, weights * duration, q_start, q_goal - q_start, law, np.array([speed, acceleration, np.inf]))
 
 
-def _sampled(t: Array, weights: Array, q_start: Array, travel: Array, law: Array, peaks: Array) -> SampledMotion:
-    """The straight line q_start + s(t) · travel; `law` (3, k) holds s and its derivatives, `peaks` (3,) the rates'."""
-    s, rate, acceleration = law[:, :, None] * travel
+def _sampled(t: Array, weights: Array, q_start: Array, displacement: Array, law: Array, peaks: Array) -> SampledMotion:
+    """The straight line q_start + s(t) · displacement; `law` (3, k) holds s and its derivatives, `peaks` (3,) the
+    rates'."""
+    s, rate, acceleration = law[:, :, None] * displacement
     with np.errstate(invalid="ignore"):  # infinite jerk of a joint that stays where it is: none
-        peak_v, peak_a, peak_jerk = np.nan_to_num(np.abs(travel) * peaks[:, None], nan=0.0, posinf=np.inf)
+        peak_v, peak_a, peak_jerk = np.nan_to_num(np.abs(displacement) * peaks[:, None], nan=0.0, posinf=np.inf)
     return SampledMotion(t, weights, q_start + s, rate, acceleration, peak_v, peak_a, peak_jerk)

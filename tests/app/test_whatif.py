@@ -14,7 +14,7 @@ from app.schemas.response import OptimizeResponse
 from app.schemas.whatif import WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from app.store import keep as kept_answers
-from app.tasks.stored_answers import Shelf
+from app.tasks.stored_answers import AnswerCollector
 from tests.app.requests import HOME, NEAR, move
 from tests.optimizer.moves import tcp_pose
 
@@ -281,7 +281,7 @@ def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
 
 def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept_answers, "MOST_BYTES", 25)
-    shelf = Shelf()
+    shelf = AnswerCollector()
     marks = [shelf.add({"v": 1.5}) for _ in range(2)]
     assert len(set(marks)) == len(shelf.kept()) == 2
     with pytest.raises(InvalidRequest):

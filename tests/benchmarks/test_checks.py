@@ -113,4 +113,4 @@ def test_replay_agrees_with_the_certificate(task: Ask, answered: Json) -> None:
     assert motion.end_error < ROUNDING
     assert motion.energy.electrical.total == pytest.approx(answered["energy"]["electrical"]["total"], rel=ENERGY_ERROR)
     for name, ratio in answered["certificate"]["worst_ratio"].items():
-        assert motion.shares[name] == pytest.approx(ratio, abs=RATIO_ERROR)
+        assert motion.ratios[name] == pytest.approx(ratio, abs=RATIO_ERROR)

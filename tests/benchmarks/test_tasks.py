@@ -14,7 +14,7 @@ from models.robot import Robot
 from optimizer.energy.kernel import Kernel
 from optimizer.energy.kernel_expressions import build
 from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import problem_with
 
 POSE_ERROR = 1e-12  # rounding of a few products of rotations
@@ -62,7 +62,7 @@ def test_chains_move_as_pinocchio_says(robot: Robot, joints: int) -> None:
     assert arm.nq == joints and arm.limits.v_max.shape == arm.friction.coulomb.shape == (joints,)
     kernel = Kernel(arm, build(arm), compiled=False)
     q, v, a = np.random.default_rng(joints).normal(size=(3, 5, joints))
-    task = Task.of(problem_with(np.zeros(joints), np.zeros(joints), robot=arm))
+    task = PreparedProblem.of(problem_with(np.zeros(joints), np.zeros(joints), robot=arm))
     tau = kernel.torque(q, v, a, task.objective_parameters)
     data = task.model.createData()
     for k in range(5):

@@ -87,14 +87,14 @@ def test_requests_that_once_failed(seed: int, index: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("jerk", "duration", "travel"),
+    ("jerk", "duration", "displacement"),
     [(200.0, 100.0, 0.9), (0.01, 600.0, 6.0)],
     ids=["a hundred seconds for one radian", "next to no jerk, all of ten minutes"],
 )
-def test_very_slow_motions(jerk: float, duration: float, travel: float) -> None:
+def test_very_slow_motions(jerk: float, duration: float, displacement: float) -> None:
     limits = replace(ROBOT.limits, j_max=np.full(6, jerk))
-    start = np.full(6, -travel / 2)
+    start = np.full(6, -displacement / 2)
     fixed = {"duration_min": duration, "duration_max": duration, "deadline": 60.0, "collisions": False}
-    solution = optimize(problem_with(start, start + travel, limits=limits, **fixed))  # type: ignore[arg-type]
+    solution = optimize(problem_with(start, start + displacement, limits=limits, **fixed))  # type: ignore[arg-type]
     assert solution.certificate.valid
     assert solution.duration == duration

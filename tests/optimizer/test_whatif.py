@@ -10,7 +10,7 @@ import pytest
 from optimizer.certificate import certify
 from optimizer.exceptions import DeadlineExceeded, TorqueInfeasible
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Obstacle, Scene, Sphere
 from optimizer.solution import Solution
@@ -54,7 +54,7 @@ def test_same_motion_is_what_pinocchio_says(asked: Problem, base: Solution) -> N
 def test_optimising_anew_never_costs_more(asked: Problem, base: Solution, method: str) -> None:
     """Also where what is found from the ground up does: these methods' own motions are worse than the base's."""
     worse = replace(asked, method=method)  # type: ignore[arg-type]
-    same = Task.of(worse).energy(base.trajectory.spline).electrical.total
+    same = PreparedProblem.of(worse).energy(base.trajectory.spline).electrical.total
     assert optimize(worse).energy.electrical.total > same
     found = whatif(base, worse)
     assert found.certificate.valid and found.reoptimised is not None and found.reoptimised.certificate.valid

@@ -13,9 +13,9 @@ from app.http.problem_details import TABLE, problem_reply, problem_type
 from app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
 from optimizer import exceptions
 from optimizer.exceptions import JoulepathError
-from optimizer.solution import Candidate, Clearance, UnreachableTarget
+from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
-CANDIDATE = Candidate("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
+CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
 COLLIDING = exceptions.CollidingBranch("left/up/flip", 0, np.zeros(6), ("table", "forearm"), 0.02)
 HIT = Clearance(-0.02, -0.02, ("table", "forearm"), 0.5)
 ERRORS: list[JoulepathError] = [

@@ -13,13 +13,14 @@ from scipy.spatial.transform import Rotation
 from models.robot import Array
 from optimizer import optimize
 from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import ROOMS, STEP, along, nothing_between, ways_around
+from optimizer.collision.path_planner import BOUND_MARGINS, STEP, along, interpolation_is_free, plan_paths
 from optimizer.collision.state_validity import FreeSpace
+from optimizer.deadline import Deadline
 from optimizer.exceptions import NoTrajectory
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.path_constraints import PathLimits, path_limits
-from optimizer.methods.free_spline import LED
+from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
+from optimizer.methods.free_spline import FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
@@ -80,7 +81,7 @@ TASKS = {
 
 
 def task(name: str) -> tuple[Arm, Array, Array]:
-    """The arm and the ends of least travel that hit nothing."""
+    """The arm and the ends of least displacement that hit nothing."""
     scene, T_start, T_goal = TASKS[name]
     arm = Arm(
         robot=ROBOT,
@@ -100,7 +101,7 @@ def task(name: str) -> tuple[Arm, Array, Array]:
 
 
 def between(path: Array) -> Array:
-    """Configurations (k, nq) along a path, DENSE apart."""
+    """Waypoints (k, nq) along a path, DENSE apart."""
     parts = [np.linspace(a, b, int(np.abs(b - a).max() / DENSE) + 2) for a, b in pairwise(path)]
     return np.concatenate(parts)
 
@@ -132,14 +133,14 @@ def test_ways_hit_nothing(name: str) -> None:
     limits = arm.active_limits
     # there is something in the way
     assert least(arm, between(np.stack([q_start, q_goal]))) < 0
-    ways = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE)
+    ways = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
     assert ways
     for way in ways:
         np.testing.assert_array_equal(way[0], q_start)
         np.testing.assert_array_equal(way[-1], q_goal)
         assert (way >= limits.q_min).all() and (way <= limits.q_max).all()
-        assert (way >= np.minimum(q_start, q_goal) - ROOMS[-1]).all()
-        assert (way <= np.maximum(q_start, q_goal) + ROOMS[-1]).all()
+        assert (way >= np.minimum(q_start, q_goal) - BOUND_MARGINS[-1]).all()
+        assert (way <= np.maximum(q_start, q_goal) + BOUND_MARGINS[-1]).all()
         assert least(arm, between(way)) > 0
     lengths = [np.linalg.norm(np.diff(way, axis=0) / limits.v_max, axis=1).sum() for way in ways]
     assert lengths == sorted(lengths)
@@ -147,14 +148,14 @@ def test_ways_hit_nothing(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_ways() -> None:
     arm, q_start, q_goal = task("post")
-    first, again, other = (ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE, 2, s) for s in (3, 3, 4))
+    first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2, s) for s in (3, 3, 4))
     assert [way.tolist() for way in first] == [way.tolist() for way in again]
     assert [way.tolist() for way in first] != [way.tolist() for way in other]
 
 
 def test_two_ways_are_distinct() -> None:
     arm, q_start, q_goal = task("post")
-    ways = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE, 2)
+    ways = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2)
     assert len(ways) == 2
     v_max = arm.active_limits.v_max
     assert np.abs(along(ways[0], 1.0, v_max)[0] - along(ways[1], 1.0, v_max)[0]).max() > 0.3
@@ -162,7 +163,7 @@ def test_two_ways_are_distinct() -> None:
 
 def test_the_straight_line_is_the_only_way_where_it_is_free() -> None:
     _, q_start, q_goal = task("post")
-    (way,) = ways_around(Arm(robot=ROBOT), q_start, q_goal, time.perf_counter() + AMPLE)
+    (way,) = plan_paths(Arm(robot=ROBOT), q_start, q_goal, Deadline.after(AMPLE))
     np.testing.assert_array_equal(way, np.stack([q_start, q_goal]))
 
 
@@ -170,7 +171,7 @@ def test_no_way_to_a_goal_that_hits_something() -> None:
     arm, q_start, q_goal = task("post")
     through = Scene([*arm.scene.obstacles, Obstacle("plate", Box(np.array([0.2, 0.2, 0.02])), at(0.5, 0.3, 0.2))])
     blocked = Arm(robot=ROBOT, scene=through, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp)
-    assert ways_around(blocked, q_start, q_goal, time.perf_counter() + AMPLE) == []
+    assert plan_paths(blocked, q_start, q_goal, Deadline.after(AMPLE)) == []
 
 
 def walled_in() -> tuple[Arm, Array, Array]:
@@ -186,7 +187,7 @@ def test_no_way_to_a_goal_that_is_walled_in_and_an_answer_by_the_deadline() -> N
     closed, q_start, q_goal = walled_in()
     assert least(closed, q_start[None]) > 0 and least(closed, q_goal[None]) > 0
     begin = time.perf_counter()
-    assert ways_around(closed, q_start, q_goal, begin + 0.3) == []
+    assert plan_paths(closed, q_start, q_goal, begin + 0.3) == []
     # a run ends within a few checks of the deadline
     assert time.perf_counter() - begin < 1.0
 
@@ -202,7 +203,7 @@ def test_motions_get_past_what_is_in_the_way(name: str) -> None:
     found = optimize(problem(arm, q_start, q_goal))
     q = sample(found.trajectory.spline, np.arange(0.0, found.duration, REPLAY))[0]
     assert least(arm, q) >= 0
-    assert (found.candidates[0].reason == f"converged{LED}") == (name in STUCK)
+    assert (found.candidates[0].reason == f"converged{FROM_PLANNED_PATH}") == (name in STUCK)
 
 
 def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
@@ -216,11 +217,11 @@ def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
 def test_something_stands_between_ways_on_either_side_of_it() -> None:
     arm, q_start, q_goal = task("post")
     model, ones = CollisionModel(arm), np.ones(6)
-    (way, *_) = ways_around(arm, q_start, q_goal, time.perf_counter() + AMPLE)
+    (way, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
     around = along(way, 1.0, ones)[0]
     through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
-    assert nothing_between(model, around, around)
-    assert not nothing_between(model, around, 2 * through - around)
+    assert interpolation_is_free(model, around, around)
+    assert not interpolation_is_free(model, around, 2 * through - around)
 
 
 def test_limits_tightened_are_kept() -> None:
@@ -232,7 +233,7 @@ def test_limits_tightened_are_kept() -> None:
         q_min=np.maximum(limits.q_min, np.minimum(q_start, q_goal) - room),
         q_max=np.minimum(limits.q_max, np.maximum(q_start, q_goal) + room),
     )
-    for way in ways_around(replace(arm, limits=tight), q_start, q_goal, time.perf_counter() + AMPLE):
+    for way in plan_paths(replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)):
         assert (way >= tight.q_min).all() and (way <= tight.q_max).all()
 
 
@@ -240,12 +241,12 @@ def test_ways_keep_the_tool_within_its_cone() -> None:
     arm, q_start, q_goal = task("post")
     cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 0.4)
     held = replace(arm, tool_cone=cone)
-    tilt = PathLimits(joint_placements(arm.robot.model), path_limits(held))
+    tilt = PathConstraints(joint_placements(arm.robot.model), path_constraint_list(held))
 
     def widest(ways: list[Array]) -> float:
-        return max(float(tilt.shares(q := between(way), np.zeros_like(q)).max()) for way in ways)
+        return max(float(tilt.ratios(q := between(way), np.zeros_like(q)).max()) for way in ways)
 
-    free, within = (ways_around(a, q_start, q_goal, time.perf_counter() + AMPLE) for a in (arm, held))
+    free, within = (plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)) for a in (arm, held))
     assert within
     assert widest(within) <= 1 + STEP / cone.half_angle
     assert widest(free) > 1.2

@@ -16,7 +16,7 @@ from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.losses import power_flow
 from optimizer.exceptions import InvalidProblem
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Inverter, Payload
 from optimizer.problem.bus import Bus
 from optimizer.search.lower_bound import lower_bounds
@@ -201,7 +201,7 @@ def test_the_charge_is_in_the_answer() -> None:
     assert use.final - use.initial == pytest.approx(STORE.efficiency * use.charged - use.discharged, rel=1e-6)
     t = found.trajectory.t
     assert (np.abs(np.diff(charge)) <= STORE.power * np.diff(t) * (1 + 1e-6)).all()
-    task = Task.of(problem(**MOVES["down"], payload=HEAVY, bus=STORE))
+    task = PreparedProblem.of(problem(**MOVES["down"], payload=HEAVY, bus=STORE))
     fine = task.trajectory(found.trajectory.spline, 5e-4)
     drawn = np.trapezoid(fine.power, fine.t)
     electrical = found.energy.electrical
@@ -221,7 +221,7 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
     """Its cost is the exact draw but for the corners, and its gradient is that of its cost."""
     compile_kernel(ROBOT)
     inverter = Inverter(constant=1.2, linear=np.linspace(0.1, 0.6, 6), quadratic=0.02)
-    task = Task.of(problem(bus=Bus(mode, efficiency=0.6), inverter=inverter, payload=HEAVY))
+    task = PreparedProblem.of(problem(bus=Bus(mode, efficiency=0.6), inverter=inverter, payload=HEAVY))
     rng = np.random.default_rng(3)
     y = rng.normal(size=(50, 18)) * np.repeat([1.0, 1.5, 6.0], 6)
     p = task.objective_parameters
@@ -249,10 +249,10 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
 def test_bounds_hold_on_every_bus(bus: Bus) -> None:
     """The energies of optimised motions over other buses, too: every motion is one that each bus allows."""
     for name, move in MOVES.items():
-        task = Task.of(problem(**move, payload=HEAVY, bus=bus))
+        task = PreparedProblem.of(problem(**move, payload=HEAVY, bus=bus))
         start, goal = np.array(move["start"], dtype=float), np.array(move["goal"], dtype=float)
-        climb = task.potential(goal) - task.potential(start)
-        bound = float(lower_bounds(task, (goal - start)[None], np.array([climb]))[0][0])
+        potential_gain = task.potential(goal) - task.potential(start)
+        bound = float(lower_bounds(task, (goal - start)[None], np.array([potential_gain]))[0][0])
         for other in (Bus(), Bus("isolated"), Bus("recuperating", efficiency=1.0), STORE):
             energy = task.energy(solved(name, other).trajectory.spline).electrical
             assert energy.parts_sum == pytest.approx(energy.total, rel=1e-3)
@@ -265,7 +265,8 @@ def test_inverter_figures_replace_the_robots() -> None:
     """By hand: what is added is constant · T + linear ∫|i| + quadratic ∫i², and the bound pays the constant."""
     compile_kernel(ROBOT)
     plain, lossy = (
-        Task.of(problem(payload=HEAVY, inverter=inverter)) for inverter in (Inverter(), Inverter(2.0, 0.3, 0.02))
+        PreparedProblem.of(problem(payload=HEAVY, inverter=inverter))
+        for inverter in (Inverter(), Inverter(2.0, 0.3, 0.02))
     )
     spline = solved("down", Bus()).trajectory.spline
     assert plain.energy(spline).electrical.inverter == 0
@@ -275,7 +276,7 @@ def test_inverter_figures_replace_the_robots() -> None:
     expected = np.trapezoid(2.0 + 0.3 * i + 0.02 * i * i, found.t, axis=0)
     assert loss == pytest.approx(expected, rel=1e-3)  # samples of 8 ms
     assert lossy.arm.drives.copper is ROBOT.drives.copper
-    only_one = Task.of(problem(inverter=Inverter(linear=np.arange(6.0))))
+    only_one = PreparedProblem.of(problem(inverter=Inverter(linear=np.arange(6.0))))
     assert (only_one.arm.drives.inverter_linear == np.arange(6)).all()
     assert (only_one.arm.drives.inverter_constant == ROBOT.drives.inverter_constant).all()
 

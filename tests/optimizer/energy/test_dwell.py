@@ -14,7 +14,7 @@ from optimizer.energy.dwell import dwell_energy, holding_power, linear_dwells
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import DurationTooShort, InvalidProblem
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
 from optimizer.problem.bus import Bus
 from optimizer.problem.cycle import Cycle
@@ -52,7 +52,7 @@ def hold() -> float:
 
 
 def test_holding_power_by_hand() -> None:
-    task = Task.of(problem(START, GOAL, payload=HEAVY))
+    task = PreparedProblem.of(problem(START, GOAL, payload=HEAVY))
     assert float(task.holding_power(GOAL)) == pytest.approx(hold(), rel=1e-9)  # the kernel's torques
     assert hold() > 1.3 * ROBOT.electronics.idle_power
     assert float(holding_power(task.arm, np.zeros(6))) == ROBOT.electronics.idle_power

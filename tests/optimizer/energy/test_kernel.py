@@ -23,15 +23,16 @@ from optimizer.energy.kernel_cache import cache_directory, compile_kernel, compi
 from optimizer.energy.kernel_expressions import Parameters, build
 from optimizer.energy.losses import drawn_power, power_flow
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques
 
 NODES = 40
-# relative to the largest entry; compiler and virtual machine evaluate the same few thousand operations
+# relative to the largest candidate; compiler and virtual machine evaluate the same few thousand operations
 ROUNDING = 1e-12
 TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
 FORMULA = 1e-9  # relative; the same power by another route, with corners rounded over a billionth of a watt
-# relative to the largest entry; central differences with a step of 1e-6 lose about 1e-6² · f''' and 1e-16 / 1e-6 · f
+# relative to the largest candidate; central differences with a step of 1e-6 lose about 1e-6² · f''' and 1e-16 / 1e-6
+# · f
 DIFFERENCE, STEP = 2e-6, 1e-6
 SWAP = 60.0  # s; a compilation without optimisation takes one to three
 
@@ -41,7 +42,7 @@ LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, s
     inverter_linear=np.array([0.3, 0.3, 0.3, 0.5, 0.5, 0.5]),
     inverter_quadratic=np.full(6, 0.02),
 )
-TASK = Task.of(
+TASK = PreparedProblem.of(
     problem(
         robot=replace(
             ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, controller_power=9, regeneration=0.3)
@@ -282,8 +283,9 @@ def test_several_processes_make_one_library(workshop: Workshop) -> None:
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
     """It has its answer from the virtual machine and does not wait for the compiler, nor stumble over it."""
     code = (
-        "from optimizer import Problem, optimize\n"
-        f"print(optimize(Problem({START.tolist()}, {GOAL.tolist()})).certificate.valid)\n"
+        "from optimizer import Arm, Problem, load_robot, optimize\n"
+        f"arm, start, goal = Arm(robot=load_robot('ur5e')), {START.tolist()}, {GOAL.tolist()}\n"
+        "print(optimize(Problem(arm=arm, start=start, goal=goal)).certificate.valid)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")

@@ -9,7 +9,7 @@ import pytest
 from models.robot import Array
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem
 
 TORQUE_TOLERANCE = 1e-9  # N·m; both recursions round at about 1e-13 of torques of some 500 N·m
@@ -33,7 +33,7 @@ def scaled(scale: Array) -> pin.Model:
 @pytest.mark.parametrize("scale", SCALES, ids=str)
 def test_torques_and_potential_are_those_of_scaled_inertias(scale: Array) -> None:
     compile_kernel(ROBOT)
-    task = Task.of(problem(payload=PAYLOAD, gravity=TILTED, link_mass_scale=scale))
+    task = PreparedProblem.of(problem(payload=PAYLOAD, gravity=TILTED, link_mass_scale=scale))
     model = scaled(scale)
     data = model.createData()
     q, v, a = np.random.default_rng(0).uniform(-3, 3, (3, 200, 6))

@@ -7,16 +7,16 @@ import pytest
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import PathLimits, PointSpeed, ToolConeLimit
+from optimizer.kinematics.path_constraints import PathConstraints, PointSpeedConstraint, ToolConeConstraint
 
 ROBOT = load_robot("ur5e")
 PLACEMENTS = joint_placements(ROBOT.model)
 AXIS, DIRECTION = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.28, -0.96])
 POINTS = np.array([[0.05, -0.02, 0.2], [0.0, 0.1, 0.0]])
 LIMITS = {
-    "cone": ToolConeLimit(AXIS, DIRECTION, 0.7),
-    "tcp": PointSpeed("tcp_speed", 6, POINTS, 1.5),
-    "elbow": PointSpeed("elbow_speed", 2, np.array([[-0.425, 0.0, 0.13]]), 0.8),
+    "cone": ToolConeConstraint(AXIS, DIRECTION, 0.7),
+    "tcp": PointSpeedConstraint("tcp_speed", 6, POINTS, 1.5),
+    "elbow": PointSpeedConstraint("elbow_speed", 2, np.array([[-0.425, 0.0, 0.13]]), 0.8),
 }
 # central differences of step 1e-6 on values of order one: rounding 1e-10, truncation less
 STEP, GRADIENT_TOLERANCE = 1e-6, 1e-8
@@ -31,23 +31,23 @@ def states() -> tuple[Array, Array]:
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_gradients_are_those_of_finite_differences(name: str, states: tuple[Array, Array]) -> None:
-    path = PathLimits(PLACEMENTS, [LIMITS[name]])
+    path = PathConstraints(PLACEMENTS, [LIMITS[name]])
     q, v = states
     found = path.linearised(q, v)
-    np.testing.assert_array_equal(found.value, path.shares(q, v))
+    np.testing.assert_array_equal(found.value, path.ratios(q, v))
     for j in range(6):
         d = STEP * np.eye(6)[j]
-        by_q = (path.shares(q + d, v) - path.shares(q - d, v)) / (2 * STEP)
-        by_v = (path.shares(q, v + d) - path.shares(q, v - d)) / (2 * STEP)
+        by_q = (path.ratios(q + d, v) - path.ratios(q - d, v)) / (2 * STEP)
+        by_v = (path.ratios(q, v + d) - path.ratios(q, v - d)) / (2 * STEP)
         np.testing.assert_allclose(found.by_q[..., j], by_q, atol=GRADIENT_TOLERANCE)
         np.testing.assert_allclose(found.by_v[..., j], by_v, atol=GRADIENT_TOLERANCE)
 
 
 def test_shares_are_what_pinocchio_says(states: tuple[Array, Array]) -> None:
-    path = PathLimits(PLACEMENTS, list(LIMITS.values()))
+    path = PathConstraints(PLACEMENTS, list(LIMITS.values()))
     assert path.names == ("tool_cone", "tcp_speed", "tcp_speed", "elbow_speed")
     data = ROBOT.model.createData()
-    for q, v, shares in zip(*states, path.shares(*states), strict=True):
+    for q, v, shares in zip(*states, path.ratios(*states), strict=True):
         pin.forwardKinematics(ROBOT.model, data, q, v)
         angle = np.arccos(data.oMi[6].rotation @ AXIS @ DIRECTION)
         speeds = [speed_of(data, 6, point) / 1.5 for point in POINTS]
@@ -62,7 +62,7 @@ def speed_of(data: pin.Data, joint: int, point: Array) -> float:
 
 
 def test_a_tool_along_the_cones_axis_uses_nothing_of_it() -> None:
-    path = PathLimits(PLACEMENTS, [ToolConeLimit(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), 0.1)])
+    path = PathConstraints(PLACEMENTS, [ToolConeConstraint(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]), 0.1)])
     q = np.array([[0.0, -np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2, 0.0]])
     found = path.linearised(q, np.zeros((1, 6)))
     # the sum of rounding of six turns

@@ -5,22 +5,22 @@ Each is held to the limits, to fixed durations and to its deadline in `test_cand
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 import pytest
 
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import DurationTooShort
 from optimizer.methods import METHODS
-from optimizer.methods.method import Attempt
+from optimizer.methods.method import SolveResult
 from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
-from optimizer.problem.problem import Method
+from optimizer.problem.problem import MethodName
 from optimizer.solution import Solution
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, tcp_pose
@@ -48,7 +48,7 @@ def solved(method: str, start: Any = START, goal: Any = GOAL, **given: Any) -> S
 
 
 def test_every_method_is_there() -> None:
-    assert set(METHODS) == set(get_args(Method))
+    assert set(METHODS) == set(get_args(MethodName))
 
 
 CONDITIONS: list[dict[str, Any]] = [{}, {"payload": PAYLOAD, "gravity": TILTED}, {"limits": limits(j_max=40.0)}]
@@ -98,9 +98,9 @@ def test_a_polynomial_spends_no_more_than_the_quintic_that_it_could_be() -> None
 
 
 def test_the_factor_is_the_best_of_many() -> None:
-    """Against the same motion slowed by a hundred factors."""
+    """Against the same motion retimed by a hundred factors."""
     for start, goal in random_moves(53, 4):
-        task = Task.of(problem(start, goal, method="uniform_scaling"))
+        task = PreparedProblem.of(problem(start, goal, method="uniform_scaling"))
         solution = solved("uniform_scaling", start, goal)
         given = time_optimal_spline(ROBOT.limits, start, goal)
         shortest = solution.trajectory.spline.knots / solution.duration * given.duration
@@ -142,9 +142,9 @@ def test_mechanical_work(method: str) -> None:
     assert slow.duration <= 3.0
 
 
-def bred(start: Any = START, goal: Any = GOAL, **given: Any) -> tuple[PolynomialGA, Attempt]:
-    task = Task.of(problem(start, goal, method="polynomial_ga", **given))
-    solver = PolynomialGA(task, start, goal, time.perf_counter() + 60.0)
+def bred(start: Any = START, goal: Any = GOAL, **given: Any) -> tuple[PolynomialGA, SolveResult]:
+    task = PreparedProblem.of(problem(start, goal, method="polynomial_ga", **given))
+    solver = PolynomialGA(task, start, goal, Deadline.after(60.0))
     return solver, solver.solve()
 
 
@@ -155,7 +155,7 @@ def test_breeding_is_the_same_every_time_and_improves_on_its_first_population() 
     assert (attempt.spline.control_points == again.spline.control_points).all()
     assert attempt.spline.duration == again.spline.duration
     # by a share far beyond what making it hold every limit can take away
-    assert solver.task.energy(attempt.spline).electrical.total < 0.999 * solver.first_cost
+    assert solver.prepared.energy(attempt.spline).electrical.total < 0.999 * solver.first_cost
     assert attempt.iterations == solver.generations > 0
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -10,11 +9,12 @@ import pytest
 from scipy.interpolate import BSpline
 
 from models.robot import Array
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods import METHODS, solver_for
-from optimizer.methods import duration_intervals as windows
-from optimizer.methods.method import Attempt, Solver
-from optimizer.prepared_problem import Task
+from optimizer.methods import duration_intervals as duration_intervals
+from optimizer.methods.method import Method, SolveResult
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.spline import Spline
@@ -44,14 +44,14 @@ CONDITIONS: list[dict[str, Any]] = [
 ]
 
 
-def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any) -> Solver:
+def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0, **given: Any) -> Method:
     compile_kernel(ROBOT)
-    task = Task.of(problem(start, goal, **given))
-    window = windows.fastest(task) if fastest else None
-    return solver_for(task, start, goal, time.perf_counter() + wait, window)
+    task = PreparedProblem.of(problem(start, goal, **given))
+    interval = duration_intervals.fastest(task) if fastest else None
+    return solver_for(task, start, goal, Deadline.after(wait), interval)
 
 
-def spline(attempt: Attempt) -> Spline:
+def spline(attempt: SolveResult) -> Spline:
     assert attempt.status == "solved" and attempt.spline is not None, attempt.reason
     return attempt.spline
 
@@ -81,7 +81,7 @@ def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
         attempt = mine.solve()
         if method == "time_scaling" and attempt.status == "infeasible":
             continue  # a straight line may lead where the arm cannot be held
-        assert_held(mine.task.problem, spline(attempt))
+        assert_held(mine.prepared.problem, spline(attempt))
         assert attempt.iterations > 0 and attempt.solves > 0
 
 
@@ -89,9 +89,9 @@ def test_a_time_scaled_motion_stays_on_its_line() -> None:
     """Every control point, so every point; each a little further along."""
     for start, goal in random_moves(32, 4):
         points = spline(solver(start, goal, method="time_scaling").solve()).control_points
-        travel = goal - start
-        fraction = (points - start) @ travel / (travel @ travel)
-        assert np.abs(points - start - np.outer(fraction, travel)).max() < ROUNDING
+        displacement = goal - start
+        fraction = (points - start) @ displacement / (displacement @ displacement)
+        assert np.abs(points - start - np.outer(fraction, displacement)).max() < ROUNDING
         assert fraction[0] == pytest.approx(0, abs=ROUNDING) and fraction[-1] == pytest.approx(1, abs=ROUNDING)
 
 
@@ -101,7 +101,7 @@ def test_in_haste_the_arm_nearly_reaches_the_shortest_duration() -> None:
         least = float(shortest_duration(goal - start, ROBOT.limits))
         mine = solver(start, goal, fastest=True)
         motion = spline(mine.solve())
-        assert_held(mine.task.problem, motion)
+        assert_held(mine.prepared.problem, motion)
         assert least * (1 - ROUNDING) <= motion.duration <= 1.03 * least
 
 
@@ -132,7 +132,7 @@ def test_a_fixed_duration_is_kept(method: str) -> None:
         mine = solver(START, GOAL, method=method, **fixed(duration))
         motion = spline(mine.solve())
         assert motion.duration == duration
-        assert_held(mine.task.problem, motion)
+        assert_held(mine.prepared.problem, motion)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -141,4 +141,4 @@ def test_going_nowhere_is_a_motion(method: str) -> None:
     motion = spline(mine.solve())
     assert motion.duration > 0
     assert np.abs(motion.control_points - START).max() < 0.1
-    assert_held(mine.task.problem, motion)
+    assert_held(mine.prepared.problem, motion)

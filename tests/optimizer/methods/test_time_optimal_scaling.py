@@ -11,8 +11,8 @@ from scipy.interpolate import BSpline
 
 from models.robot import Array
 from optimizer.energy.kernel_cache import compile_kernel
-from optimizer.methods.time_optimal_scaling import GRID, TRUST, shortest_law
-from optimizer.prepared_problem import Task
+from optimizer.methods.time_optimal_scaling import GRID, TRUST, time_optimal_on_line
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.baselines import within_limits
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import DEGREE
@@ -29,13 +29,15 @@ WEAK = [60.0, 75.0, 45.0, 12.0, 10.0, 9.0]
 
 def law_of(start: Array, goal: Array, **given: Any) -> Any:
     compile_kernel(ROBOT)
-    return shortest_law(Task.of(problem(start, goal, **given)), start, goal)
+    return time_optimal_on_line(PreparedProblem.of(problem(start, goal, **given)), start, goal)
 
 
-@pytest.mark.parametrize(("travel", "duration"), [(2.0, 2.0 / math.pi + math.pi / 10), (0.5, 2 * math.sqrt(0.05))])
-def test_one_joint_with_ample_torque_moves_in_a_trapezoid(travel: float, duration: float) -> None:
+@pytest.mark.parametrize(
+    ("displacement", "duration"), [(2.0, 2.0 / math.pi + math.pi / 10), (0.5, 2 * math.sqrt(0.05))]
+)
+def test_one_joint_with_ample_torque_moves_in_a_trapezoid(displacement: float, duration: float) -> None:
     """The last joint at 3.14 rad/s and 10 rad/s²: T = Δ/v + v/a, or 2 (Δ/a)^½ where it turns before its full speed."""
-    law = law_of(START, START + travel * np.eye(6)[5], **ALMOST_WEIGHTLESS)
+    law = law_of(START, START + displacement * np.eye(6)[5], **ALMOST_WEIGHTLESS)
     assert law.times[-1] == pytest.approx(duration, rel=GRID_STEP)
     assert TRUST * law.times[-1] == pytest.approx(law.duration_bound)
     assert law.duration_bound <= duration

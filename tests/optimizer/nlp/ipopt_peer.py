@@ -1,7 +1,7 @@
 """A second solver for the optimiser's programmes: the same problem, written plainly in CasADi, solved by IPOPT.
 
-Shares with the optimiser the spline basis and the expression for power at one instant. Objective, constraints, their
-derivatives (CasADi's own) and the method (interior point) are apart from it.
+ConstraintRatios with the optimiser the spline basis and the expression for power at one instant. Objective,
+constraints, their derivatives (CasADi's own) and the method (interior point) are apart from it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.energy.kernel_expressions import build
-from optimizer.nlp.nonlinear_program import Programme
+from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.trajectories.bspline import REST_POINTS, Basis
 from tests.optimizer.moves import ROBOT
 
@@ -39,7 +39,7 @@ def thinned(basis: Basis) -> Array:
 
 
 class Peer:
-    """One programme family: motions of all joints in a spline space. Built once, solved for any ends and limits."""
+    """One program family: motions of all joints in a spline space. Built once, solved for any ends and limits."""
 
     def __init__(self, basis: Basis) -> None:
         nq, m = ROBOT.nq, basis.n - 2 * REST_POINTS
@@ -69,16 +69,16 @@ class Peer:
             {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes", "ipopt.tol": 1e-7, "ipopt.max_iter": 500},
         )
 
-    def solve(self, programme: Programme, free: Array, duration: float) -> Optimum:
-        """The optimum near a guess, under the programme's own limits and duration bounds."""
-        limits, line = programme.limits, programme.coordinates
+    def solve(self, program: NonlinearProgram, free: Array, duration: float) -> Optimum:
+        """The optimum near a guess, under the program's own limits and duration bounds."""
+        limits, line = program.limits, program.coordinates
         rates = np.stack([limits.v_max, limits.a_max, limits.j_max])
         bounds = np.concatenate([np.ones(self._rows), np.tile(limits.tau_max, self._nodes)])
         found = self._solver(
             x0=np.append(free.T.ravel(), duration),
-            p=np.concatenate([programme.p, line.start, line.goal, rates.T.ravel()]),
-            lbx=np.append(np.repeat(limits.q_min, self._m), programme.t_min),
-            ubx=np.append(np.repeat(limits.q_max, self._m), programme.t_max),
+            p=np.concatenate([program.p, line.start, line.goal, rates.T.ravel()]),
+            lbx=np.append(np.repeat(limits.q_min, self._m), program.t_min),
+            ubx=np.append(np.repeat(limits.q_max, self._m), program.t_max),
             lbg=-bounds,
             ubg=bounds,
         )

@@ -7,14 +7,15 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
 from optimizer.collision.model import CollisionModel
+from optimizer.deadline import NEVER
 from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.path_constraints import PathLimits
+from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import Attempt
-from optimizer.methods.sqp_method import DEARER
-from optimizer.nlp.clearance_constraint import COUNTED, RESERVE, SCALE, KeepAway
+from optimizer.methods.method import SolveResult
+from optimizer.methods.sqp_method import NO_BETTER
+from optimizer.nlp.clearance_constraint import COUNTED, RESERVE, SCALE, ClearanceConstraint
 from optimizer.nlp.sqp import NEAR_PATH
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from optimizer.problem.tool_cone import ToolCone
@@ -81,26 +82,26 @@ def test_what_is_far_away_changes_nothing() -> None:
 
 
 def test_what_is_dearer_than_a_known_motion_is_not_kept_clear() -> None:
-    task = Task.of(problem_with(HOME, GOAL, scene=Scene((low_post(),))))
+    task = PreparedProblem.of(problem_with(HOME, GOAL, scene=Scene((low_post(),))))
     free = solved(collisions=False).energy.electrical.total
 
-    def attempt(best_known: float) -> Attempt:
-        solver = FreeSpline(task, HOME, GOAL, np.inf)
+    def attempt(best_known: float) -> SolveResult:
+        solver = FreeSpline(task, HOME, GOAL, NEVER)
         solver.best_known = best_known
         return solver.solve()
 
     assert attempt(np.inf).status == attempt(1.1 * free).status == "solved"
     pruned = attempt(0.9 * free)
-    assert (pruned.status, pruned.reason, pruned.spline) == ("pruned", DEARER, None)
+    assert (pruned.status, pruned.reason, pruned.spline) == ("pruned", NO_BETTER, None)
 
 
-def every_pair(model: CollisionModel) -> PathLimits:
-    return PathLimits(joint_placements(ROBOT.model), [KeepAway(model, np.arange(len(model.pairs)))])
+def every_pair(model: CollisionModel) -> PathConstraints:
+    return PathConstraints(joint_placements(ROBOT.model), [ClearanceConstraint(model, np.arange(len(model.pairs)))])
 
 
 def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     problem = problem_with(HOME, GOAL, scene=Scene((low_post(), Obstacle("ball", Sphere(0.1), at(0.3, -0.3, 0.4)))))
-    path = every_pair(CollisionModel(problem))
+    path = every_pair(CollisionModel(problem.arm))
     q = np.linspace(HOME, GOAL, 25)
     v = np.zeros_like(q)
     found = path.linearised(q, v)
@@ -108,14 +109,14 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     assert near.sum() > 10
     for j in range(6):
         d = STEP * np.eye(6)[j]
-        by_q = (path.shares(q + d, v) - path.shares(q - d, v)) / (2 * STEP)
+        by_q = (path.ratios(q + d, v) - path.ratios(q - d, v)) / (2 * STEP)
         np.testing.assert_allclose(found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE)
 
 
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
     q = np.linspace(HOME, GOAL, 25)
-    shares = every_pair(model).shares(q, np.zeros_like(q))
+    shares = every_pair(model).ratios(q, np.zeros_like(q))
     expected = 1 - (model.distances(q)[0] - RESERVE) / SCALE
     near = expected > COUNTED_SHARE
     assert 10 < near.sum() < near.size
@@ -141,10 +142,10 @@ def test_a_wide_cone_changes_nothing_and_a_narrow_one_binds() -> None:
         return problem_with(HOME, goal, windings=False, tool_cone=cone)
 
     free = optimize(problem_with(HOME, goal, windings=False))
-    path = Task.of(upright(1.0)).path
+    path = PreparedProblem.of(upright(1.0)).path
     assert path is not None
     q, v, _ = sample(free.trajectory.spline, np.linspace(0, free.duration, 400))
-    tilt = float(path.shares(q, v).max())
+    tilt = float(path.ratios(q, v).max())
     wide, narrow = optimize(upright(1.5 * tilt)), optimize(upright(0.4 * tilt))
     assert wide.energy.electrical.total == pytest.approx(free.energy.electrical.total, rel=SAME_ENERGY)
     assert USED < narrow.certificate.worst_ratio["tool_cone"] <= 1

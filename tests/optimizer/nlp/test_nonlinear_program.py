@@ -1,4 +1,4 @@
-"""The programme of a candidate: its cost against an independent integral, its derivatives against differences."""
+"""The program of a candidate: its cost against an independent integral, its derivatives against differences."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.losses import drawn_power, power_flow
 from optimizer.energy.plant import KNEE, WIDTH
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import Programme
-from optimizer.prepared_problem import Task
+from optimizer.nlp.nonlinear_program import NonlinearProgram
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import DEGREE, Basis
 from optimizer.trajectories.quadrature import quadrature
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 
 STEP = 1e-6  # of control points [rad, or of the line's fraction] and of the duration [s]
-# relative to the largest entry: a central difference loses STEP² of the third derivative, which friction's reversal
+# relative to the largest candidate: a central difference loses STEP² of the third derivative, which friction's reversal
 # at KNEE makes large, and rounding over STEP of the value
 FIRST, SECOND = 1e-6, 1e-5
 # relative; corners of |power| rounded over WIDTH, and friction's reversal at rest, lie between the nodes
@@ -35,10 +35,10 @@ SPACES = {"uniform": bspline.uniform(13), "graded": bspline.graded(np.array([0.0
 
 @dataclass(frozen=True)
 class Case:
-    """A programme and a point that is neither optimal nor a straight line nor feasible."""
+    """A program and a point that is neither optimal nor a straight line nor feasible."""
 
-    task: Task
-    programme: Programme
+    task: PreparedProblem
+    program: NonlinearProgram
     free: Array
     duration: float
     multiplier: Array
@@ -56,7 +56,7 @@ def case(request: pytest.FixtureRequest) -> Case:
 def make(objective: str, kind: str, basis: Basis) -> Case:
     compile_kernel(ROBOT)
     electronics = replace(ROBOT.electronics, regeneration=0.4)
-    task = Task.of(
+    task = PreparedProblem.of(
         problem(
             robot=replace(ROBOT, electronics=electronics),
             payload=PAYLOAD,
@@ -67,17 +67,17 @@ def make(objective: str, kind: str, basis: Basis) -> Case:
     )
     build = {"joints": Coordinates.joints, "line": Coordinates.straight_line}[kind]
     coordinates = build(START, GOAL, ROBOT.limits)
-    kernel = Task.of(problem()).kernel
-    programme = Programme(kernel, basis, task.objective_parameters, coordinates, 0.5, 2.0)
+    kernel = PreparedProblem.of(problem()).kernel
+    program = NonlinearProgram(kernel, basis, task.objective_parameters, coordinates, 0.5, 2.0)
     rng = np.random.default_rng(1)
     points = coordinates.start + np.outer(basis.quintic, coordinates.goal - coordinates.start)
-    free = points[basis.free] + 0.05 * rng.normal(size=(programme.free_count, programme.r))
-    return Case(task, programme, free, 0.8, 0.1 * rng.normal(size=(len(basis.nodes), 6)))
+    free = points[basis.free] + 0.05 * rng.normal(size=(program.free_count, program.r))
+    return Case(task, program, free, 0.8, 0.1 * rng.normal(size=(len(basis.nodes), 6)))
 
 
 def motion(case: Case) -> BSpline:
     """q(t) by SciPy, from the control points of the joints."""
-    return BSpline(case.programme.basis.knots * case.duration, case.programme.joint_points(case.free), DEGREE)
+    return BSpline(case.program.basis.knots * case.duration, case.program.joint_points(case.free), DEGREE)
 
 
 def power(case: Case, q: Array, v: Array, a: Array) -> Array:
@@ -93,34 +93,34 @@ def power(case: Case, q: Array, v: Array, a: Array) -> Array:
 
 def test_cost_is_the_sum_of_power_over_the_nodes(case: Case) -> None:
     """Of SciPy's spline in real time: the chain rule v = s' / T, a = s'' / T², and dt = T dτ."""
-    curve, basis, T = motion(case), case.programme.basis, case.duration
+    curve, basis, T = motion(case), case.program.basis, case.duration
     t = basis.nodes * T
     expected = T * basis.weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
-    assert case.programme.value(case.free, T)[0] == pytest.approx(float(expected), rel=SUM)
+    assert case.program.value(case.free, T)[0] == pytest.approx(float(expected), rel=SUM)
 
 
 def test_cost_is_the_integral_of_power(case: Case) -> None:
     """Along a straight motion, against sixteen times as many points."""
-    line = case.programme.coordinates
-    points = line.start + np.outer(case.programme.basis.quintic, line.goal - line.start)
-    smooth = replace(case, free=points[case.programme.basis.free])
+    line = case.program.coordinates
+    points = line.start + np.outer(case.program.basis.quintic, line.goal - line.start)
+    smooth = replace(case, free=points[case.program.basis.free])
     curve = motion(smooth)
     t, weights = quadrature(curve.t, 64)
     expected = weights @ power(case, curve(t), curve(t, 1), curve(t, 2))
-    assert case.programme.value(smooth.free, case.duration)[0] == pytest.approx(float(expected), rel=QUADRATURE)
+    assert case.program.value(smooth.free, case.duration)[0] == pytest.approx(float(expected), rel=QUADRATURE)
 
 
 def test_torques_are_those_of_the_motion(case: Case) -> None:
     """At every node, friction included, from SciPy's spline in real time."""
-    curve, t = motion(case), case.programme.basis.nodes * case.duration
+    curve, t = motion(case), case.program.basis.nodes * case.duration
     q, v, a = curve(t), curve(t, 1), curve(t, 2)
     friction = replace(case.task.friction, knee=KNEE)
     expected = torques(case.task.problem, q, v, a) + friction.torque(v)
-    tau = case.programme.value(case.free, case.duration)[1].copy()
+    tau = case.program.value(case.free, case.duration)[1].copy()
     assert np.abs(tau - expected).max() < TORQUE
-    line = case.programme.derivatives(case.free, case.duration, case.multiplier)
+    line = case.program.derivatives(case.free, case.duration, case.multiplier)
     assert np.abs(line.tau - expected).max() < TORQUE
-    assert line.cost == pytest.approx(case.programme.value(case.free, case.duration)[0], rel=EXACT)
+    assert line.cost == pytest.approx(case.program.value(case.free, case.duration)[0], rel=EXACT)
 
 
 def shifted(case: Case, i: int, by: float) -> tuple[Array, float]:
@@ -132,9 +132,9 @@ def shifted(case: Case, i: int, by: float) -> tuple[Array, float]:
 
 def test_gradient_is_the_slope_of_the_cost(case: Case) -> None:
     n = case.free.size + 1
-    up, down = ([case.programme.value(*shifted(case, i, by))[0] for i in range(n)] for by in (STEP, -STEP))
+    up, down = ([case.program.value(*shifted(case, i, by))[0] for i in range(n)] for by in (STEP, -STEP))
     slope = (np.array(up) - np.array(down)) / (2 * STEP)
-    gradient = case.programme.derivatives(case.free, case.duration, case.multiplier).gradient
+    gradient = case.program.derivatives(case.free, case.duration, case.multiplier).gradient
     assert gradient.shape == (n,)
     assert np.abs(gradient - slope).max() < FIRST * np.abs(slope).max()
     assert gradient[-1] == pytest.approx(slope[-1], rel=FIRST)  # small beside those by control points
@@ -142,17 +142,17 @@ def test_gradient_is_the_slope_of_the_cost(case: Case) -> None:
 
 def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
     """Of cost + multiplier · tau_motor, in all unknowns; the last row, by the duration, on its own scale too."""
-    programme, n = case.programme, case.free.size + 1
+    program, n = case.program, case.free.size + 1
     k, j = (index.ravel() for index in np.indices(case.multiplier.shape))
 
     def gradient(i: int, by: float) -> Array:
         free, T = shifted(case, i, by)
-        line = programme.derivatives(free, T, case.multiplier)
-        rows = programme.torque_rows(line, T, k, j)
+        line = program.derivatives(free, T, case.multiplier)
+        rows = program.torque_rows(line, T, k, j)
         return np.asarray(line.gradient + case.multiplier.ravel() @ rows)
 
     slope = np.array([gradient(i, STEP) - gradient(i, -STEP) for i in range(n)]) / (2 * STEP)
-    hessian = programme.derivatives(case.free, case.duration, case.multiplier).hessian
+    hessian = program.derivatives(case.free, case.duration, case.multiplier).hessian
     assert np.abs(hessian - hessian.T).max() < EXACT * np.abs(hessian).max()
     assert np.abs(hessian - slope).max() < SECOND * np.abs(slope).max()
     assert np.abs(hessian[-1] - slope[-1]).max() < SECOND * np.abs(slope[-1]).max()
@@ -161,23 +161,23 @@ def test_hessian_is_the_slope_of_the_lagrangians_gradient(case: Case) -> None:
 def test_torque_rows_are_the_slopes_of_torques(case: Case) -> None:
     """Of chosen joints at chosen nodes, in any order."""
     rng = np.random.default_rng(2)
-    k, j = rng.integers(0, len(case.programme.basis.nodes), 40), rng.integers(0, 6, 40)
+    k, j = rng.integers(0, len(case.program.basis.nodes), 40), rng.integers(0, 6, 40)
     n = case.free.size + 1
     up, down = (
-        np.array([case.programme.value(*shifted(case, i, by))[1][k, j] for i in range(n)]) for by in (STEP, -STEP)
+        np.array([case.program.value(*shifted(case, i, by))[1][k, j] for i in range(n)]) for by in (STEP, -STEP)
     )
     slope = (up - down).T / (2 * STEP)
-    line = case.programme.derivatives(case.free, case.duration, case.multiplier)
-    rows = case.programme.torque_rows(line, case.duration, k, j)
+    line = case.program.derivatives(case.free, case.duration, case.multiplier)
+    rows = case.program.torque_rows(line, case.duration, k, j)
     assert rows.shape == (40, n)
     assert np.abs(rows - slope).max() < FIRST * np.abs(slope).max()
 
 
 def test_rates_are_those_of_the_motion(case: Case) -> None:
     """|derivative by τ| ≤ limit · T^d is the limit on the joints themselves, jerk included."""
-    programme, T = case.programme, case.duration
-    derivatives = programme.kinematics(case.free)
-    limit = programme.rates * T ** np.arange(1, 4)[:, None]
+    program, T = case.program, case.duration
+    derivatives = program.kinematics(case.free)
+    limit = program.rates * T ** np.arange(1, 4)[:, None]
     worst = (np.abs(derivatives).max(axis=1) / limit).max(axis=1)
     curve, robot = motion(case), ROBOT.limits
     eps = 1e-10
@@ -190,15 +190,15 @@ def test_rates_are_those_of_the_motion(case: Case) -> None:
 
 def test_points_of_the_motion(case: Case) -> None:
     """Three equal ones at either end, the free ones in between; back from joints to coordinates."""
-    programme = case.programme
-    q = programme.joint_points(case.free)
+    program = case.program
+    q = program.joint_points(case.free)
     assert q[:3] == pytest.approx(np.tile(START, (3, 1)), rel=EXACT)
     assert q[-3:] == pytest.approx(np.tile(GOAL, (3, 1)), rel=EXACT)
-    assert programme.coordinates.from_joints(q[3:-3]) == pytest.approx(case.free, rel=1e-10, abs=1e-12)
+    assert program.coordinates.from_joints(q[3:-3]) == pytest.approx(case.free, rel=1e-10, abs=1e-12)
 
 
 def test_a_line_is_limited_by_its_slowest_joint() -> None:
-    """Fractions of the line per second: each joint's limit over its travel; joints that stay set no limit."""
+    """Fractions of the line per second: each joint's limit over its displacement; joints that stay set no limit."""
     goal = START + np.array([1.0, -0.5, 0.0, 0.0, 0.0, 0.0])
     own = limits(v_max=[3.0, 0.6, 1, 1, 1, 1], a_max=[2.0, 5.0, 1, 1, 1, 1], j_max=[90.0, 50.0, 1, 1, 1, 1])
     line = Coordinates.straight_line(START, goal, own)

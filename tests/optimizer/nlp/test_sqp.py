@@ -14,9 +14,9 @@ from models.robot import Array, Limits
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.plant import KNEE
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import Programme
+from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import FEASIBILITY, Result, solve
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import DEGREE, Basis
 from optimizer.trajectories.seven_segment import shortest_duration
@@ -29,7 +29,8 @@ PEER = 5e-4
 # relative; what IPOPT may still find from where the optimiser stopped: along the flat valleys of mechanical energy a
 # step that promises less than 5e-5 may be the first of a long way
 REST = 1e-3
-# share of the cost per greatest travel, or per doubling of the time, that no multiplier accounts for; the solver stops
+# share of the cost per greatest displacement, or per doubling of the time, that no multiplier accounts for; the
+# solver stops
 # where a further step promises 5e-5 of the cost: with a curvature h of the cost, (2 h · 5e-5)^½ may be left, and h is
 # of order 10 along the softest directions
 STATIONARY = 0.05
@@ -38,20 +39,20 @@ GRID = 1e-3  # relative; a rate's peak between the points of the grid
 COARSE = bspline.uniform(11)
 
 
-def programme(
+def program(
     start: Array, goal: Array, basis: Basis = COARSE, kind: str = "joints", own: Limits = ROBOT.limits, **given: Any
-) -> Programme:
-    """One candidate's programme, between the duration bounds of its problem."""
+) -> NonlinearProgram:
+    """One candidate's program, between the duration bounds of its problem."""
     compile_kernel(ROBOT)
-    task = Task.of(problem(start, goal, limits=own, **given))
-    kernel = Task.of(problem()).kernel  # a robot with other figures has the same
+    task = PreparedProblem.of(problem(start, goal, limits=own, **given))
+    kernel = PreparedProblem.of(problem()).kernel  # a robot with other figures has the same
     build = Coordinates.straight_line if kind == "line" else Coordinates.joints
     t_min, t_max = task.problem.duration_min or 0.01, task.problem.duration_max or 600.0
     p = task.objective_parameters
-    return Programme(kernel, basis, p, build(start, goal, own), t_min, t_max)
+    return NonlinearProgram(kernel, basis, p, build(start, goal, own), t_min, t_max)
 
 
-def quintic(of: Programme) -> Array:
+def quintic(of: NonlinearProgram) -> Array:
     """Free control points of the straight quintic."""
     line = of.coordinates
     return np.asarray((line.start + np.outer(of.basis.quintic, line.goal - line.start))[of.basis.free])
@@ -87,7 +88,7 @@ def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
     """From the same guess, one move per condition: the same cost, and nearly the same duration."""
     start, goal = list(random_moves(11, len(CONDITIONS)))[k]
     given = conditions(k)
-    mine = programme(start, goal, **given)
+    mine = program(start, goal, **given)
     guess = quintic(mine), 1.4 * shortest(start, goal, given["own"])
     ours, theirs = solve(mine, *guess), peer.solve(mine, *guess)
     assert ours.status == "solved" and theirs.converged
@@ -102,7 +103,7 @@ def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
 def test_mechanical_optimum_leaves_ipopt_little(peer: Peer, k: int) -> None:
     """Mechanical energy has many local optima: IPOPT starts from ours, and finds next to nothing nearby."""
     start, goal = list(random_moves(11, 4))[k]
-    mine = programme(start, goal, objective="mechanical", duration_max=1.5 * shortest(start, goal), **conditions(k))
+    mine = program(start, goal, objective="mechanical", duration_max=1.5 * shortest(start, goal), **conditions(k))
     ours = solve(mine, quintic(mine), mine.t_max)
     theirs = peer.solve(mine, ours.free, ours.duration)
     assert ours.status == "solved" and theirs.converged
@@ -110,7 +111,7 @@ def test_mechanical_optimum_leaves_ipopt_little(peer: Peer, k: int) -> None:
     assert ours.cost < mine.value(quintic(mine), mine.t_max)[0]
 
 
-def unexplained(of: Programme, found: Result) -> float:
+def unexplained(of: NonlinearProgram, found: Result) -> float:
     """What is left of the cost's gradient, over the cost, when active limits take what nonnegative multipliers can.
 
     Gradients of active rows by the definition of each limit: rates at the grid, torques at the nodes, positions of
@@ -134,7 +135,7 @@ def unexplained(of: Programme, found: Result) -> float:
     rows += [-unit[i] for i in np.flatnonzero(flat < np.tile(of.limits.q_min, m) + 1e-6)]
     rows += [unit[-1]] * (of.t_max - 1e-6 < T) + [-unit[-1]] * (of.t_min + 1e-6 > T)
     length = np.abs(of.coordinates.goal - of.coordinates.start).max()
-    scale = np.append(np.full(m * r, length), T)  # of the unknowns: the greatest travel, and the duration itself
+    scale = np.append(np.full(m * r, length), T)  # of the unknowns: the greatest displacement, and the duration itself
     gradient = line.gradient * scale / line.cost
     A = np.array(rows).reshape(-1, len(scale)) * scale
     multipliers, _ = nnls(A.T, -gradient) if len(A) else (np.zeros(0), 0.0)
@@ -148,7 +149,7 @@ def test_active_limits_explain_the_gradient(objective: str, kind: str) -> None:
     for k, (start, goal) in enumerate(random_moves(12, 6)):
         given = conditions(k)
         longest = None if objective == "electrical" else 1.5 * shortest(start, goal, given["own"])
-        mine = programme(start, goal, kind=kind, objective=objective, duration_max=longest, **given)
+        mine = program(start, goal, kind=kind, objective=objective, duration_max=longest, **given)
         found = solve(mine, quintic(mine), 1.5 * shortest(start, goal, given["own"]))
         assert found.status == "solved"
         assert unexplained(mine, found) < STATIONARY
@@ -156,7 +157,7 @@ def test_active_limits_explain_the_gradient(objective: str, kind: str) -> None:
 
 def test_the_conditions_are_not_met_elsewhere() -> None:
     """The measure above does tell: a straight quintic at leisure is far from optimal."""
-    mine = programme(START, GOAL)
+    mine = program(START, GOAL)
     guess = Result("solved", quintic(mine), 1.5, 0.0, 0, 0.0, 0.0, np.zeros((len(COARSE.nodes), 6)))
     assert unexplained(mine, guess) > 0.5
 
@@ -167,7 +168,7 @@ def test_limits_are_held(kind: str) -> None:
     for k, (start, goal) in enumerate(random_moves(13, 6)):
         given = conditions(k)
         own = given["own"]
-        mine = programme(start, goal, kind=kind, **given)
+        mine = program(start, goal, kind=kind, **given)
         found = solve(mine, quintic(mine), 2 * shortest(start, goal, own))
         assert found.status == "solved" and found.violation <= FEASIBILITY
         curve = BSpline(COARSE.knots * found.duration, mine.joint_points(found.free), DEGREE)
@@ -185,14 +186,14 @@ def test_limits_are_held(kind: str) -> None:
 def test_positions_stay_inside_a_narrow_range() -> None:
     """Mechanical energy would swing the arm far out; the elbow may not."""
     given: dict[str, Any] = {"objective": "mechanical", **fixed(2.5)}
-    free = solve(wide := programme(START, GOAL, **given), quintic(wide), 2.5)
+    free = solve(wide := program(START, GOAL, **given), quintic(wide), 2.5)
     points = wide.joint_points(free.free)
     joint = int(np.abs(points - np.clip(points, np.minimum(START, GOAL), np.maximum(START, GOAL))).max(axis=0).argmax())
     q_min, q_max = ROBOT.limits.q_min.copy(), ROBOT.limits.q_max.copy()
     q_min[joint], q_max[joint] = (f(START[joint], GOAL[joint]) + by for f, by in ((min, -0.01), (max, 0.01)))
     assert points[:, joint].max() > q_max[joint] + 0.05 or points[:, joint].min() < q_min[joint] - 0.05
     own = replace(ROBOT.limits, q_min=q_min, q_max=q_max)
-    narrow = programme(START, GOAL, own=own, **given)
+    narrow = program(START, GOAL, own=own, **given)
     found = solve(narrow, quintic(narrow), 2.5)
     q = narrow.joint_points(found.free)
     assert found.status == "solved"
@@ -201,7 +202,7 @@ def test_positions_stay_inside_a_narrow_range() -> None:
 
 
 def test_a_fixed_duration_is_kept() -> None:
-    mine = programme(START, GOAL, **fixed(1.234))
+    mine = program(START, GOAL, **fixed(1.234))
     for guess in (0.5, 1.234, 3.0):
         found = solve(mine, quintic(mine), guess)
         assert found.status == "solved" and found.duration == 1.234
@@ -210,10 +211,10 @@ def test_a_fixed_duration_is_kept() -> None:
 def test_durations_stay_between_their_bounds() -> None:
     """At a bound where the best duration lies beyond it; an arm that idles cheaply likes to take its time."""
     lazy = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=3.0))
-    best = solve(mine := programme(START, GOAL, robot=lazy), quintic(mine), 1.0).duration
+    best = solve(mine := program(START, GOAL, robot=lazy), quintic(mine), 1.0).duration
     assert best > 1.5 * shortest(START, GOAL)
     for t_min, t_max in ((1.2 * best, 2 * best), (0.01, 0.9 * best)):
-        mine = programme(START, GOAL, robot=lazy, duration_min=t_min, duration_max=t_max)
+        mine = program(START, GOAL, robot=lazy, duration_min=t_min, duration_max=t_max)
         found = solve(mine, quintic(mine), best)
         assert found.status == "solved"
         assert found.duration == pytest.approx(t_min if t_min > best else t_max, rel=1e-9)
@@ -224,7 +225,7 @@ def test_durations_stay_between_their_bounds() -> None:
 def test_too_little_time_is_told(share: float) -> None:
     """Less than the limits on speed, acceleration and jerk allow: no motion, and the excess is reported."""
     own = limits(v_max=1.5)
-    mine = programme(START, GOAL, own=own, **fixed(share * shortest(START, GOAL, own)))
+    mine = program(START, GOAL, own=own, **fixed(share * shortest(START, GOAL, own)))
     found = solve(mine, quintic(mine), mine.t_max)
     assert found.status != "solved" and found.violation > FEASIBILITY
 
@@ -232,7 +233,7 @@ def test_too_little_time_is_told(share: float) -> None:
 def test_too_little_torque_is_told() -> None:
     """The shoulder cannot hold the arm."""
     own = limits(tau_max=[150, 8, 150, 28, 28, 28])
-    mine = programme(START, GOAL, own=own)
+    mine = program(START, GOAL, own=own)
     found = solve(mine, quintic(mine), 1.5)
     assert found.status != "solved" and found.violation > FEASIBILITY
 
@@ -240,7 +241,7 @@ def test_too_little_torque_is_told() -> None:
 @pytest.mark.parametrize("ticks", [0, 1, 3])
 def test_the_deadline_is_looked_at_in_every_iteration(ticks: int) -> None:
     """A clock that reaches the deadline after a number of readings; what has been found so far is returned."""
-    mine = programme(START, GOAL)
+    mine = program(START, GOAL)
     readings = iter(range(1000))
     found = solve(mine, quintic(mine), 3.0, deadline=ticks - 0.5, clock=lambda: float(next(readings)))
     assert found.status == "out of time" and found.iterations == ticks + 1
@@ -250,7 +251,7 @@ def test_the_deadline_is_looked_at_in_every_iteration(ticks: int) -> None:
 def test_an_optimum_is_left_alone() -> None:
     """Started from its own answer, the solver sees that there is nothing to do."""
     for start, goal in random_moves(14, 4):
-        mine = programme(start, goal)
+        mine = program(start, goal)
         first = solve(mine, quintic(mine), 1.5 * shortest(start, goal))
         again = solve(mine, first.free, first.duration, first.multiplier)
         assert again.status == "solved" and again.iterations <= 3
@@ -260,7 +261,7 @@ def test_an_optimum_is_left_alone() -> None:
 def test_electrical_optimum_does_not_depend_on_the_guess() -> None:
     """Bent motions and durations too short and too long all lead to the same cost."""
     rng = np.random.default_rng(3)
-    mine = programme(START, GOAL)
+    mine = program(START, GOAL)
     costs = []
     for stretch in (0.7, 1.1, 2.0, 6.0):
         free = quintic(mine) + 0.1 * rng.normal(size=(mine.free_count, mine.r))
@@ -278,9 +279,9 @@ def test_in_haste_a_joint_moves_as_its_seven_segments() -> None:
     assert least == pytest.approx(2.0 / v + v / a + a / j)
     early = np.array([a / j, v / a, v / a + a / j]) / least
     space = bspline.graded(np.concatenate([early, 1 - early[::-1]]), 3)
-    task = Task.of(problem(START, goal))
+    task = PreparedProblem.of(problem(START, goal))
     coordinates = Coordinates.joints(START, goal, ROBOT.limits)
-    mine = Programme(task.kernel, space, task.fastest_parameters, coordinates, 0.01, 600.0)
+    mine = NonlinearProgram(task.kernel, space, task.fastest_parameters, coordinates, 0.01, 600.0)
     found = solve(mine, quintic(mine), 3.0)
     assert found.status == "solved"
     assert (

@@ -18,7 +18,7 @@ from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
 from optimizer.problem.bus import Bus
 from optimizer.replay.evaluate import MOST_SEGMENTS, Evaluation, evaluate
-from optimizer.replay.recording import BLOCK, Configurations, Log, LogBlock, in_blocks
+from optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints, in_blocks
 from optimizer.trajectories.time_scalings import quintic
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits
 
@@ -33,8 +33,8 @@ QUADRATURE = 5e-4
 DYNAMICS = 1e-9
 
 
-def motion(interpolation: Any) -> Configurations:
-    return Configurations(POINTS, TIMES, interpolation)
+def motion(interpolation: Any) -> Waypoints:
+    return Waypoints(POINTS, TIMES, interpolation)
 
 
 def log(rows: int, period: float = 0.008) -> tuple[Array, Array]:
@@ -105,7 +105,7 @@ def test_goes_through_the_configurations(interpolation: str) -> None:
 
 
 def test_is_the_baselines_own_quintic() -> None:
-    result = evaluate(ARM, Configurations(np.array([START, GOAL]), np.array(1.6), "quintic"))
+    result = evaluate(ARM, Waypoints(np.array([START, GOAL]), np.array(1.6), "quintic"))
     known = quintic(START, GOAL, 1.6)
     tau = Plant(ARM).torques(known.q, known.v, known.a)
     assert total(result) == pytest.approx(float(known.weights @ simple_power(ARM, known.v, tau)), rel=1e-4)
@@ -197,7 +197,7 @@ def test_a_store_keeps_its_charge_from_stretch_to_stretch() -> None:
     bus = Bus("storage", efficiency=0.9, capacity=50.0, power=400.0, initial=5.0)
     arm = Arm(robot=ROBOT, payload=PAYLOAD, bus=bus)
     points = np.array([START, GOAL] * 6)
-    result = evaluate(arm, Configurations(points, np.array(0.7), "quintic"), sample_period=0.01)
+    result = evaluate(arm, Waypoints(points, np.array(0.7), "quintic"), sample_period=0.01)
     uses = [each.energy.storage for each in result.segments]
     assert uses[0] is not None and uses[0].initial == 5.0
     for before, after in pairwise(uses):
@@ -214,9 +214,9 @@ def test_a_store_keeps_its_charge_from_stretch_to_stretch() -> None:
 def test_too_many_segments_to_list_are_still_counted() -> None:
     steps = MOST_SEGMENTS + 5
     q = START + np.linspace(0.0, 1.0, steps + 1)[:, None] * np.ones(6)
-    result = evaluate(ARM, Configurations(q, np.array(1e-3), "linear"))
+    result = evaluate(ARM, Waypoints(q, np.array(1e-3), "linear"))
     assert (result.segment_count, result.segments) == (steps, [])
-    whole = evaluate(ARM, Configurations(q[[0, -1]], np.array(steps * 1e-3), "linear"))
+    whole = evaluate(ARM, Waypoints(q[[0, -1]], np.array(steps * 1e-3), "linear"))
     assert total(result) == pytest.approx(total(whole), rel=1e-6)
     assert result.total.balance_error < 1e-6
 
@@ -224,12 +224,12 @@ def test_too_many_segments_to_list_are_still_counted() -> None:
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: Configurations(POINTS[:1], np.array(1.0)),
-        lambda: Configurations(POINTS, np.array([1.0])),
-        lambda: Configurations(POINTS, np.array([1.0, 0.0])),
-        lambda: Configurations(np.full((3, 6), np.nan), np.array(1.0)),
-        lambda: Configurations(np.zeros((10_001, 6)), np.array(1.0), "spline"),
-        lambda: evaluate(ARM, Configurations(np.zeros((3, 5)), np.array(1.0))),
+        lambda: Waypoints(POINTS[:1], np.array(1.0)),
+        lambda: Waypoints(POINTS, np.array([1.0])),
+        lambda: Waypoints(POINTS, np.array([1.0, 0.0])),
+        lambda: Waypoints(np.full((3, 6), np.nan), np.array(1.0)),
+        lambda: Waypoints(np.zeros((10_001, 6)), np.array(1.0), "spline"),
+        lambda: evaluate(ARM, Waypoints(np.zeros((3, 5)), np.array(1.0))),
         lambda: evaluate(ARM, motion("quintic"), sample_period=1e-6),
     ],
 )

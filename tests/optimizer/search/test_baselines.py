@@ -64,10 +64,10 @@ def compare(task: Problem, duration: float = DURATION, ours: float = 60.0) -> di
     return {each.name: each for each in baselines(task, np.asarray(task.start), goals, duration, ours, *oracle(task))}
 
 
-def one_joint(travel: float) -> Array:
+def one_joint(displacement: float) -> Array:
     """A goal to which only the elbow moves."""
     goal = START.copy()
-    goal[2] -= travel
+    goal[2] -= displacement
     return goal
 
 
@@ -103,10 +103,10 @@ def test_durations(name: str) -> None:
 
 def test_quintic_peaks() -> None:
     """1.875 Δ/T, 5.7735 Δ/T², 60 Δ/T³."""
-    motion, travel = quintic(START, GOAL, DURATION), np.abs(GOAL - START)
-    assert motion.peak_v == pytest.approx(1.875 * travel / DURATION, rel=EXACT)
-    assert motion.peak_a == pytest.approx(5.773502691896258 * travel / DURATION**2, rel=EXACT)
-    assert motion.peak_jerk == pytest.approx(60 * travel / DURATION**3, rel=EXACT)
+    motion, displacement = quintic(START, GOAL, DURATION), np.abs(GOAL - START)
+    assert motion.peak_v == pytest.approx(1.875 * displacement / DURATION, rel=EXACT)
+    assert motion.peak_a == pytest.approx(5.773502691896258 * displacement / DURATION**2, rel=EXACT)
+    assert motion.peak_jerk == pytest.approx(60 * displacement / DURATION**3, rel=EXACT)
     assert np.abs(motion.a[[0, -1]]).max() == 0
 
 
@@ -114,9 +114,9 @@ def test_trapezoid_in_thirds() -> None:
     """Unless a limit objects: 1.5 Δ/T and 4.5 Δ/T²; its jerk is unbounded where a joint moves."""
     goal = GOAL.copy()
     goal[4] = START[4]
-    motion, travel = trapezoid(problem(goal=goal), START, goal, DURATION), np.abs(goal - START)
-    assert motion.peak_v == pytest.approx(1.5 * travel / DURATION, rel=EXACT)
-    assert motion.peak_a == pytest.approx(4.5 * travel / DURATION**2, rel=EXACT)
+    motion, displacement = trapezoid(problem(goal=goal), START, goal, DURATION), np.abs(goal - START)
+    assert motion.peak_v == pytest.approx(1.5 * displacement / DURATION, rel=EXACT)
+    assert motion.peak_a == pytest.approx(4.5 * displacement / DURATION**2, rel=EXACT)
     assert motion.peak_jerk.tolist() == [math.inf] * 4 + [0.0, math.inf]
 
 
@@ -161,50 +161,50 @@ def test_ruckig_keeps_its_limits_and_its_word() -> None:
 def test_slowing_scales_the_rates() -> None:
     """Twice the duration: v/2, a/4, jerk/8 on the same path."""
     motion = time_optimal(problem().arm.active_limits, START, GOAL)
-    slowed = motion.scaled_to(2 * motion.duration)
+    retimed = motion.scaled_to(2 * motion.duration)
     for name, factor in {"q": 1, "t": 2, "weights": 2, "v": 1 / 2, "a": 1 / 4}.items():
-        assert getattr(slowed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
+        assert getattr(retimed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
     for name, factor in {"peak_v": 1 / 2, "peak_a": 1 / 4, "peak_jerk": 1 / 8}.items():
-        assert getattr(slowed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
+        assert getattr(retimed, name) == pytest.approx(getattr(motion, name) * factor, rel=EXACT)
 
 
 @pytest.mark.parametrize(
-    ("travel", "duration"),
+    ("displacement", "duration"),
     [
         (2.0, 2.0 / 1.0472 + 1.0472 / 1.3963),  # reaches its speed
         (0.4, 2 * math.sqrt(0.4 / 1.3963)),  # turns before
         (1.0472**2 / 1.3963, 2 * 1.0472 / 1.3963),  # just reaches it: both formulas agree
     ],
 )
-def test_controller_default_duration(travel: float, duration: float) -> None:
+def test_controller_default_duration(displacement: float, duration: float) -> None:
     """A move of one joint, from the UR's default 1.0472 rad/s and 1.3963 rad/s²."""
-    motion = controller_default(problem(), START, one_joint(travel))
+    motion = controller_default(problem(), START, one_joint(displacement))
     assert motion.duration == pytest.approx(duration, rel=EXACT)
     assert motion.peak_a.max() == pytest.approx(1.3963, rel=EXACT)
     assert motion.peak_v.max() <= 1.0472 * (1 + EXACT)
 
 
 def test_controller_default_is_led_by_one_axis() -> None:
-    """The longest travel sets the pace, the others keep in step on a straight line; tighter limits count."""
-    travel = np.abs(GOAL - START)
+    """The longest displacement sets the pace, the others keep in step on a straight line; tighter limits count."""
+    displacement = np.abs(GOAL - START)
     motion = controller_default(problem(), START, GOAL)
-    assert motion.duration == pytest.approx(travel.max() / 1.0472 + 1.0472 / 1.3963, rel=EXACT)
-    assert motion.peak_v == pytest.approx(1.0472 * travel / travel.max(), rel=EXACT)
+    assert motion.duration == pytest.approx(displacement.max() / 1.0472 + 1.0472 / 1.3963, rel=EXACT)
+    assert motion.peak_v == pytest.approx(1.0472 * displacement / displacement.max(), rel=EXACT)
     tight = controller_default(problem(limits=limits(v_max=0.5, a_max=1.0)), START, GOAL)
-    assert tight.duration == pytest.approx(travel.max() / 0.5 + 0.5 / 1.0, rel=EXACT)
+    assert tight.duration == pytest.approx(displacement.max() / 0.5 + 0.5 / 1.0, rel=EXACT)
 
 
 def test_nearest_goal() -> None:
-    """Least time at the speed limits first, then least travel."""
+    """Least time at the speed limits first, then least displacement."""
     near, turned = GOAL.copy(), GOAL.copy()
     turned[5] += 2 * math.pi
     assert nearest(problem(), START, np.array([turned, near])) == pytest.approx(near)
     detour = near.copy()
-    detour[4] += 0.1  # not the joint that needs longest: the same time, more travel
+    detour[4] += 0.1  # not the joint that needs longest: the same time, more displacement
     assert nearest(problem(), START, np.array([detour, near])) == pytest.approx(near)
     other = near.copy()
     other[5] = START[5]
-    other[3] += 2.0  # less time with a slow last joint, though more travel
+    other[3] += 2.0  # less time with a slow last joint, though more displacement
     slow_wrist = problem(limits=limits(v_max=[3, 3, 3, 3, 3, 0.1]))
     assert nearest(slow_wrist, START, np.array([near, other])) == pytest.approx(other)
 
@@ -312,8 +312,8 @@ def test_no_travel() -> None:
 
 def test_next_to_no_travel() -> None:
     """Down to rounding every figure stays finite."""
-    for travel in (1e-6, 1e-9, 1e-12, 1e-15):
-        goal = START + travel
+    for displacement in (1e-6, 1e-9, 1e-12, 1e-15):
+        goal = START + displacement
         for motion in guesses(problem(goal=goal), START, goal, DURATION).values():
             assert isinstance(motion, SampledMotion)
             assert all(np.isfinite(part).all() for part in (motion.t, motion.weights, motion.q, motion.v, motion.a))

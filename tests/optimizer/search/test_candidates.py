@@ -10,19 +10,20 @@ import numpy as np
 import pytest
 
 from models.robot import Array
+from optimizer.deadline import NEVER, Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import TorqueInfeasible, UnreachablePose
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.methods import solver_for
-from optimizer.methods.method import Attempt
+from optimizer.methods.method import SolveResult
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
 from optimizer.search import candidates as search
 from optimizer.search.branch_and_bound import explore
-from optimizer.search.candidates import Entry
+from optimizer.search.candidates import Candidate
 from optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
 
@@ -31,8 +32,8 @@ SAME = 1e-6  # rad; inverse kinematics agrees with itself to 1e-9
 NARROW = limits(q_min=[-3.6, -3.6, -np.pi, -3.6, -3.6, -3.6], q_max=[3.6, 3.6, np.pi, 3.6, 3.6, 3.6])
 
 
-def entries(task: Problem) -> list[Entry]:
-    made = Task.of(task)
+def candidates(task: Problem) -> list[Candidate]:
+    made = PreparedProblem.of(task)
     return search.pairs(made, ends(made, "start")[0], ends(made, "goal")[0])
 
 
@@ -53,7 +54,7 @@ def rounded(rows: list[Array]) -> set[tuple[float, ...]]:
 
 
 def test_joints_to_joints_is_one_candidate() -> None:
-    (only,) = entries(problem())
+    (only,) = candidates(problem())
     assert only.q_start.tolist() == START.tolist() and only.q_goal.tolist() == GOAL.tolist()
     labels = inverse_kinematics_for(ROBOT)
     assert (only.start.label, only.goal.label) == (str(labels.label(START)), str(labels.label(GOAL)))
@@ -63,54 +64,54 @@ def test_joints_to_joints_is_one_candidate() -> None:
 def test_windings_of_a_goal_are_complete(own: Any) -> None:
     """From given joints: every branch with every full turn that the limits leave, each once."""
     task = problem(goal=tcp_pose(GOAL), limits=own)
-    found = [entry.q_goal for entry in entries(task)]
+    found = [candidate.q_goal for candidate in candidates(task)]
     expected = every_configuration(GOAL, task)
     assert len(found) == len(expected) == len(rounded(found))
     distances = np.abs(np.array(found)[:, None] - np.array(expected)[None]).max(axis=2)
     assert distances.min(axis=0).max() < SAME and distances.min(axis=1).max() < SAME
-    assert all(entry.q_start.tolist() == START.tolist() for entry in entries(task))
+    assert all(candidate.q_start.tolist() == START.tolist() for candidate in candidates(task))
 
 
 def test_windings_of_a_start_are_complete() -> None:
     task = problem(start=tcp_pose(START), limits=NARROW)
-    found = [entry.q_start for entry in entries(task)]
+    found = [candidate.q_start for candidate in candidates(task)]
     assert rounded(found) == rounded(every_configuration(START, task))
     assert len(found) == len(rounded(found))
 
 
 def test_without_windings_every_branch_goes_the_shortest_way() -> None:
-    """The travel of each joint is the least of all full turns that the limits allow."""
+    """The displacement of each joint is the least of all full turns that the limits allow."""
     for own in (ROBOT.limits, NARROW):
         task = problem(goal=tcp_pose(GOAL), limits=own, windings=False)
-        found = entries(task)
+        found = candidates(task)
         everything = every_configuration(GOAL, task)
-        assert len(found) == len({entry.goal.label for entry in found}) == 8
-        for entry in found:
-            siblings = [q for q in everything if np.abs(np.sin((q - entry.q_goal) / 2)).max() < SAME]
+        assert len(found) == len({candidate.goal.label for candidate in found}) == 8
+        for candidate in found:
+            siblings = [q for q in everything if np.abs(np.sin((q - candidate.q_goal) / 2)).max() < SAME]
             least = np.min([np.abs(q - START) for q in siblings], axis=0)
-            assert np.abs(entry.q_goal - START) == pytest.approx(least, abs=SAME)
+            assert np.abs(candidate.q_goal - START) == pytest.approx(least, abs=SAME)
 
 
 def test_between_poses_relative_travels_are_distinct() -> None:
-    """Turning both ends alike changes nothing: of all pairs with the same travel one is kept."""
+    """Turning both ends alike changes nothing: of all pairs with the same displacement one is kept."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL))
-    found = entries(task)
-    labels = {(entry.start.label, entry.goal.label) for entry in found}
+    found = candidates(task)
+    labels = {(candidate.start.label, candidate.goal.label) for candidate in found}
     assert len(labels) == 64
     assert len(rounded([e.q_goal - e.q_start for e in found])) == len(found)
-    for entry in found:
-        assert (entry.q_start >= ROBOT.limits.q_min).all() and (entry.q_goal <= ROBOT.limits.q_max).all()
+    for candidate in found:
+        assert (candidate.q_start >= ROBOT.limits.q_min).all() and (candidate.q_goal <= ROBOT.limits.q_max).all()
 
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
     """Each joint's travels, branch by branch: all of less than a full turn that the limits allow."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
-    found: dict[tuple[str, str], list[Entry]] = {}
-    for entry in entries(task):
-        found.setdefault((entry.start.label, entry.goal.label), []).append(entry)
+    found: dict[tuple[str, str], list[Candidate]] = {}
+    for candidate in candidates(task):
+        found.setdefault((candidate.start.label, candidate.goal.label), []).append(candidate)
     for group in found.values():
-        travels = np.array([entry.q_goal - entry.q_start for entry in group])
+        travels = np.array([candidate.q_goal - candidate.q_start for candidate in group])
         for j in range(6):
             turns = TURN * np.arange(-2, 3)
             inside = [
@@ -118,21 +119,22 @@ def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
                 for each in (group[0].q_start, group[0].q_goal)
             ]
             possible = {round(b - a, 6) for a, b in product(*inside) if abs(b - a) < TURN - SAME}
-            assert possible <= {round(travel, 6) for travel in travels[:, j].tolist()}
+            assert possible <= {round(displacement, 6) for displacement in travels[:, j].tolist()}
         assert len(travels) == np.prod([len(set(np.round(travels[:, j], 6).tolist())) for j in range(6)])
 
 
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
 def test_between_poses_nothing_that_may_be_best_is_missing(own: Any) -> None:
-    """Every pair of configurations has a candidate of its own travel, or one that ends alike and travels no further."""
+    """Every pair of configurations has a candidate of its own displacement, or one that ends alike and travels no
+    further."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
-    kept = np.array([entry.q_goal - entry.q_start for entry in entries(task)])
+    kept = np.array([candidate.q_goal - candidate.q_start for candidate in candidates(task)])
     starts, goals = every_configuration(START, task), every_configuration(GOAL, task)
     rng = np.random.default_rng(1)
     for _ in range(2000):
-        travel = goals[rng.integers(len(goals))] - starts[rng.integers(len(starts))]
-        alike = np.abs(np.sin((kept - travel) / 2)).max(axis=1) < SAME
-        no_further = (np.abs(kept) <= np.abs(travel) + SAME).all(axis=1)
+        displacement = goals[rng.integers(len(goals))] - starts[rng.integers(len(starts))]
+        alike = np.abs(np.sin((kept - displacement) / 2)).max(axis=1) < SAME
+        no_further = (np.abs(kept) <= np.abs(displacement) + SAME).all(axis=1)
         assert (alike & no_further).any()
 
 
@@ -142,38 +144,38 @@ def test_between_poses_nothing_that_may_be_best_is_missing(own: Any) -> None:
 def test_a_branch_filter_keeps_what_it_names(wanted: dict[str, Any]) -> None:
     """At both ends, where both are poses; joints that are given stay whatever they are."""
     given = BranchFilter(**wanted)
-    everything = entries(problem(start=tcp_pose(START), goal=tcp_pose(GOAL)))
-    found = entries(problem(start=tcp_pose(START), goal=tcp_pose(GOAL), branch=given))
+    everything = candidates(problem(start=tcp_pose(START), goal=tcp_pose(GOAL)))
+    found = candidates(problem(start=tcp_pose(START), goal=tcp_pose(GOAL), branch=given))
 
     def kept(label: str) -> bool:
         return all(part in label.split("/") for part in wanted.values())
 
     expected = {(e.start.label, e.goal.label) for e in everything if kept(e.start.label) and kept(e.goal.label)}
     assert {(e.start.label, e.goal.label) for e in found} == expected
-    assert len(entries(problem(branch=given))) == 1
+    assert len(candidates(problem(branch=given))) == 1
 
 
 def test_a_branch_that_does_not_reach_the_pose_is_refused() -> None:
     """Where the elbow may only bend one way, the other way is no branch of the pose."""
     bent = replace(ROBOT.limits, q_min=np.where(np.arange(6) == 2, 1e-3, ROBOT.limits.q_min))
     one_elbow = problem(goal=tcp_pose(GOAL), limits=bent)
-    reached = {tuple(entry.goal.label.split("/")[:2]) for entry in entries(one_elbow)}
+    reached = {tuple(candidate.goal.label.split("/")[:2]) for candidate in candidates(one_elbow)}
     assert 0 < len(reached) < 4
     for shoulder, elbow in {("left", "up"), ("left", "down"), ("right", "up"), ("right", "down")} - reached:
         with pytest.raises(UnreachablePose) as refusal:
-            entries(replace(one_elbow, branch=BranchFilter(shoulder=shoulder, elbow=elbow)))  # type: ignore[arg-type]
+            candidates(replace(one_elbow, branch=BranchFilter(shoulder=shoulder, elbow=elbow)))  # type: ignore[arg-type]
         assert refusal.value.target == "goal"
 
 
 def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
     """Where no end can be held, the joint, what it needs and what it has are told."""
     weak = limits(tau_max=[150, 5, 150, 28, 28, 28])
-    task = Task.of(problem(limits=weak))
+    task = PreparedProblem.of(problem(limits=weak))
     with pytest.raises(TorqueInfeasible) as refusal:
-        search.bound(task, entries(task.problem))
+        search.bound(task, candidates(task.problem))
     error = refusal.value
     assert error.joint == ROBOT.joint_names[1] and error.available == 5 and error.needed > 5
-    some = Task.of(
+    some = PreparedProblem.of(
         problem(
             goal=tcp_pose(GOAL),
             payload=Payload(mass=5),
@@ -181,29 +183,31 @@ def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
             limits=limits(tau_max=[150, 80, 150, 28, 28, 28]),
         )
     )
-    found = entries(some.problem)
+    found = candidates(some.problem)
     search.bound(some, found)
-    for entry in found:
-        needed = np.abs(torques(some.problem, entry.q_goal[None], np.zeros((1, 6)), np.zeros((1, 6))))[0, 1]
-        assert entry.status == ("unvisited" if needed <= 80 else "infeasible")
-        assert entry.status == "unvisited" or (ROBOT.joint_names[1] in entry.reason and np.isinf(entry.lower_bound))
-    assert {entry.status for entry in found} == {"infeasible", "unvisited"}
+    for candidate in found:
+        needed = np.abs(torques(some.problem, candidate.q_goal[None], np.zeros((1, 6)), np.zeros((1, 6))))[0, 1]
+        assert candidate.status == ("unvisited" if needed <= 80 else "infeasible")
+        assert candidate.status == "unvisited" or (
+            ROBOT.joint_names[1] in candidate.reason and np.isinf(candidate.lower_bound)
+        )
+    assert {candidate.status for candidate in found} == {"infeasible", "unvisited"}
 
 
 class Recorder:
     """The real solver, and in which order it was asked for candidates."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: PreparedProblem) -> None:
         compile_kernel(ROBOT)
-        self.task, self.asked = task, list[Entry]()
+        self.task, self.asked = task, list[Candidate]()
 
-    def __call__(self, entry: Entry) -> Attempt:
-        self.asked.append(entry)
-        return solver_for(self.task, entry.q_start, entry.q_goal, np.inf).solve()
+    def __call__(self, candidate: Candidate) -> SolveResult:
+        self.asked.append(candidate)
+        return solver_for(self.task, candidate.q_start, candidate.q_goal, NEVER).solve()
 
-    def energy(self, entry: Entry) -> float:
+    def energy(self, candidate: Candidate) -> float:
         """What a motion of the candidate takes, inf where none is found."""
-        attempt = self(entry)
+        attempt = self(candidate)
         return np.inf if attempt.spline is None else self.task.objective_of(self.task.energy(attempt.spline))
 
 
@@ -221,53 +225,55 @@ MOST = 32  # candidates solved one by one, of least bound
 @pytest.mark.parametrize("name", list(SMALL))
 def test_pruning_loses_nothing(name: str) -> None:
     """Solving all candidates one by one (of the many, those of least bound) finds no better one than the search."""
-    task = Task.of(problem(payload=PAYLOAD, gravity=TILTED, **SMALL[name]))
-    found, recorder = entries(task.problem), Recorder(task)
+    task = PreparedProblem.of(problem(payload=PAYLOAD, gravity=TILTED, **SMALL[name]))
+    found, recorder = candidates(task.problem), Recorder(task)
     search.bound(task, found)
-    best = explore(task, found, recorder, np.inf)
+    best = explore(task, found, recorder, NEVER)
     assert best is not None and best.energy is not None
-    visited = [entry.lower_bound for entry in recorder.asked]
+    visited = [candidate.lower_bound for candidate in recorder.asked]
     assert visited == sorted(visited)
-    assert all(entry.lower_bound >= best.energy for entry in found if entry.status == "pruned")
-    assert all(entry.lower_bound <= entry.energy for entry in found if entry.energy is not None)
-    assert all(entry.status != "unvisited" for entry in found)
-    if name != "mechanical":  # whose bound is only the climb
-        assert any(entry.status == "pruned" for entry in found)
-    rest = sorted((entry for entry in found if entry.status == "pruned"), key=lambda entry: entry.lower_bound)
-    for entry in rest[: MOST - len(visited)]:
-        assert recorder.energy(entry) >= best.energy
+    assert all(candidate.lower_bound >= best.energy for candidate in found if candidate.status == "pruned")
+    assert all(candidate.lower_bound <= candidate.energy for candidate in found if candidate.energy is not None)
+    assert all(candidate.status != "unvisited" for candidate in found)
+    if name != "mechanical":  # whose bound is only the potential_gain
+        assert any(candidate.status == "pruned" for candidate in found)
+    rest = sorted(
+        (candidate for candidate in found if candidate.status == "pruned"), key=lambda candidate: candidate.lower_bound
+    )
+    for candidate in rest[: MOST - len(visited)]:
+        assert recorder.energy(candidate) >= best.energy
 
 
 def test_what_was_not_reached_says_so() -> None:
     """A clock that passes the deadline at its third reading: two candidates are visited, the rest are not."""
-    task = Task.of(problem(goal=tcp_pose(GOAL), objective="mechanical", duration_max=1.5))
-    found, recorder, readings = entries(task.problem), Recorder(task), iter(range(100))
+    task = PreparedProblem.of(problem(goal=tcp_pose(GOAL), objective="mechanical", duration_max=1.5))
+    found, recorder, readings = candidates(task.problem), Recorder(task), iter(range(100))
     search.bound(task, found)
-    explore(task, found, recorder, 1.5, clock=lambda: float(next(readings)))
+    explore(task, found, recorder, Deadline(1.5, lambda: float(next(readings))))
     assert len(recorder.asked) == 2
-    assert {entry.status for entry in found} <= {"solved", "failed", "infeasible", "unvisited"}
-    waiting = [entry.report() for entry in found if entry.status == "unvisited"]
+    assert {candidate.status for candidate in found} <= {"solved", "failed", "infeasible", "unvisited"}
+    waiting = [candidate.report() for candidate in found if candidate.status == "unvisited"]
     assert waiting and all("deadline" in each.reason and each.energy is None for each in waiting)
 
 
 def test_durations_rule_candidates_out() -> None:
     """Those that cannot be that fast are infeasible, with the least time that they take; the others stay."""
-    task = Task.of(problem(goal=tcp_pose(GOAL), duration_max=1.2))
-    found = entries(task.problem)
+    task = PreparedProblem.of(problem(goal=tcp_pose(GOAL), duration_max=1.2))
+    found = candidates(task.problem)
     search.bound(task, found)
-    slow = [entry for entry in found if entry.shortest > 1.2]
+    slow = [candidate for candidate in found if candidate.shortest > 1.2]
     assert 0 < len(slow) < len(found)
-    for entry in found:
-        assert (entry.status == "infeasible") == (entry.shortest > 1.2)
-        assert np.isinf(entry.lower_bound) == (entry.shortest > 1.2)
-        assert entry.status != "infeasible" or f"{entry.shortest:.4f}" in entry.reason
+    for candidate in found:
+        assert (candidate.status == "infeasible") == (candidate.shortest > 1.2)
+        assert np.isinf(candidate.lower_bound) == (candidate.shortest > 1.2)
+        assert candidate.status != "infeasible" or f"{candidate.shortest:.4f}" in candidate.reason
 
 
 def test_every_candidate_is_reported() -> None:
     """In the answer: each pair with its fate, its bound and, where solved, its energy and duration."""
     task = problem(goal=tcp_pose(GOAL), limits=NARROW)
     solution = optimize(task)
-    assert len(solution.candidates) == len(entries(task))
+    assert len(solution.candidates) == len(candidates(task))
     for each in solution.candidates:
         assert each.reason and each.start.count("/") == each.goal.count("/") == 2
         assert (each.energy is not None) == (each.duration is not None) == (each.status == "solved")

@@ -12,22 +12,22 @@ from models.robot import Array
 from optimizer.exceptions import InvalidProblem, NoReachableTarget, UnreachablePose
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation, sample_orientations
-from optimizer.methods.duration_intervals import windows
-from optimizer.nlp.coordinates import Coordinates, Leeway
-from optimizer.nlp.nonlinear_program import Programme
+from optimizer.methods.duration_intervals import duration_intervals
+from optimizer.nlp.coordinates import Coordinates, GoalConstraints
+from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import solve
 from optimizer.optimize import optimize
 from optimizer.pareto import pareto
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.bus import Bus
-from optimizer.problem.cone_oriented_pose import LoosePose
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf
-from optimizer.search.free_goal import leeway
+from optimizer.search.free_goal import goal_constraints
 from optimizer.search.free_goal_bound import family_bound
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.solution import Solution
@@ -61,7 +61,7 @@ def energy(solution: Solution) -> float:
 @pytest.mark.parametrize("half_angle", [0.0, 1e-3, 0.4, 2.5, np.pi])
 def test_samples_are_allowed_and_fill_what_is(half_angle: float) -> None:
     axis, direction = np.array([1.0, -2.0, 0.5]), np.array([0.2, 0.1, -1.0])
-    pose = LoosePose(np.zeros(3), axis, direction, half_angle)
+    pose = ConeOrientedPose(np.zeros(3), axis, direction, half_angle)
     samples = sample_orientations(pose, 200)
     tilts = np.array([angle(R @ axis, direction) for R in samples])
     assert tilts.max() <= half_angle + ROUNDING
@@ -76,7 +76,7 @@ def test_samples_are_allowed_and_fill_what_is(half_angle: float) -> None:
 
 @pytest.mark.parametrize("half_angle", [0.0, 0.4, 2.5])
 def test_the_nearest_orientation_is_allowed_and_as_far_as_said(half_angle: float) -> None:
-    pose = LoosePose(np.zeros(3), [0, 1, 1], [1, 0, 0], half_angle)
+    pose = ConeOrientedPose(np.zeros(3), [0, 1, 1], [1, 0, 0], half_angle)
     for R in rotations(1, 50):
         beyond = angle(R @ np.array([0, 1, 1]), np.array([1, 0, 0])) - half_angle
         assert excess_angle(pose, R) == pytest.approx(max(0.0, beyond), abs=1e-7)
@@ -86,19 +86,24 @@ def test_the_nearest_orientation_is_allowed_and_as_far_as_said(half_angle: float
 
 
 def test_opposite_axes_have_a_way_back() -> None:
-    pose = LoosePose(np.zeros(3), [0, 0, 1], [0, 0, -1], 0.0)
+    pose = ConeOrientedPose(np.zeros(3), [0, 0, 1], [0, 0, -1], 0.0)
     assert excess_angle(pose, np.eye(3)) == pytest.approx(np.pi)
     assert excess_angle(pose, nearest_orientation(pose, np.eye(3))) <= ROUNDING
 
 
 @pytest.mark.parametrize(
-    "pose", [LoosePose(np.zeros(3)), LoosePose.about(tcp_pose(GOAL), [0, 0, 1]), LoosePose(np.zeros(3), half_angle=0.3)]
+    "pose",
+    [
+        ConeOrientedPose(np.zeros(3)),
+        ConeOrientedPose.about(tcp_pose(GOAL), [0, 0, 1]),
+        ConeOrientedPose(np.zeros(3), half_angle=0.3),
+    ],
 )
-def test_leeway_is_the_derivative_of_forward_kinematics(pose: LoosePose) -> None:
+def test_leeway_is_the_derivative_of_forward_kinematics(pose: ConeOrientedPose) -> None:
     """A step that its rows hold level moves neither the TCP nor, where that is fixed, its axis, to first order."""
     rng, step = np.random.default_rng(2), 1e-5
-    task = Task.of(problem(goal=GOAL, T_flange_tcp=TOOL, payload=PAYLOAD))
-    allowed = leeway(task, pose, GOAL, 0.5)
+    task = PreparedProblem.of(problem(goal=GOAL, T_flange_tcp=TOOL, payload=PAYLOAD))
+    allowed = goal_constraints(task, pose, GOAL, 0.5)
     level = allowed.rows[allowed.lower == allowed.upper]
     _, values, basis = np.linalg.svd(level)
     free = basis[int((values > 1e-9).sum()) :].T @ rng.normal(size=len(basis) - int((values > 1e-9).sum()))
@@ -112,23 +117,23 @@ def test_leeway_is_the_derivative_of_forward_kinematics(pose: LoosePose) -> None
 
 def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
     """Gradient and Hessian against central differences, the goal's row among the unknowns; the end is at rest."""
-    task = Task.of(problem(goal=GOAL))
-    space, window = bspline.uniform(9), windows(task, GOAL)[0]
+    task = PreparedProblem.of(problem(goal=GOAL))
+    space, interval = bspline.uniform(9), duration_intervals(task, GOAL)[0]
     coordinates = Coordinates.joints(START, GOAL, task.arm.active_limits)
-    free_end = Leeway(np.eye(6), np.full(6, -1.0), np.full(6, 1.0), 1.0)
-    programme = Programme(task.kernel, space, window.p, coordinates, 0.1, 10.0, leeway=free_end)
+    free_end = GoalConstraints(np.eye(6), np.full(6, -1.0), np.full(6, 1.0), 1.0)
+    program = NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=free_end)
     rng = np.random.default_rng(3)
-    free = np.linspace(START, GOAL, programme.free_count) + rng.normal(scale=0.1, size=(programme.free_count, 6))
-    assert (programme.points(free)[-3:] == free[-1]).all()
+    free = np.linspace(START, GOAL, program.free_count) + rng.normal(scale=0.1, size=(program.free_count, 6))
+    assert (program.points(free)[-3:] == free[-1]).all()
     duration, none = 1.3, np.zeros((len(space.nodes), 6))
-    line = programme.derivatives(free, duration, none)
+    line = program.derivatives(free, duration, none)
     direction, step = rng.normal(size=free.shape), 1e-5
-    ends = [programme.value(free + sign * step * direction, duration)[0] for sign in (1, -1)]
+    ends = [program.value(free + sign * step * direction, duration)[0] for sign in (1, -1)]
     slope = float(line.gradient[:-1] @ direction.ravel())
     # third derivatives times the step squared, relative to a slope of tens of joules per radian
     assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-5)
     gradients = [
-        programme.derivatives(free + sign * step * direction, duration, none).gradient.copy() for sign in (1, -1)
+        program.derivatives(free + sign * step * direction, duration, none).gradient.copy() for sign in (1, -1)
     ]
     bent = line.hessian[:, :-1] @ direction.ravel()
     assert bent == pytest.approx((gradients[0] - gradients[1]) / (2 * step), rel=1e-4, abs=1e-3)
@@ -136,21 +141,21 @@ def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
 
 def test_the_solver_keeps_to_the_leeway() -> None:
     """What it proposes lies on the plane, within the radius and within joint limits, and spends no more."""
-    task = Task.of(problem(goal=GOAL))
-    space, window = bspline.uniform(13), windows(task, GOAL)[0]
+    task = PreparedProblem.of(problem(goal=GOAL))
+    space, interval = bspline.uniform(13), duration_intervals(task, GOAL)[0]
     coordinates = Coordinates.joints(START, GOAL, task.arm.active_limits)
     free = START + space.quintic[:, None] * (GOAL - START)
-    held = Programme(task.kernel, space, window.p, coordinates, 0.1, 10.0)
+    held = NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0)
     at_rest = solve(held, free[space.free], 2.0)
     T = tcp_pose(GOAL).T
     for pose in (
-        LoosePose(T[:3, 3]),
-        LoosePose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.1),
-        LoosePose.about(Pose(T), [1, 0, 0]),
+        ConeOrientedPose(T[:3, 3]),
+        ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.1),
+        ConeOrientedPose.about(Pose(T), [1, 0, 0]),
     ):
-        allowed = leeway(task, pose, GOAL, 0.3)
-        programme = Programme(task.kernel, space, window.p, coordinates, 0.1, 10.0, leeway=allowed)
-        found = solve(programme, np.concatenate([at_rest.free, GOAL[None]]), at_rest.duration)
+        allowed = goal_constraints(task, pose, GOAL, 0.3)
+        program = NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=allowed)
+        found = solve(program, np.concatenate([at_rest.free, GOAL[None]]), at_rest.duration)
         moved = found.free[-1] - GOAL
         assert found.violation < 1e-4 and found.cost < at_rest.cost
         assert np.abs(moved).max() <= 0.3 + ROUNDING and np.abs(moved).max() > 0.01
@@ -163,9 +168,9 @@ def test_what_is_freer_costs_no_more(number: int) -> None:
     """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five orientations."""
     pose = POSITIONS[number]
     position, direction = pose.T[:3, 3], pose.T[:3, 2]
-    about = optimize(problem(HOME, LoosePose.about(pose, [0, 0, 1])))
-    cone = optimize(problem(HOME, LoosePose(position, [0, 0, 1], direction, 0.3)))
-    free = optimize(problem(HOME, LoosePose(position)))
+    about = optimize(problem(HOME, ConeOrientedPose.about(pose, [0, 0, 1])))
+    cone = optimize(problem(HOME, ConeOrientedPose(position, [0, 0, 1], direction, 0.3)))
+    free = optimize(problem(HOME, ConeOrientedPose(position)))
     five = optimize(problem(HOME, AnyOf(tuple(paper_poses()[5 * number : 5 * number + 5]))))
     full = optimize(problem(HOME, pose))
     for solution, most in ((about, 0.0), (cone, 0.3), (free, np.pi)):
@@ -183,7 +188,7 @@ def test_what_is_freer_costs_no_more(number: int) -> None:
 @pytest.mark.parametrize("number", range(2))
 def test_free_is_no_worse_than_any_orientation_sampled(number: int) -> None:
     """Twelve orientations that the search has not seen, each solved as a request of its own."""
-    pose = LoosePose(POSITIONS[number].T[:3, 3])
+    pose = ConeOrientedPose(POSITIONS[number].T[:3, 3])
     free = optimize(problem(HOME, pose))
     tried = [pose.with_orientation(R) for R in rotations(3 + number, 12)]
     reachable = [each for each in tried if inverse_kinematics_for(ROBOT).branches(each.T)]
@@ -210,7 +215,7 @@ def test_holds_under(condition: str) -> None:
     T = tcp_pose(GOAL, tool).T
     axis = np.array([0.0, 1.0, 1.0])
     direction = T[:3, :3] @ axis
-    solution = optimize(problem(goal=LoosePose(T[:3, 3], axis, direction, 0.25), **given))
+    solution = optimize(problem(goal=ConeOrientedPose(T[:3, 3], axis, direction, 0.25), **given))
     reached = tcp_pose(solution.goal.q, tool).T
     assert solution.certificate.valid and max(solution.certificate.goal_error) < HELD
     assert np.linalg.norm(reached[:3, 3] - T[:3, 3]) < HELD
@@ -221,9 +226,9 @@ def test_holds_under(condition: str) -> None:
         assert solution.goal.label.split("/")[1] == "up"
 
 
-def bound_of_samples(task: Problem, pose: LoosePose, count: int) -> float:
+def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float:
     """The least `lower_bounds` of any branch of many orientations, joints as near to the start as full turns allow."""
-    made, kinematics = Task.of(task), inverse_kinematics_for(ROBOT)
+    made, kinematics = PreparedProblem.of(task), inverse_kinematics_for(ROBOT)
     start = np.asarray(task.start)
     q = np.array(
         [
@@ -232,10 +237,10 @@ def bound_of_samples(task: Problem, pose: LoosePose, count: int) -> float:
             for branch in kinematics.branches(pose.with_orientation(R).T @ np.linalg.inv(task.arm.T_flange_tcp))
         ]
     )
-    travel = q - start
-    travel -= 2 * np.pi * np.round(travel / (2 * np.pi))
-    climb = np.array([made.potential(each) for each in q]) - made.potential(start)
-    return float(lower_bounds(made, travel, climb)[0].min())
+    displacement = q - start
+    displacement -= 2 * np.pi * np.round(displacement / (2 * np.pi))
+    potential_gain = np.array([made.potential(each) for each in q]) - made.potential(start)
+    return float(lower_bounds(made, displacement, potential_gain)[0].min())
 
 
 @pytest.mark.parametrize("half_angle", [0.0, 0.3, np.pi])
@@ -247,8 +252,8 @@ def test_the_bound_holds_for_the_whole_family(half_angle: float, given: dict[str
         start, goal = rng.uniform(-np.pi, np.pi, (2, 6))
         task = problem(start, GOAL, **given)
         T = tcp_pose(goal, given.get("T_flange_tcp")).T
-        pose = LoosePose(T[:3, 3], [0, 0, 1], T[:3, 2], half_angle)
-        values = [family_bound(Task.of(task), pose, start[None], rounds) for rounds in (0, 5, 20)]
+        pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], half_angle)
+        values = [family_bound(PreparedProblem.of(task), pose, start[None], rounds) for rounds in (0, 5, 20)]
         assert values == sorted(values)
         assert values[-1] <= bound_of_samples(task, pose, 150)
 
@@ -257,12 +262,15 @@ def test_the_bound_tells_far_from_near() -> None:
     """On the other side of the base, the first joint's half turn alone is most of the energy."""
     task = problem(HOME, GOAL)
     opposite = tcp_pose(HOME).T[:3, 3] * np.array([-1, -1, 1])
-    near, far = (family_bound(Task.of(task), LoosePose(p), HOME[None]) for p in (tcp_pose(HOME).T[:3, 3], opposite))
+    near, far = (
+        family_bound(PreparedProblem.of(task), ConeOrientedPose(p), HOME[None])
+        for p in (tcp_pose(HOME).T[:3, 3], opposite)
+    )
     assert far > near + 30
 
 
 def test_out_of_reach_in_every_orientation() -> None:
-    far = LoosePose(np.array([2.0, 0.0, 0.3]))
+    far = ConeOrientedPose(np.array([2.0, 0.0, 0.3]))
     with pytest.raises(UnreachablePose) as refusal:
         optimize(problem(goal=far))
     assert refusal.value.distance is not None and 0.5 < refusal.value.distance < 1.5
@@ -273,7 +281,7 @@ def test_out_of_reach_in_every_orientation() -> None:
 
 def test_mixes_with_full_targets() -> None:
     """Joints next door win against a free orientation far away, which is nevertheless accounted for."""
-    solution = optimize(problem(goal=AnyOf((LoosePose(tcp_pose(GOAL).T[:3, 3]), START + 0.02))))
+    solution = optimize(problem(goal=AnyOf((ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), START + 0.02))))
     assert solution.goal.target == 1
     assert {candidate.goal_target for candidate in solution.candidates} == {0, 1}
 
@@ -281,15 +289,15 @@ def test_mixes_with_full_targets() -> None:
 @pytest.mark.parametrize(
     ("make", "field"),
     [
-        (lambda: LoosePose([0.1, 0.2]), "pose.position"),
-        (lambda: LoosePose([0.1, 0.2, np.nan]), "pose.position"),
-        (lambda: LoosePose([0, 0, 1], [0, 0, 0]), "pose.orientation.axis"),
-        (lambda: LoosePose([0, 0, 1], [0, 0, 1], [0, 0, 0]), "pose.orientation.direction"),
-        (lambda: LoosePose([0, 0, 1], [0, 0, 1], [0, 0, 1], 3.2), "pose.orientation.half_angle"),
-        (lambda: LoosePose([0, 0, 1], [0, 0, 1], [0, 0, 1], np.nan), "pose.orientation.half_angle"),
-        (lambda: LoosePose.about(Pose(np.eye(4)), [0, np.inf, 0]), "pose.orientation.axis"),
-        (lambda: problem(start=LoosePose([0.4, 0, 0.3])), "start"),
-        (lambda: problem(start=AnyOf((START, LoosePose([0.4, 0, 0.3])))), "start"),
+        (lambda: ConeOrientedPose([0.1, 0.2]), "pose.position"),
+        (lambda: ConeOrientedPose([0.1, 0.2, np.nan]), "pose.position"),
+        (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 0]), "pose.orientation.axis"),
+        (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 0]), "pose.orientation.direction"),
+        (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 1], 3.2), "pose.orientation.half_angle"),
+        (lambda: ConeOrientedPose([0, 0, 1], [0, 0, 1], [0, 0, 1], np.nan), "pose.orientation.half_angle"),
+        (lambda: ConeOrientedPose.about(Pose(np.eye(4)), [0, np.inf, 0]), "pose.orientation.axis"),
+        (lambda: problem(start=ConeOrientedPose([0.4, 0, 0.3])), "start"),
+        (lambda: problem(start=AnyOf((START, ConeOrientedPose([0.4, 0, 0.3])))), "start"),
     ],
 )
 def test_what_is_malformed_is_refused(make: Any, field: str) -> None:
@@ -300,14 +308,14 @@ def test_what_is_malformed_is_refused(make: Any, field: str) -> None:
 
 def test_respects_the_deadline() -> None:
     """A free orientation from a start that is a pose itself: the answer is there a little after the deadline."""
-    solution = optimize(problem(tcp_pose(START), LoosePose(tcp_pose(GOAL).T[:3, 3]), deadline=0.5))
+    solution = optimize(problem(tcp_pose(START), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), deadline=0.5))
     # what is under way is finished, on a machine that others use
     assert solution.solver.wall_time < 2.0 and solution.status == "feasible"
 
 
 def test_a_front_follows_a_goal_that_turns() -> None:
     """Every point of a front goes where its own duration is cheapest: none is beaten by a longer one's motion."""
-    front = pareto(problem(goal=LoosePose(tcp_pose(GOAL).T[:3, 3]), deadline=20.0), 4)
+    front = pareto(problem(goal=ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), deadline=20.0), 4)
     energies = [energy(point) for point in front.points]
     assert len(energies) >= 2 and energies == sorted(energies, reverse=True)
     assert all(point.certificate.valid and point.lower_bound <= energy(point) for point in front.points)
@@ -326,7 +334,7 @@ def test_a_front_follows_a_goal_that_turns() -> None:
 def test_waiting_and_every_bus_count(given: dict[str, Any]) -> None:
     """What the goal costs to hold is part of what is compared, and of the bound."""
     T = tcp_pose(GOAL).T
-    pose = LoosePose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.4)
+    pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], 0.4)
     free, full = (optimize(problem(goal=goal, payload=PAYLOAD, **given)) for goal in (pose, Pose(T)))
     assert free.certificate.valid
     assert free.lower_bound <= energy(free) <= energy(full) * (1 + FOUND)

@@ -14,7 +14,7 @@ from models.robot import Array, Robot
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.losses import breakdown
 from optimizer.optimize import optimize
-from optimizer.prepared_problem import Task
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from optimizer.search.baselines import guesses, motion_energy
@@ -68,8 +68,8 @@ class Torques:
 
     def __init__(self, task: Problem) -> None:
         compile_kernel(ROBOT)
-        self.task = Task.of(task)
-        self._kernel, self._p = Task.of(problem()).kernel, self.task.objective_parameters
+        self.task = PreparedProblem.of(task)
+        self._kernel, self._p = PreparedProblem.of(problem()).kernel, self.task.objective_parameters
 
     def __call__(self, q: Array, v: Array, a: Array) -> Array:
         return self._kernel.torque(q, v, a, self._p)
@@ -79,9 +79,9 @@ def ends(seed: int, count: int = MOVES) -> tuple[Array, Array]:
     """Starts and goals (count, 6): long, short, of single joints, and none."""
     rng = np.random.default_rng(seed)
     start = rng.uniform(-np.pi, np.pi, (count, 6))
-    travel = rng.uniform(-np.pi, np.pi, (count, 6)) * 10 ** rng.uniform(-2, 0, (count, 1))
-    travel *= rng.random((count, 6)) < rng.choice([0.2, 1.0], (count, 1))
-    return start, np.clip(start + travel, ROBOT.limits.q_min, ROBOT.limits.q_max)
+    displacement = rng.uniform(-np.pi, np.pi, (count, 6)) * 10 ** rng.uniform(-2, 0, (count, 1))
+    displacement *= rng.random((count, 6)) < rng.choice([0.2, 1.0], (count, 1))
+    return start, np.clip(start + displacement, ROBOT.limits.q_min, ROBOT.limits.q_max)
 
 
 def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: int) -> Iterator[tuple[float, Energy]]:
@@ -111,9 +111,9 @@ def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: in
 
 def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Array, Array]:
     """Bounds and least durations (P,) for starts and goals (P, 6)."""
-    task = Task.of(changed(torques.task.problem, **given))
-    climb = np.array([task.potential(b) - task.potential(a) for a, b in zip(start, goal, strict=True)])
-    return lower_bounds(task, goal - start, climb)
+    task = PreparedProblem.of(changed(torques.task.problem, **given))
+    potential_gain = np.array([task.potential(b) - task.potential(a) for a, b in zip(start, goal, strict=True)])
+    return lower_bounds(task, goal - start, potential_gain)
 
 
 @pytest.mark.parametrize("name", list(CONDITIONS))
@@ -202,7 +202,8 @@ def test_the_bound_is_reached_where_only_friction_costs(law: str, speed: float) 
 
 
 def test_standing_still_costs_idling() -> None:
-    """No travel: the idle power over the least duration, which is the one asked for or the least that is planned."""
+    """No displacement: the idle power over the least duration, which is the one asked for or the least that is
+    planned."""
     torques = Torques(problem())
     q = np.zeros((1, 6))
     assert bound(torques, q, q)[0][0] == pytest.approx(36.7 * LEAST_DURATION, rel=1e-3)
@@ -239,31 +240,37 @@ def test_duration_bounds_raise_the_bound() -> None:
 
 
 def test_longer_travel_never_lowers_the_bound() -> None:
-    """Joint by joint, with climb as it is; the least duration grows as well."""
+    """Joint by joint, with potential_gain as it is; the least duration grows as well."""
     rng = np.random.default_rng(9)
     for name, conditions in CONDITIONS.items():
         if name == "wide reversal":
-            continue  # its deficit grows with the time, not with the travel
-        task = Task.of(problem(**conditions))
-        travel, climb = rng.normal(size=(300, 6)) * 10 ** rng.uniform(-2, 0.3, (300, 1)), rng.normal(size=300)
-        longer = travel.copy()
+            continue  # its deficit grows with the time, not with the displacement
+        task = PreparedProblem.of(problem(**conditions))
+        displacement, potential_gain = (
+            rng.normal(size=(300, 6)) * 10 ** rng.uniform(-2, 0.3, (300, 1)),
+            rng.normal(size=300),
+        )
+        longer = displacement.copy()
         joint = rng.integers(0, 6, 300)
         longer[np.arange(300), joint] *= rng.uniform(1.0, 2.0, 300)
-        (low, least), (high, more) = lower_bounds(task, travel, climb), lower_bounds(task, longer, climb)
+        (low, least), (high, more) = (
+            lower_bounds(task, displacement, potential_gain),
+            lower_bounds(task, longer, potential_gain),
+        )
         assert (more >= least * (1 - EXACT)).all()
         assert (high >= low - EXACT * np.abs(low)).all()
 
 
 def test_tighter_limits_never_lower_the_bound() -> None:
     start, goal = ends(10)
-    loose, _ = bound(Torques(problem()), start, goal)
+    tolerance, _ = bound(Torques(problem()), start, goal)
     for tight in (limits(v_max=0.5), limits(a_max=2.0), limits(j_max=20.0), limits(tau_max=[80, 120, 80, 9, 9, 9])):
         ours, _ = bound(Torques(problem(limits=tight)), start, goal)
-        assert (ours >= loose * (1 - EXACT)).all()
+        assert (ours >= tolerance * (1 - EXACT)).all()
 
 
 def test_mechanical_bound_is_the_climb() -> None:
     """By hand: 2 kg on the flange lifted with the arm; the work against gravity is the least, up or down."""
-    task = Task.of(problem(objective="mechanical", duration_max=5.0))
+    task = PreparedProblem.of(problem(objective="mechanical", duration_max=5.0))
     ours, _ = lower_bounds(task, np.ones((2, 6)), np.array([12.0, -7.0]))
     assert ours.tolist() == [12.0, 7.0]

@@ -57,13 +57,13 @@ def test_the_arm_takes_as_long_as_its_slowest_joint() -> None:
     """Over many travels at once: as long as the longest of six profiles, for rows and for blocks of rows."""
     rng = np.random.default_rng(2)
     own = limits(v_max=rng.uniform(0.5, 3, 6), a_max=rng.uniform(1, 10, 6), j_max=rng.uniform(10, 200, 6))
-    travel = rng.normal(size=(4, 5, 6)) * 10 ** rng.uniform(-3, 0.5, (4, 5, 6))
-    found = shortest_duration(travel, own)
+    displacement = rng.normal(size=(4, 5, 6)) * 10 ** rng.uniform(-3, 0.5, (4, 5, 6))
+    found = shortest_duration(displacement, own)
     assert found.shape == (4, 5)
     for index in np.ndindex(4, 5):
-        rates = zip(np.abs(travel[index]), own.v_max, own.a_max, own.j_max, strict=True)
+        rates = zip(np.abs(displacement[index]), own.v_max, own.a_max, own.j_max, strict=True)
         assert found[index] == pytest.approx(max(ruckig_profile(*each)[0] for each in rates), rel=RUCKIG)
-        assert found[index] == pytest.approx(float(shortest_duration(travel[index], own)), rel=EXACT)
+        assert found[index] == pytest.approx(float(shortest_duration(displacement[index], own)), rel=EXACT)
 
 
 def test_no_travel_takes_no_time() -> None:
@@ -139,10 +139,10 @@ def test_switches_make_a_motion_of_the_travel(stretch: float) -> None:
 def test_the_joint_that_needs_longest_leads() -> None:
     """Its switches, though another joint travels further: limits differ."""
     own = limits(v_max=[3, 3, 3, 3, 3, 0.8])
-    travel = np.array([2.0, 0.1, 0.2, -0.3, 0.0, -1.5])
-    duration = 1.1 * float(shortest_duration(travel, own))
-    alone = np.where(np.arange(6) == 5, travel, 0.0)
-    assert switches(travel, duration, own) == pytest.approx(switches(alone, duration, own))
+    displacement = np.array([2.0, 0.1, 0.2, -0.3, 0.0, -1.5])
+    duration = 1.1 * float(shortest_duration(displacement, own))
+    alone = np.where(np.arange(6) == 5, displacement, 0.0)
+    assert switches(displacement, duration, own) == pytest.approx(switches(alone, duration, own))
     assert len(switches(alone, duration, own)) == 6
 
 
