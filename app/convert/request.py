@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from app.convert.arm import to_arm
-from app.convert.pose import to_matrix, to_rotation
+from app.convert.pose import to_pose
 from app.schemas import request as asked
 from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
 from app.schemas.orientation import InCone
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
-from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf, Single, Target
 
@@ -57,19 +56,18 @@ def to_target(target: asked.Target) -> Target:
 def _single(target: asked.JointTarget | asked.PoseTarget) -> Single:
     if isinstance(target, asked.JointTarget):
         return np.array(target.q)
-    return _loose(target.pose) if isinstance(target.pose, ConeOrientedPoseSchema) else Pose(to_matrix(target.pose))
+    pose = target.pose
+    return _cone_oriented(pose) if isinstance(pose, ConeOrientedPoseSchema) else to_pose(pose.position, pose)
 
 
-def _loose(pose: ConeOrientedPoseSchema) -> ConeOrientedPose:
+def _cone_oriented(pose: ConeOrientedPoseSchema) -> ConeOrientedPose:
     position, orientation = np.array(pose.position), pose.orientation
     if isinstance(orientation, str):
         return ConeOrientedPose(position)
     if isinstance(orientation, InCone):
         cone = orientation.cone
         return ConeOrientedPose(position, np.array(cone.axis), np.array(cone.direction), cone.half_angle)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = to_rotation(orientation), position
-    return ConeOrientedPose.about(Pose(T), np.array(orientation.free_about))
+    return ConeOrientedPose.about(to_pose(pose.position, orientation), np.array(orientation.free_about))
 
 
 def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]:

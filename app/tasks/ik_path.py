@@ -8,13 +8,12 @@ import numpy as np
 
 from app.convert.arm import robot_named
 from app.convert.fields import fields
-from app.convert.pose import to_matrix
+from app.convert.pose import to_matrix, to_pose
 from app.engine.reply import Reply
 from app.schemas.ik_path import IKPathRequest
 from app.tasks.task import answer, json_reply
 from optimizer.kinematics.path_following import follow
 from optimizer.problem.arm import Arm
-from optimizer.problem.pose import Pose
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class IKPathTask:
         targets = (
             np.array(request.points)
             if request.points is not None
-            else [Pose(to_matrix(pose)) for pose in request.poses or []]
+            else [to_pose(pose.position, pose) for pose in request.poses or []]
         )
         found = follow(arm, targets, np.array(request.guess), request.tolerance, request.near_singular)
         written = [(t, point.q) for t, point in zip(request.t, found, strict=True) if point.written]

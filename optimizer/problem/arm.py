@@ -1,4 +1,4 @@
-"""The arm as it stands in its cell: robot, tool, payload, mounting, limits, friction, drives, bus; validated."""
+"""An arm in its cell: robot, tool, payload, mounting, limits, friction, drives, bus. Validated on construction."""
 
 from __future__ import annotations
 
@@ -9,21 +9,20 @@ import numpy as np
 
 from models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem.arrays import frozen, per_joint
+from optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from optimizer.problem.bus import Bus
-from optimizer.problem.pose import Pose
 from optimizer.problem.scene import Attachment, Scene
 from optimizer.problem.tool_cone import ToolCone
 
-# a limit on speed below this [m/s] would leave motions that last longer than any answer may
+# least speed limit [m/s] of a point: below it, motions would last longer than any answer may
 LEAST_SPEED = 1e-3
 LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
-# most shapes that a tool is made of
+# most capsules of a tool
 MOST_PARTS = 16
 
-# factors on a link's mass and inertia that are still an arm like the robot
+# range of the factors on mass and inertia of a link: beyond it, the arm is no variant of the robot
 LINK_MASS_SCALES = (0.1, 10.0)
-# coefficients of the inverter's loss, and their greatest values [W, W/A, W/A²]: far beyond any inverter's
+# coefficients of the inverter's loss, and their greatest value [W, W/A, W/A²], far above that of any inverter
 INVERTER_PARTS = ("constant", "linear", "quadratic")
 INVERTER_MOST = 1e3
 
@@ -32,7 +31,8 @@ INVERTER_MOST = 1e3
 class Payload:
     """A body fixed to the flange: mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com.
 
-    `shape` is what it takes up of space, for collisions only.
+    `shape` is its geometry, which is used for collisions only. Raises InvalidProblem, with the field named, for a mass
+    or an inertia that no body has.
     """
 
     mass: float = 0.0
@@ -52,15 +52,16 @@ class Payload:
         if principal[0] < -slack or principal[2] > principal[0] + principal[1] + slack:
             raise InvalidProblem(
                 "payload.inertia",
-                "payload.inertia fits no body: principal moments must be positive and obey the triangle inequality.",
+                "payload.inertia belongs to no body: its principal moments must not be negative, and none may exceed "
+                "the sum of the other two.",
             )
 
 
 @dataclass(frozen=True)
 class Inverter:
-    """The inverters' loss constant + linear·|i| + quadratic·i² [W, W/A, W/A²], one number or one per joint each.
+    """Coefficients of the inverters' loss constant + linear·|i| + quadratic·i² [W, W/A, W/A²].
 
-    None keeps the robot's figure.
+    Each is one number for all joints, or one per joint (nq,). None keeps the robot's figure.
     """
 
     constant: float | Array | None = None
@@ -70,16 +71,18 @@ class Inverter:
 
 @dataclass(frozen=True, kw_only=True)
 class Arm:
-    """A robot with what it carries, how it is mounted and which limits it keeps.
+    """A robot with its tool, payload, mounting, surroundings and limits.
 
-    `limits` replaces the robot's limits and may only tighten them. `gravity` (3,) [m/s²] is in the base frame.
-    `friction` names one of the robot's friction laws (None: its default). `inverter` replaces figures of the robot's
-    inverters, `bus` says where surplus power goes, `link_mass_scale` (nq,), or one number, multiplies mass and inertia
-    of every moving link, payload apart. `tool` is what the flange bears, for collisions only, and `scene` what stands
-    around the arm; with `collisions` false nothing is compared. `tool_cone` holds an axis of the tool near a direction,
-    `tcp_speed` and `elbow_speed` [m/s] limit how fast these points move.
+    `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, `gravity` (3,) [m/s²] is in the base frame.
+    `limits` replaces the robot's limits and may only tighten them. `friction` names one of the robot's friction laws
+    (None: its default). `inverter` replaces coefficients of the robot's inverters, and `bus` says where surplus power
+    goes. `link_mass_scale` (nq,), or one number, multiplies mass and inertia of every moving link, not of the payload.
 
-    Raises InvalidProblem, with the field named, when the parts do not fit together.
+    `tool` holds the shapes fixed to the flange, `scene` the obstacles around the arm; both are used for collisions
+    only. With `collisions` false, no collisions are checked. `tool_cone` keeps an axis of the tool near a direction;
+    `tcp_speed` and `elbow_speed` [m/s] limit the speeds of these points in the base frame.
+
+    Raises InvalidProblem, with the field named, if the parts do not fit together.
     """
 
     robot: Robot
@@ -99,7 +102,7 @@ class Arm:
     elbow_speed: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T_flange_tcp", Pose(self.T_flange_tcp).T)
+        object.__setattr__(self, "T_flange_tcp", rigid_transform(self.T_flange_tcp, "tcp"))
         object.__setattr__(self, "gravity", frozen(self.gravity, (3,), "gravity"))
         object.__setattr__(self, "limits", self.robot.limits if self.limits is None else self.limits)
         object.__setattr__(self, "tool", tuple(self.tool))
@@ -145,18 +148,18 @@ class Arm:
 
     @property
     def base_power(self) -> float:
-        """What the electronics draw besides the motors and their inverters [W]."""
+        """Power [W] of the electronics, without the motors and their inverters."""
         return self.robot.electronics.idle_power + self.robot.electronics.controller_power
 
     @property
     def regeneration(self) -> float:
-        """The share of surplus on the bus that the supply takes back."""
+        """Fraction of the surplus power on the bus that is fed back to the supply."""
         if self.bus.mode == "recuperating":
             return self.bus.efficiency
         return 0.0 if self.bus.mode == "isolated" else self.robot.electronics.regeneration
 
     def check_inside(self, target: str, q: Array) -> None:
-        """Raises OutsideLimits when a joint of q (nq,) is out of range; `target` says whose joints they are."""
+        """Raises OutsideLimits, which names `target`, if a joint of q (nq,) [rad] is out of range."""
         lower, upper = self.active_limits.q_min, self.active_limits.q_max
         outside = np.flatnonzero((q < lower) | (q > upper))
         if outside.size:
@@ -165,12 +168,12 @@ class Arm:
 
     def _check_limits(self) -> None:
         limits, robot = self.active_limits, self.robot.limits
-        # asked so that NaN, which compares false with everything, is refused
+        # written so that NaN, which compares false with everything, is refused
         for public, name in LIMIT_NAMES.items():
             value, most = getattr(limits, name), getattr(robot, name)
             if value.shape != most.shape or not (value > 0).all():
                 raise InvalidProblem(f"limits.{public}", f"limits.{public} must be a positive number for every joint.")
-            # the factor lets a caller pass the robot's own figure back after rounding
+            # the factor allows the robot's own limits after rounding
             if (value > most * (1 + 1e-9)).any():
                 joint = int(np.argmax(value / most))
                 raise InvalidProblem(

@@ -1,59 +1,61 @@
-"""Arrays of a problem: read-only, of the right shape, finite; rotations orthonormal."""
+"""Checks of a problem's arrays. Each returns a read-only copy; each error names the field."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from models.arrays import read_only
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 
+# sizes and distances [m] outside of these are a mistake of units
+SMALLEST, LARGEST = 1e-4, 100.0
+# of a rotation matrix: one assembled in double precision is orthonormal to about 1e-15
+ORTHONORMAL = 1e-9
+# a vector shorter than this has no direction [any unit]
+SHORTEST_VECTOR = 1e-6
 
-def frozen(values: object, shape: tuple[int, ...], name: str) -> Array:
-    """A read-only array of that shape. Raises InvalidProblem, with the field named."""
+
+def frozen(values: object, shape: tuple[int, ...], field: str) -> Array:
+    """A read-only, finite array of that shape, in which -1 stands for any length. Raises InvalidProblem."""
     try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidProblem(name, f"{name} must be numbers.") from None
-    if array.shape != shape:
-        raise InvalidProblem(name, f"{name} must have shape {shape}, not {array.shape}.")
-    if not np.isfinite(array).all():
-        raise InvalidProblem(name, f"{name} must be finite.")
-    array.setflags(write=False)
-    return array
+        return read_only(values, shape, field)
+    except ValueError as error:
+        raise InvalidProblem(field, str(error)) from None
 
 
-def per_joint(values: object, count: int, name: str, least: float, most: float) -> Array:
-    """Numbers (count,) within [least, most] from one number or one each. Raises InvalidProblem."""
-    array = frozen(np.full(count, values) if np.ndim(values) == 0 else values, (count,), name)  # type: ignore[arg-type]
+def per_joint(values: object, count: int, field: str, least: float, most: float) -> Array:
+    """Numbers (count,) within [least, most] from one number for all joints, or one each. Raises InvalidProblem."""
+    given = [values] * count if np.ndim(values) == 0 else values  # type: ignore[arg-type]
+    array = frozen(given, (count,), field)
     if not ((array >= least) & (array <= most)).all():
-        raise InvalidProblem(name, f"{name} must lie between {least:g} and {most:g}.")
+        raise InvalidProblem(field, f"{field} must lie between {least:g} and {most:g}.")
     return array
 
 
-LARGEST = 100.0
+def unit_vector(values: object, field: str) -> Array:
+    """The unit vector (3,) along a vector (3,) of any length. Raises InvalidProblem, also for the zero vector."""
+    vector = frozen(values, (3,), field)
+    length = float(np.linalg.norm(vector))
+    if length < SHORTEST_VECTOR:
+        raise InvalidProblem(field, f"{field} must not be zero: it gives a direction.")
+    return frozen(vector / length, (3,), field)
 
 
-def placement(name: str, T: Array) -> Array:
-    """A read-only pose (4, 4) within reach of reason. Raises InvalidProblem."""
-    T = numbers(name, T, (4, 4))
-    rotation = T[:3, :3]
-    # 1e-9: a rotation assembled in double precision is orthonormal to about 1e-15
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-9 or np.linalg.det(rotation) < 0:
-        raise InvalidProblem(name, "The pose's rotation matrix must be orthonormal and right-handed.")
-    if np.abs(T[:3, 3]).max() > LARGEST:
-        raise InvalidProblem(name, f"The pose must lie within {LARGEST:g} m of the origin.")
+def rigid_transform(values: object, field: str) -> Array:
+    """A homogeneous matrix (4, 4) with an orthonormal, right-handed rotation. Raises InvalidProblem."""
+    T = frozen(values, (4, 4), field)
+    R = T[:3, :3]
+    if np.abs(R @ R.T - np.eye(3)).max() > ORTHONORMAL or np.linalg.det(R) < 0:
+        raise InvalidProblem(field, f"The rotation matrix of {field} must be orthonormal and right-handed.")
+    if T[3].tolist() != [0, 0, 0, 1]:
+        raise InvalidProblem(field, f"The last row of the matrix of {field} must be 0, 0, 0, 1.")
     return T
 
 
-def numbers(name: str, values: object, shape: tuple[int, ...]) -> Array:
-    """A read-only array of that shape, -1 standing for any length. Raises InvalidProblem, with the field named."""
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidProblem(name, f"{name} must be numbers.") from None
-    if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
-        raise InvalidProblem(name, f"{name} has the wrong shape.")
-    if not np.isfinite(array).all():
-        raise InvalidProblem(name, f"{name} must be finite.")
-    array.setflags(write=False)
-    return array
+def placement(values: object, field: str) -> Array:
+    """Pose (4, 4) of a body, with its origin at most LARGEST from that of the frame. Raises InvalidProblem."""
+    T = rigid_transform(values, field)
+    if np.abs(T[:3, 3]).max() > LARGEST:
+        raise InvalidProblem(field, f"{field} must lie within {LARGEST:g} m of the origin.")
+    return T

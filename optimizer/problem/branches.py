@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 Shoulder = Literal["left", "right"]
@@ -11,29 +11,17 @@ Wrist = Literal["flip", "no_flip"]
 
 
 @dataclass(frozen=True)
-class BranchFilter:
-    """Keep to these inverse kinematics branches; None leaves a part free."""
-
-    shoulder: Shoulder | None = None
-    elbow: Elbow | None = None
-    wrist: Wrist | None = None
-
-    def allows(self, label: Label) -> bool:
-        """Whether a branch is one of these."""
-        parts = ("shoulder", "elbow", "wrist")
-        return all(getattr(self, part) in (None, getattr(label, part)) for part in parts)
-
-
-@dataclass(frozen=True)
 class Label:
-    """Which of the eight branches an arm configuration is on. A part changes only across its own singularity.
+    """The branch, one of eight, of a configuration of an arm with shoulder, elbow and wrist.
 
-    After C. S. G. Lee and M. Ziegler, "Geometric approach in solving inverse kinematics of PUMA robots" (1984).
-    `shoulder`: the side of the first axis on which the arm's plane lies, seen along the reach. It changes where the
-    origin of the last axis comes level with the first axis.
-    `elbow`: up where it lies above the line from shoulder to wrist of an arm that reaches ahead. It changes with it
-    stretched or folded; across the shoulder's singularity it changes with the shoulder's part.
-    `wrist`: no_flip where sin(q5) < 0, as with the tool down in a Universal Robots arm's everyday posture.
+    A part changes only across its own singularity. After C. S. G. Lee and M. Ziegler, "Geometric approach in solving
+    inverse kinematics of PUMA robots" (1984).
+
+    `shoulder`: side of the first axis on which the plane of the arm lies, seen along the reach. It changes where the
+    origin of the last axis is level with the first axis.
+    `elbow`: up if the elbow is above the line from shoulder to wrist of an arm that reaches forward. It changes where
+    the elbow is stretched or folded; across the singularity of the shoulder it changes with the shoulder's part.
+    `wrist`: no_flip if sin(q5) < 0, as with the tool down in the everyday posture of a Universal Robots arm.
     """
 
     shoulder: Shoulder
@@ -42,3 +30,21 @@ class Label:
 
     def __str__(self) -> str:
         return f"{self.shoulder}/{self.elbow}/{self.wrist}"
+
+
+@dataclass(frozen=True)
+class BranchFilter:
+    """The inverse kinematics branches that a request allows; None leaves a part free."""
+
+    shoulder: Shoulder | None = None
+    elbow: Elbow | None = None
+    wrist: Wrist | None = None
+
+    def allows(self, label: object) -> bool:
+        """Whether every part that the filter names has its value in `label`.
+
+        The label may be that of any family of arms. If it has no part of a name, a filter that names the part does not
+        allow it.
+        """
+        named = {part: wanted for part, wanted in asdict(self).items() if wanted is not None}
+        return all(getattr(label, part, None) == wanted for part, wanted in named.items())

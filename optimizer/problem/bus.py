@@ -14,10 +14,10 @@ BusMode = Literal["shared", "isolated", "recuperating", "storage"]
 
 @dataclass(frozen=True)
 class Bus:
-    """How joints and supply exchange power; `capacity`, `power` and `initial` are the store's.
+    """How joints and supply exchange power; `capacity`, `power` and `initial` belong to the energy storage.
 
-    `efficiency` [1] is of feeding back (`recuperating`) or of a round trip through the store (`storage`). `capacity`
-    and `initial` [J] are charge that can be given back, `power` [W] limits charging and discharging alike.
+    `efficiency` [1] is that of feeding back (`recuperating`), or of charging and discharging together (`storage`).
+    `capacity` and `initial` [J] are usable charge; `power` [W] limits both charging and discharging.
 
     Raises InvalidProblem, with the field named.
     """
@@ -31,7 +31,7 @@ class Bus:
     def __post_init__(self) -> None:
         if self.mode not in ("shared", "isolated", "recuperating", "storage"):
             raise InvalidProblem("bus.mode", "bus.mode must be shared, isolated, recuperating or storage.")
-        # asked so that NaN, which compares false with everything, is refused
+        # written so that NaN, which compares false with everything, is refused
         if not 0 <= self.efficiency <= 1:
             raise InvalidProblem("bus.efficiency", "bus.efficiency must be a number from 0 to 1.")
         if not 0 <= self.capacity < np.inf:

@@ -8,21 +8,19 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import frozen
+from optimizer.problem.arrays import frozen, unit_vector
 from optimizer.problem.pose import Pose
-
-# an axis shorter than this has no direction
-SHORTEST_AXIS = 1e-9
 
 
 @dataclass(frozen=True)
 class ConeOrientedPose:
-    """The TCP at `position` (3,) [m] in the base frame, turned so that `axis` is within `half_angle` of `direction`.
+    """The TCP at `position` (3,) [m] in the base frame, with `axis` at most `half_angle` [rad] away from `direction`.
 
-    `axis` (3,) is fixed to the tool, in the TCP frame; `direction` (3,) is in the base frame; both are normalised. A
-    `half_angle` [rad] of pi allows every orientation, one of 0 any rotation about the axis alone.
+    `axis` (3,) is fixed to the tool, in the TCP frame; `direction` (3,) is in the base frame. Both are normalised. The
+    rotation about the axis is free. A `half_angle` of pi therefore allows every orientation; one of 0 leaves only the
+    rotation about the axis.
 
-    Raises InvalidProblem when an axis has no length, or the angle is not in [0, pi].
+    Raises InvalidProblem if `axis` or `direction` is zero, or if `half_angle` is not in [0, pi].
     """
 
     position: Array
@@ -33,28 +31,23 @@ class ConeOrientedPose:
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", frozen(self.position, (3,), "pose.position"))
         for name in ("axis", "direction"):
-            vector = frozen(getattr(self, name), (3,), f"pose.orientation.{name}")
-            length = float(np.linalg.norm(vector))
-            if length < SHORTEST_AXIS:
-                raise InvalidProblem(f"pose.orientation.{name}", f"The orientation's {name} must not be zero.")
-            object.__setattr__(self, name, frozen(vector / length, (3,), f"pose.orientation.{name}"))
+            object.__setattr__(self, name, unit_vector(getattr(self, name), f"pose.orientation.{name}"))
         if not 0 <= self.half_angle <= np.pi:
             raise InvalidProblem(
-                "pose.orientation.half_angle", "The orientation's half_angle must lie between 0 and pi."
+                "pose.orientation.half_angle", "pose.orientation.half_angle must be between 0 and pi rad."
             )
 
     @staticmethod
     def about(pose: Pose, axis: Array) -> ConeOrientedPose:
-        """That pose, or any that a rotation about `axis` (3,), given in the TCP frame, makes of it."""
-        return ConeOrientedPose(pose.T[:3, 3], axis, pose.T[:3, :3] @ frozen(axis, (3,), "pose.orientation.axis"), 0.0)
+        """`pose` with a free rotation about `axis` (3,), which is given in the TCP frame. Raises InvalidProblem."""
+        axis = frozen(axis, (3,), "pose.orientation.axis")
+        return ConeOrientedPose(pose.T[:3, 3], axis, pose.T[:3, :3] @ axis, 0.0)
 
     @property
     def freedom(self) -> int:
-        """How many independent ways there are to turn."""
+        """Number of independent rotations that the tolerance leaves: 3, or 1 about the axis alone."""
         return 3 if self.half_angle > 0 else 1
 
     def with_orientation(self, R: Array) -> Pose:
         """The pose at this position with the orientation R (3, 3)."""
-        T = np.eye(4)
-        T[:3, :3], T[:3, 3] = R, self.position
-        return Pose(T)
+        return Pose.from_rotation(self.position, R)

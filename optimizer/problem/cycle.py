@@ -1,4 +1,4 @@
-"""A cycle: how long the arm may take from one start to the next, and how it stands still at the goal until then."""
+"""A cycle: the time from one start of the motion to the next, and how the arm is held at the goal until then."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Hold = Literal["motors", "brakes"]
 
 @dataclass(frozen=True)
 class Cycle:
-    """The time [s] from the motion's start until the arm is needed again, and how the arm holds still until then.
+    """The `time` [s] from one start of the motion to the next, and how the arm is held at the goal until then.
 
-    On brakes the motors hold for `brake_delay` [s] first; then the arm draws `brake_power` [W] in all, electronics
-    included (None: what the electronics draw, brakes on).
+    With `hold` "brakes" the motors hold for `brake_delay` [s] first. Then the arm draws `brake_power` [W] in all,
+    electronics included (None: the power of the electronics with the brakes on).
 
     Raises InvalidProblem, with the field named.
     """

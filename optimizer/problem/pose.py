@@ -1,4 +1,4 @@
-"""A pose of the TCP in the robot's base frame."""
+"""A pose of the TCP in the robot's base frame, from a matrix or from any of the usual forms of an orientation."""
 
 from __future__ import annotations
 
@@ -8,20 +8,82 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import frozen
+from optimizer.problem.arrays import frozen, rigid_transform
+
+# how far the norm of a quaternion may be from 1: rounded to three decimals it is that near
+QUATERNION_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Pose of the TCP in the robot's base frame: `T` is the homogeneous matrix T_base_tcp, shape (4, 4), metres."""
+    """Pose of the TCP in the robot's base frame: `T` is the homogeneous matrix T_base_tcp (4, 4), position in m.
+
+    Raises InvalidProblem if `T` is not a rigid transform.
+    """
 
     T: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T", frozen(self.T, (4, 4), "pose"))
-        rotation = self.T[:3, :3]
-        # 1e-9: a rotation assembled in double precision is orthonormal to about 1e-15
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-9 or np.linalg.det(rotation) < 0:
-            raise InvalidProblem("pose", "The pose's rotation matrix must be orthonormal and right-handed.")
-        if self.T[3].tolist() != [0, 0, 0, 1]:
-            raise InvalidProblem("pose", "The last row of the pose's matrix must be 0, 0, 0, 1.")
+        object.__setattr__(self, "T", rigid_transform(self.T, "pose"))
+
+    @classmethod
+    def from_rotation(cls, position: object, R: object) -> Pose:
+        """From a position (3,) [m] and a rotation matrix (3, 3). Raises InvalidProblem."""
+        T = np.eye(4)
+        T[:3, :3] = frozen(R, (3, 3), "pose.rotation")
+        T[:3, 3] = frozen(position, (3,), "pose.position")
+        return cls(T)
+
+    @classmethod
+    def from_quaternion(cls, position: object, quaternion: object) -> Pose:
+        """From a position (3,) [m] and a unit quaternion x, y, z, w (4,). Raises InvalidProblem."""
+        return cls.from_rotation(position, rotation_from_quaternion(quaternion))
+
+    @classmethod
+    def from_rpy(cls, position: object, rpy: object) -> Pose:
+        """From a position (3,) [m] and roll, pitch, yaw (3,) [rad] about fixed axes. Raises InvalidProblem."""
+        return cls.from_rotation(position, rotation_from_rpy(rpy))
+
+    @classmethod
+    def from_rotvec(cls, position: object, rotvec: object) -> Pose:
+        """From a position (3,) [m] and a rotation vector (3,) [rad]. Raises InvalidProblem."""
+        return cls.from_rotation(position, rotation_from_rotvec(rotvec))
+
+
+def rotation_from_quaternion(quaternion: object) -> Array:
+    """Rotation matrix (3, 3) of a quaternion x, y, z, w (4,), which is normalised.
+
+    Raises InvalidProblem if its norm differs from 1 by more than QUATERNION_TOLERANCE.
+    """
+    field = "pose.quaternion"
+    given = frozen(quaternion, (4,), field)
+    norm = float(np.linalg.norm(given))
+    if abs(norm - 1) > QUATERNION_TOLERANCE:
+        raise InvalidProblem(field, f"{field} must have norm 1, to within {QUATERNION_TOLERANCE:g}.")
+    x, y, z, w = given / norm
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def rotation_from_rpy(rpy: object) -> Array:
+    """Rotation matrix (3, 3) of roll, pitch, yaw (3,) [rad]: Rz(yaw) Ry(pitch) Rx(roll), about the fixed axes x, y, z.
+
+    Raises InvalidProblem.
+    """
+    angles = frozen(rpy, (3,), "pose.rpy")
+    roll, pitch, yaw = (rotation_from_rotvec(angle * axis) for angle, axis in zip(angles, np.eye(3), strict=True))
+    return np.asarray(yaw @ pitch @ roll)
+
+
+def rotation_from_rotvec(rotvec: object) -> Array:
+    """Rotation matrix (3, 3) of a rotation vector (3,) [rad]: unit axis times angle. Raises InvalidProblem."""
+    vector = frozen(rotvec, (3,), "pose.rotvec")
+    angle = float(np.linalg.norm(vector))
+    # sinc keeps the quaternion exact through zero
+    half = 0.5 * vector * np.sinc(0.5 * angle / np.pi)
+    return rotation_from_quaternion([*half, np.cos(0.5 * angle)])

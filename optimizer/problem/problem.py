@@ -1,9 +1,9 @@
-"""What is asked: a motion between two targets, validated on construction."""
+"""A request: the motion of least energy between two targets. Validated on construction."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -13,23 +13,28 @@ from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.targets import Target, members, validated
 
-if TYPE_CHECKING:
-    from optimizer.problem.branches import Label
-
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
 Objective = Literal["electrical", "mechanical"]
+
+# bounds on every planned duration [s]; the first also holds if start and goal are the same
+LEAST_DURATION = 0.01
+LONGEST_DURATION = 600.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
     """A request for the motion of least energy of `arm` between `start` and `goal`.
 
-    `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these. `duration_min` and
-    `duration_max` [s] bound the duration; equal, they fix it; None leaves it to the optimiser. With a `cycle` the arm
-    waits at the goal until the cycle is over, which ends the longest duration allowed, too. `deadline` [s] is the wall
-    time after which the best verified result so far is returned.
+    `start` and `goal` are joint positions (nq,) [rad], a `Pose`, or an `AnyOf` of these; the goal may be a
+    `ConeOrientedPose`. `duration_min` and `duration_max` [s] bound the duration. If they are equal, they fix it; None
+    leaves it to the optimiser. With a `cycle` the arm waits at the goal until the end of the cycle, and the motion
+    lasts no longer than the cycle.
 
-    Raises InvalidProblem or OutsideLimits, with the field named, when the parts do not fit together.
+    `branch` restricts the inverse kinematics branches of start and goal. With `windings` the goal may also be a full
+    turn of a joint away. `sample_period` [s] is that of the returned samples. After `deadline` [s] of wall time the
+    best verified result so far is returned.
+
+    Raises InvalidProblem or OutsideLimits, with the field named, if the parts do not fit together.
     """
 
     arm: Arm
@@ -68,16 +73,11 @@ class Problem:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
 
-    def allows(self, label: Label) -> bool:
-        """Whether the request leaves a branch open."""
+    def allows(self, label: object) -> bool:
+        """Whether `branch` allows the inverse kinematics branch of this label."""
         return self.branch is None or self.branch.allows(label)
 
 
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:
-    """The same problem with one member of its start and one of its goal, by index."""
+    """The same problem with only one target each: those of index `start` and `goal` among its own."""
     return replace(problem, start=members(problem.start)[start], goal=members(problem.goal)[goal])
-
-
-# no motion is planned shorter than this, even one that goes nowhere, nor longer than that [s]
-LEAST_DURATION = 0.01
-LONGEST_DURATION = 600.0

@@ -1,7 +1,7 @@
-"""What stands around the arm and what is fixed to it: shapes, validated on construction.
+"""Obstacles around the arm and bodies fixed to its flange: shapes, validated on construction.
 
-Every shape is a convex core grown by a radius: a point or segment, a box, a cylinder's discs, a hull. Distances are
-computed on that form alone.
+Every shape is a convex core grown by a radius: a point or segment, a box, the discs of a cylinder, a hull. Distances
+are computed on this form alone.
 """
 
 from __future__ import annotations
@@ -16,21 +16,20 @@ from scipy.spatial import ConvexHull, QhullError
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
-from optimizer.problem.arrays import LARGEST, numbers, placement
+from optimizer.problem.arrays import LARGEST, SMALLEST, frozen, placement
 
-# most obstacles in a scene and most vertices of a mesh: what keeps a request's work bounded
+# most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
 MOST_OBSTACLES, MOST_VERTICES = 64, 256
-# sizes and distances [m] outside of these are a mistake of units
-SMALLEST = 1e-4
-# a hull whose thinnest extent is a smaller part of its widest is flat
+# least ratio of the smallest to the largest extent of a hull: below it, the hull is flat
 FLAT = 1e-6
 
 
 @dataclass(frozen=True)
 class Core:
-    """Points (m, 3) [m] whose hull, with every point widened to a disc of radius `ring` about z, grown by `radius`.
+    """The hull of `points` (m, 3) [m], grown by `radius` [m].
 
-    `half` (3,) is set for a box (half its edges). `plane`: the half-space below the point instead, z up.
+    Each point is first widened to a disc of radius `ring` [m] normal to z. `half` (3,) [m] is set for a box: half its
+    edges. With `plane` the core is the half-space below the point, z up.
     """
 
     points: Array
@@ -51,13 +50,13 @@ class Sphere:
 
     @property
     def core(self) -> Core:
-        """Its form for distances."""
+        """The form on which distances are computed."""
         return Core(np.zeros((1, 3)), self.radius)
 
 
 @dataclass(frozen=True)
 class Capsule:
-    """A segment of `length` [m] along z, its middle in the origin, grown by `radius` [m]."""
+    """A segment of `length` [m] along z, centred at the origin, grown by `radius` [m]."""
 
     radius: float
     length: float
@@ -68,13 +67,13 @@ class Capsule:
 
     @property
     def core(self) -> Core:
-        """Its form for distances."""
+        """The form on which distances are computed."""
         return Core(_on_axis(self.length), self.radius)
 
 
 @dataclass(frozen=True)
 class Cylinder:
-    """A cylinder of `length` [m] along z, its middle in the origin."""
+    """A cylinder of `radius` [m] and `length` [m] along z, centred at the origin."""
 
     radius: float
     length: float
@@ -85,63 +84,63 @@ class Cylinder:
 
     @property
     def core(self) -> Core:
-        """Its form for distances."""
+        """The form on which distances are computed."""
         return Core(_on_axis(self.length), ring=self.radius)
 
 
 @dataclass(frozen=True)
 class Box:
-    """A box with edges `size` (3,) [m] along the axes, its middle in the origin."""
+    """A box with edges `size` (3,) [m] along the axes, centred at the origin."""
 
     size: Array
 
     def __post_init__(self) -> None:
-        size = numbers("size", self.size, (3,))
+        size = frozen(self.size, (3,), "size")
         for edge in size.tolist():
             _size("size", edge)
         object.__setattr__(self, "size", size)
 
     @property
     def core(self) -> Core:
-        """Its form for distances."""
+        """The form on which distances are computed."""
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
         return Core(signs * self.size / 2, half=self.size / 2)
 
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """All that lies below z = 0: a floor, or a wall whose z axis points into the room."""
+    """All points below z = 0: a floor, or a wall whose z axis points into the free space."""
 
     @property
     def core(self) -> Core:
-        """Its form for distances."""
+        """The form on which distances are computed."""
         return Core(np.zeros((1, 3)), plane=True)
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem when they lie in a plane."""
+    """The convex hull of `vertices` (n, 3) [m]. Raises InvalidProblem if they lie in a plane."""
 
     vertices: Array
 
     def __post_init__(self) -> None:
-        vertices = numbers("vertices", self.vertices, (-1, 3))
+        vertices = frozen(self.vertices, (-1, 3), "vertices")
         if not 4 <= len(vertices) <= MOST_VERTICES:
             raise InvalidProblem("vertices", f"vertices must be 4 to {MOST_VERTICES} points.")
         if np.abs(vertices).max() > LARGEST:
             raise InvalidProblem("vertices", f"vertices must lie within {LARGEST:g} m of the origin.")
         extents = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
         if extents[2] <= FLAT * extents[0] or extents[2] < SMALLEST * FLAT:
-            raise InvalidProblem("vertices", "vertices lie in a plane: give a body with a volume.")
+            raise InvalidProblem("vertices", "vertices lie in a plane: give points of a body with a volume.")
         try:
             hull = ConvexHull(vertices)
         except QhullError:
-            raise InvalidProblem("vertices", "vertices span no body: give points that do not lie in a plane.") from None
-        object.__setattr__(self, "vertices", numbers("vertices", vertices[hull.vertices], (-1, 3)))
+            raise InvalidProblem("vertices", "vertices lie in a plane: give points of a body with a volume.") from None
+        object.__setattr__(self, "vertices", frozen(vertices[hull.vertices], (-1, 3), "vertices"))
 
     @cached_property
     def core(self) -> Core:
-        """Its form for distances."""
+        """The form on which distances are computed."""
         return Core(self.vertices)
 
 
@@ -150,7 +149,7 @@ Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A shape in the base frame at `T_base_shape`; the arm keeps `margin` [m] away from it."""
+    """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at least `margin` [m]."""
 
     name: str
     shape: Shape
@@ -162,12 +161,12 @@ class Obstacle:
             raise InvalidProblem("scene.obstacles", "Every obstacle needs a name.")
         if not (0 <= self.margin <= 1):
             raise InvalidProblem("scene.obstacles", "margin must be between 0 and 1 m.")
-        object.__setattr__(self, "T_base_shape", placement("scene.obstacles", self.T_base_shape))
+        object.__setattr__(self, "T_base_shape", placement(self.T_base_shape, "scene.obstacles"))
 
 
 @dataclass(frozen=True)
 class Attachment:
-    """A shape fixed to the flange at `T_flange_shape`: part of a tool, or what the arm carries."""
+    """A shape fixed to the flange at `T_flange_shape` (4, 4): part of a tool, or the payload."""
 
     shape: Shape
     T_flange_shape: Array = field(default_factory=lambda: np.eye(4))
@@ -175,26 +174,29 @@ class Attachment:
     def __post_init__(self) -> None:
         if isinstance(self.shape, HalfSpace):
             raise InvalidProblem("shape", "A half-space cannot be carried: use a box.")
-        object.__setattr__(self, "T_flange_shape", placement("shape", self.T_flange_shape))
+        object.__setattr__(self, "T_flange_shape", placement(self.T_flange_shape, "shape"))
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Obstacles, each under a name of its own."""
+    """Obstacles, each with a name of its own."""
 
     obstacles: Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if len(self.obstacles) > MOST_OBSTACLES:
-            raise InvalidProblem("scene.obstacles", f"A scene holds at most {MOST_OBSTACLES} obstacles.")
+            raise InvalidProblem("scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles.")
         if any(count > 1 for count in Counter(obstacle.name for obstacle in self.obstacles).values()):
             raise InvalidProblem("scene.obstacles", "Two obstacles have the same name: name each differently.")
 
 
 def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
-    """A capsule on the flange around the segment from `first` to `second` (3,) [m]; a sphere where they coincide."""
-    ends = numbers("tool.capsules", [first, second], (2, 3))
+    """A capsule fixed to the flange, around the segment from `first` to `second` (3,) [m] in the flange frame.
+
+    If the two points coincide, it is a sphere. Raises InvalidProblem.
+    """
+    ends = frozen([first, second], (2, 3), "tool.capsules")
     along = ends[1] - ends[0]
     length = float(np.linalg.norm(along))
     T = np.eye(4)
@@ -202,7 +204,7 @@ def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
     if length < SMALLEST:
         return Attachment(Sphere(radius + length / 2), T)
     z = along / length
-    # any x axis across will do
+    # any x axis normal to z
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
@@ -214,6 +216,6 @@ def _on_axis(length: float) -> Array:
 
 
 def _size(name: str, value: float) -> None:
-    # asked so that NaN is refused
+    # written so that NaN is refused
     if not SMALLEST <= value <= LARGEST:
         raise InvalidProblem(name, f"{name} must be between {SMALLEST:g} and {LARGEST:g} m.")

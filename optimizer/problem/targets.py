@@ -1,4 +1,4 @@
-"""Where a motion may start or end: joint positions, a pose, or any one of several."""
+"""Targets, at which a motion may start or end: joint positions, a pose, or any one of several."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from optimizer.problem.arrays import frozen
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 
-# of `AnyOf`
+# targets of one `AnyOf`
 MOST_TARGETS = 64
 
 Single = Array | Pose | ConeOrientedPose
@@ -19,9 +19,9 @@ Single = Array | Pose | ConeOrientedPose
 
 @dataclass(frozen=True)
 class AnyOf:
-    """Whichever of `targets` costs least: 1 to 64 joint positions (nq,) [rad] or poses, mixed as you like.
+    """The one of `targets` that needs the least energy: 1 to MOST_TARGETS joint positions (nq,) [rad] or poses, mixed.
 
-    Raises InvalidProblem when there are none, too many, or one of them is itself an AnyOf.
+    Raises InvalidProblem if there are none, too many, or one of them is itself an AnyOf.
     """
 
     targets: tuple[Single, ...]
@@ -38,22 +38,22 @@ Target = Single | AnyOf
 
 
 def members(target: Target) -> tuple[Single, ...]:
-    """The targets that it stands for: itself, unless it is an AnyOf."""
+    """The targets of an AnyOf; of any other target, only itself."""
     return target.targets if isinstance(target, AnyOf) else (target,)
 
 
 def single(target: Target) -> Single:
-    """The target itself. Raises ValueError for an AnyOf."""
+    """The target itself. Raises ValueError for an AnyOf, which must be narrowed to one target first."""
     if isinstance(target, AnyOf):
         raise ValueError("narrow the problem to one of its targets first")
     return target
 
 
 def validated(arm: Arm, name: str, target: Target) -> Target:
-    """A problem's `start` or `goal` (which `name` says) with its joint positions read-only arrays.
+    """The target `name` (start or goal) of a problem, with its joint positions as read-only arrays.
 
-    Raises InvalidProblem, also for a start whose orientation is free, or OutsideLimits for joint positions out of
-    range; those of an AnyOf are merely unreachable.
+    Raises InvalidProblem, also for a start with an orientation tolerance, and OutsideLimits for joint positions out of
+    range. Joint positions of an AnyOf may be out of range: they count as unreachable.
     """
     if name == "start" and any(isinstance(member, ConeOrientedPose) for member in members(target)):
         raise InvalidProblem(name, "Only a goal's orientation may be free: give the start's in full.")

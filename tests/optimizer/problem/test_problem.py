@@ -47,7 +47,7 @@ def test_defaults() -> None:
         ({"start": -outside(5, 1e-9)}, "start.q"),
         ({"gravity": [0, 0]}, "gravity"),
         ({"gravity": [0, 0, math.inf]}, "gravity"),
-        ({"T_flange_tcp": np.diag([1.0, 1.0, -1.0, 1.0])}, "pose"),
+        ({"T_flange_tcp": np.diag([1.0, 1.0, -1.0, 1.0])}, "tcp"),
         ({"duration_min": 0.0}, "duration"),
         ({"duration_max": -1.0}, "duration"),
         ({"duration_max": math.nan}, "duration"),
@@ -147,8 +147,9 @@ def test_nothing_can_be_changed_afterwards() -> None:
         ROTATED + 1e-6 * np.eye(4)[:, ::-1],  # sheared
         np.full((4, 4), math.nan),
         ROTATED[:, ::-1],
+        "pose",
     ],
-    ids=["shape", "scaled", "mirrored", "sheared", "nan", "shuffled"],
+    ids=["shape", "scaled", "mirrored", "sheared", "nan", "shuffled", "text"],
 )
 def test_a_pose_must_be_rigid(T: Array) -> None:
     with pytest.raises(InvalidProblem) as refusal:

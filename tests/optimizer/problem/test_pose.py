@@ -1,0 +1,146 @@
+"""Poses from quaternions, roll-pitch-yaw angles and rotation vectors, against Pinocchio and scipy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.pose import (
+    QUATERNION_TOLERANCE,
+    Pose,
+    rotation_from_quaternion,
+    rotation_from_rotvec,
+    rotation_from_rpy,
+)
+
+# of a rotation computed in double precision in two ways
+ROUNDING = 1e-14
+# the same for an angle near a half turn, where the rotation vector follows from the matrix by a square root
+ANGLE_ROUNDING = 1e-7
+POSITION = [0.1, -0.2, 0.3]
+ANGLES = [
+    [0.0, 0.0, 0.0],
+    [0.3, -0.8, 2.1],
+    [np.pi, 0.0, 0.0],
+    [0.0, -np.pi, 0.0],
+    [1e-12, 0.0, 1e-9],
+    [5e-324, 0.0, 0.0],
+    [-3.0, np.pi / 2, 7.0],
+    [900.0, -700.0, 1000.0],
+]
+
+
+def difference(A: Array, B: Array) -> float:
+    """The largest between two matrices' elements."""
+    return float(np.abs(A - B).max())
+
+
+@pytest.mark.parametrize("rpy", ANGLES)
+def test_rpy_are_rotations_about_fixed_axes(rpy: list[float]) -> None:
+    R = rotation_from_rpy(rpy)
+    assert difference(R, pin.rpy.rpyToMatrix(*rpy)) < ROUNDING
+    # in scipy, lower-case letters are fixed axes
+    assert difference(R, Rotation.from_euler("xyz", rpy).as_matrix()) < ROUNDING
+
+
+@pytest.mark.parametrize("rotvec", ANGLES)
+def test_a_rotation_vector_is_axis_times_angle(rotvec: list[float]) -> None:
+    R = rotation_from_rotvec(rotvec)
+    # the angle [rad] of a long vector is itself rounded
+    rounding = ROUNDING * max(1.0, float(np.linalg.norm(rotvec)) / np.pi)
+    assert difference(R, pin.exp3(np.array(rotvec))) < rounding
+    assert difference(R, Rotation.from_rotvec(rotvec).as_matrix()) < rounding
+
+
+def test_a_quaternion_is_x_y_z_w_and_normalised() -> None:
+    for quaternion in np.random.default_rng(1).normal(size=(200, 4)):
+        unit = quaternion / np.linalg.norm(quaternion)
+        R = rotation_from_quaternion(unit)
+        assert difference(R, pin.Quaternion(unit).toRotationMatrix()) < ROUNDING
+        assert difference(R, Rotation.from_quat(unit).as_matrix()) < ROUNDING
+        assert difference(rotation_from_quaternion((1 - 0.9 * QUATERNION_TOLERANCE) * unit), R) < ROUNDING
+
+
+def test_zero_angles_are_exactly_the_identity() -> None:
+    for R in (rotation_from_rpy([0, 0, 0]), rotation_from_rotvec([0, 0, 0]), rotation_from_quaternion([0, 0, 0, 1])):
+        assert difference(R, np.eye(3)) == 0
+
+
+@pytest.mark.parametrize("axis", np.eye(3).tolist())
+def test_half_turns(axis: list[float]) -> None:
+    """About an axis e, all three forms give 2 e eᵀ - I."""
+    e = np.array(axis)
+    expected = 2 * np.outer(e, e) - np.eye(3)
+    for R in (
+        rotation_from_rotvec(np.pi * e),
+        rotation_from_rotvec(-np.pi * e),
+        rotation_from_rpy(np.pi * e),
+        rotation_from_quaternion([*axis, 0.0]),
+    ):
+        assert difference(R, expected) < ROUNDING
+
+
+def test_small_angles_keep_all_their_digits() -> None:
+    """R - I is the cross-product matrix of the vector, up to the square of the angle."""
+    for angle in (1e-160, 1e-20, 1e-12, 1e-9):
+        vector = angle * np.array([0.6, -0.64, 0.48])
+        for R in (rotation_from_rotvec(vector), rotation_from_rpy(vector)):
+            off_diagonal = np.array([R[2, 1], R[0, 2], R[1, 0]])
+            assert difference(off_diagonal, vector, rel=2 * angle + ROUNDING) < 0
+
+
+def test_there_and_back() -> None:
+    for angles in np.random.default_rng(3).uniform(-2 * np.pi, 2 * np.pi, (200, 3)):
+        quaternion = Rotation.from_rotvec(angles).as_quat()
+        from_rotvec, from_quaternion = Pose.from_rotvec(POSITION, angles), Pose.from_quaternion(POSITION, quaternion)
+        assert difference(from_rotvec.T, from_quaternion.T) < ROUNDING
+        back = Pose.from_rotvec(POSITION, pin.log3(from_rotvec.T[:3, :3]))
+        assert difference(back.T, from_rotvec.T) < ANGLE_ROUNDING
+        from_rpy = Pose.from_rpy(POSITION, angles)
+        back = Pose.from_rpy(POSITION, pin.rpy.matrixToRpy(from_rpy.T[:3, :3]))
+        assert difference(back.T, from_rpy.T) < ANGLE_ROUNDING
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        Pose.from_rpy(POSITION, [0.3, -0.8, 2.1]),
+        Pose.from_rotvec(POSITION, [0.3, -0.8, 2.1]),
+        Pose.from_quaternion(POSITION, [0.5, -0.5, 0.5, 0.5]),
+    ],
+    ids=["rpy", "rotvec", "quaternion"],
+)
+def test_a_pose_is_homogeneous_and_read_only(pose: Pose) -> None:
+    assert pose.T[:3, 3].tolist() == POSITION
+    assert pose.T[3].tolist() == [0, 0, 0, 1]
+    with pytest.raises(ValueError, match="read-only"):
+        pose.T[0, 0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("make", "field"),
+    [
+        (lambda: Pose.from_rpy([0, 0], [0, 0, 0]), "pose.position"),
+        (lambda: Pose.from_rpy(POSITION, [0, 0, 0, 0]), "pose.rpy"),
+        (lambda: Pose.from_rpy(POSITION, [0, np.nan, 0]), "pose.rpy"),
+        (lambda: Pose.from_rotvec(POSITION, [0, 0, np.inf]), "pose.rotvec"),
+        (lambda: Pose.from_rotvec(POSITION, "up"), "pose.rotvec"),
+        (lambda: Pose.from_quaternion(POSITION, [0, 0, 1]), "pose.quaternion"),
+        (lambda: Pose.from_quaternion(POSITION, [0, 0, 0, 0]), "pose.quaternion"),
+        (lambda: Pose.from_quaternion(POSITION, [0, 0, 0, 1 + 1.1 * QUATERNION_TOLERANCE]), "pose.quaternion"),
+        (lambda: Pose.from_rotation(POSITION, np.diag([1.0, 1.0, -1.0])), "pose"),
+        (lambda: Pose.from_rotation(POSITION, np.eye(4)), "pose.rotation"),
+    ],
+)
+def test_refusals_name_the_field(make: Callable[[], Any], field: str) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        make()
+    assert refusal.value.field == field
+    assert str(refusal.value).endswith(".")
