@@ -73,12 +73,13 @@ class CollisionModel:
 
     def _prepare(self) -> None:
         bodies, pairs = self.bodies, self.pairs
-        most = max(len(body.points) for body in bodies)
+        most = max((len(body.points) for body in bodies), default=0)
         # shorter cores repeat their last point
         self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
         self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
         self._ring = np.array([body.core.ring for body in bodies])
-        self._middles, self._reach = np.array([b.middle for b in bodies]), np.array([b.reach for b in bodies])
+        self._middles = np.array([body.middle for body in bodies]).reshape(-1, 3)
+        self._reach = np.array([body.reach for body in bodies])
         self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
         self._half = np.array([body.core.half if body.core.half is not None else np.zeros(3) for body in bodies])
         self._T_link_core = np.array([body.T_link_core for body in bodies])
@@ -88,9 +89,9 @@ class CollisionModel:
         first, second = self.links[pairs].T
         # which joints move the second body against the first
         self.between = (joints > first[:, None]) & (joints <= second[:, None])
-        segment = np.array([body.is_segment for body in bodies])[pairs]
-        box = np.array([body.core.half is not None for body in bodies])[pairs]
-        self._plane = plane = np.array([body.core.plane for body in bodies])[pairs][:, 0]
+        segment = np.array([body.is_segment for body in bodies], dtype=bool)[pairs]
+        box = np.array([body.core.half is not None for body in bodies], dtype=bool)[pairs]
+        self._plane = plane = np.array([body.core.plane for body in bodies], dtype=bool)[pairs][:, 0]
         # 0: segments, 1: box and segment, 2: segment and box, 3: half-space, 4: any other
         self._kinds = np.select(
             [plane, segment.all(axis=1), box[:, 0] & segment[:, 1], segment[:, 0] & box[:, 1]], [3, 0, 1, 2], 4

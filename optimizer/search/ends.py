@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array
-from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import inverse_kinematics_for, turns
+from models.robot import Array, Robot
+from optimizer.exceptions import InvalidProblem, NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
+from optimizer.kinematics.inverse import InverseKinematics, inverse_kinematics_for, turns
 from optimizer.kinematics.orientation_tolerance import sample_orientations
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -20,6 +20,8 @@ from optimizer.solution import UnreachableTarget
 SAMPLES, LEAST_SAMPLES = 96, 12
 # share of the tool's cone that a goal of free orientation may use: on the edge nothing would be left for the motion
 INSIDE = 0.999
+# label of joint positions of an arm without named branches
+GIVEN = "given"
 
 
 @dataclass(frozen=True)
@@ -61,16 +63,31 @@ def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], 
     return reached, unreachable
 
 
+def inverse_kinematics_of(robot: Robot) -> InverseKinematics | None:
+    """The robot's inverse kinematics; None for an arm that has none."""
+    try:
+        return inverse_kinematics_for(robot)
+    except ValueError:
+        return None
+
+
+def label_of(robot: Robot, q: Array) -> str:
+    """The branch of joint positions q (nq,); `given` for an arm whose branches have no names."""
+    kinematics = inverse_kinematics_of(robot)
+    return GIVEN if kinematics is None else str(kinematics.label(q))
+
+
 def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, samples: int) -> list[EndConfiguration]:
     problem = prepared.problem
-    kinematics, limits = inverse_kinematics_for(problem.arm.robot), problem.arm.active_limits
+    robot, limits = problem.arm.robot, problem.arm.active_limits
+    if not isinstance(target, Pose | ConeOrientedPose):
+        problem.arm.check_inside(name, target)
+        return [EndConfiguration(label_of(robot, target), target, [[value] for value in target.tolist()], True, index)]
+    kinematics = inverse_kinematics_of(robot)
+    if kinematics is None:
+        raise InvalidProblem(name, f"There is no inverse kinematics for {robot.name}: give joint positions (`q`).")
     if isinstance(target, ConeOrientedPose):
         return _ends_of_samples(prepared, name, target, index, samples)
-    if not isinstance(target, Pose):
-        problem.arm.check_inside(name, target)
-        return [
-            EndConfiguration(str(kinematics.label(target)), target, [[value] for value in target.tolist()], True, index)
-        ]
     solutions = kinematics.solve(target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name)
     solutions = [s for s in solutions if problem.allows(s.label)]
     if not solutions:

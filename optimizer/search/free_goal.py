@@ -18,7 +18,7 @@ import pinocchio as pin
 from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import SINGULAR, inverse_kinematics_for
+from optimizer.kinematics.inverse import SINGULAR
 from optimizer.kinematics.orientation_tolerance import nearest_orientation, tilt
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
@@ -31,7 +31,7 @@ from optimizer.nlp.sqp import FEASIBILITY, solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import UNVISITED, Candidate, bound
-from optimizer.search.ends import EndConfiguration
+from optimizer.search.ends import EndConfiguration, inverse_kinematics_of, label_of
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import REST_POINTS
 from optimizer.trajectories.spline import sample
@@ -101,7 +101,7 @@ def _distance(a: Array, b: Array) -> float:
 
 def _with_goal(prepared: PreparedProblem, candidate: Candidate, q_goal: Array) -> Candidate | None:
     """The candidate with another of its goal's configurations, bounded; None where the arm cannot be there."""
-    label = str(inverse_kinematics_for(prepared.problem.arm.robot).label(q_goal))
+    label = label_of(prepared.problem.arm.robot, q_goal)
     goal = replace(candidate.goal, label=label, q=q_goal, choices=[[value] for value in q_goal.tolist()], fixed=True)
     fresh = Candidate(candidate.start, goal, candidate.q_start, q_goal)
     try:
@@ -242,7 +242,8 @@ def project_to_goal(prepared: PreparedProblem, goal: EndConfiguration, q: Array)
     pose, problem = goal.tolerance, prepared.problem
     assert pose is not None
     R, _ = _tcp(prepared, q)
-    kinematics, limits = inverse_kinematics_for(problem.arm.robot), problem.arm.active_limits
+    kinematics, limits = inverse_kinematics_of(problem.arm.robot), problem.arm.active_limits
+    assert kinematics is not None  # else the goal would have been refused
     T_base_flange = pose.with_orientation(nearest_orientation(pose, R)).T @ np.linalg.inv(problem.arm.T_flange_tcp)
     found = []
     for branch in kinematics.branches(T_base_flange):

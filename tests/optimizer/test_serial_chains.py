@@ -1,0 +1,171 @@
+"""Targets in joint positions, of serial chains of any number of revolute joints, by no inverse kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.interpolate import BSpline
+
+from models.robot import Array, Robot
+from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.inverse import InverseKinematics
+from optimizer.methods import METHODS
+from optimizer.optimize import optimize
+from optimizer.pareto import pareto
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.bus import Bus
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import MethodName, Problem
+from optimizer.problem.targets import AnyOf
+from optimizer.problem.tool_cone import ToolCone
+from optimizer.solution import Solution
+from optimizer.whatif import whatif
+from tests.optimizer import moves
+from tests.optimizer.chains import move, serial_chain
+
+JOINTS = (2, 3, 5, 7)
+OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"duration_max": 1.5}}
+# relative, of the energy: a sum over this many equal steps, of powers that have corners where they change sign
+STEPS, SUMMED = 20001, 1e-3
+# relative, of a limit: the certificate's own tolerance
+HELD = 1e-6
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _no_compiler() -> Iterator[None]:
+    """Compiling the kernels would take minutes, and the virtual machine solves each of these in a second."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PATH", "")
+        yield
+
+
+@pytest.fixture(scope="module", params=JOINTS)
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return serial_chain(request.param)
+
+
+def problem(robot: Robot, objective: str = "electrical", **given: Any) -> Problem:
+    start, goal = move(robot.nq)
+    asked = {"start": start, "goal": goal, "deadline": 120.0, "objective": objective} | OBJECTIVES[objective] | given
+    return Problem(arm=Arm(robot=robot, payload=Payload(mass=0.5)), **asked)
+
+
+def replayed(asked: Problem, solution: Solution) -> tuple[float, dict[str, Array]]:
+    """The objective's energy [J] and the peaks of speed, acceleration and torque, by Pinocchio and SciPy alone."""
+    arm, spline = asked.arm, solution.trajectory.spline
+    model = arm.robot.loaded_model(arm.payload.mass, arm.payload.com, arm.payload.inertia, arm.gravity)
+    data = model.createData()
+    t = np.linspace(0.0, spline.duration, STEPS)
+    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    q, v, a = curve(t), curve(t, 1), curve(t, 2)
+    tau = np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
+    tau_motor = tau + arm.friction_law.torque(v)
+    peaks = {"v_max": np.abs(v).max(axis=0), "a_max": np.abs(a).max(axis=0), "tau_max": np.abs(tau_motor).max(axis=0)}
+    if asked.objective == "mechanical":
+        return float(np.trapezoid(np.abs(tau * v).sum(axis=1), t)), peaks
+    drives, electronics = arm.drives, arm.robot.electronics
+    i = np.abs(tau_motor / drives.torque_constant)
+    joints = tau_motor * v + drives.copper * i**2 + drives.inverter_constant + drives.inverter_linear * i
+    net = electronics.idle_power + electronics.controller_power + joints.sum(axis=1)
+    return float(np.trapezoid(np.maximum(net, 0) - electronics.regeneration * np.maximum(-net, 0), t)), peaks
+
+
+def own_energy(asked: Problem, solution: Solution) -> float:
+    energy = solution.energy
+    return energy.electrical.total if asked.objective == "electrical" else energy.mechanical.total
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_joints_to_joints(robot: Robot, objective: str) -> None:
+    """Certified, above its bound, no worse than any baseline, and worth as much by Pinocchio."""
+    asked = problem(robot, objective)
+    solution = optimize(asked)
+    assert solution.certificate.valid and solution.status == "optimal"
+    energy, peaks = replayed(asked, solution)
+    assert own_energy(asked, solution) == pytest.approx(energy, rel=SUMMED)
+    assert 0 <= solution.lower_bound <= energy
+    for name, peak in peaks.items():
+        assert (peak <= getattr(robot.limits, name) * (1 + HELD)).all()
+    assert solution.trajectory.q[0] == pytest.approx(asked.start, abs=HELD)
+    assert solution.trajectory.q[-1] == pytest.approx(asked.goal, abs=HELD)
+    assert {solution.start.label, solution.goal.label} == {"given"}
+    assert all(each.saving > -SUMMED for each in solution.baselines if each.within_limits)
+
+
+def test_any_of_several_joint_targets(robot: Robot) -> None:
+    start, goal = move(robot.nq)
+    near = start + 0.2 * (goal - start)
+    solution = optimize(problem(robot, goal=AnyOf((goal, near))))
+    assert solution.goal.target == 1 and solution.certificate.valid
+
+
+def test_a_front_and_a_changed_arm(robot: Robot) -> None:
+    """The other ways in take joint positions, too."""
+    asked = problem(robot)
+    front = pareto(asked, 2)
+    assert all(point.certificate.valid for point in front.points)
+    changed = whatif(front.points[-1], problem(robot, deadline=60.0))
+    assert changed.error is None and changed.certificate.valid
+
+
+def test_without_capsules_there_is_nothing_to_collide() -> None:
+    bare = serial_chain(3, capsules=False)
+    solution = optimize(problem(bare))
+    assert solution.certificate.valid and solution.certificate.clearance is None
+
+
+def test_links_keep_clear_of_each_other(robot: Robot) -> None:
+    clearance = optimize(problem(robot)).certificate.clearance
+    # links next to each other are not compared: of two joints, only the base and the last link are left
+    assert clearance is not None and clearance.min_clearance >= 0
+
+
+POSE, FREE = Pose(np.eye(4)), ConeOrientedPose([0.3, 0.1, 0.4])
+
+
+@pytest.mark.parametrize(("end", "target"), [("start", POSE), ("goal", POSE), ("goal", FREE)])
+@pytest.mark.parametrize("several", [False, True])
+def test_a_pose_needs_inverse_kinematics(robot: Robot, end: str, target: Any, several: bool) -> None:
+    with pytest.raises(InvalidProblem, match="give joint positions") as refusal:
+        optimize(problem(robot, **{end: AnyOf((move(robot.nq)[0], target)) if several else target}))
+    assert refusal.value.field == end
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method(method: MethodName) -> None:
+    solution = optimize(problem(serial_chain(3), method=method))
+    assert solution.certificate.valid and solution.lower_bound <= solution.energy.electrical.total
+
+
+def test_limits_along_the_path_waiting_and_a_bus(robot: Robot) -> None:
+    """The TCP's speed and a cone for the tool, a cycle, and energy storage on the bus."""
+    arm = Arm(
+        robot=robot,
+        tcp_speed=0.3,
+        tool_cone=ToolCone([0, 0, 1], [0, 0, 1], np.pi),
+        bus=Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9),
+    )
+    solution = optimize(replace(problem(robot), arm=arm, cycle=Cycle(time=4.0, hold="motors")))
+    assert solution.certificate.valid
+    assert {"tcp_speed", "tool_cone"} < set(solution.certificate.worst_ratio)
+    assert solution.lower_bound <= solution.energy.electrical.total
+
+
+def test_joint_targets_ask_no_inverse_kinematics(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even where there is a closed form: all that it gives then is the label."""
+
+    def solved(*_: Any, **__: Any) -> None:
+        raise AssertionError("inverse kinematics was asked")
+
+    monkeypatch.setattr(InverseKinematics, "solve", solved)
+    monkeypatch.setattr(InverseKinematics, "branches", solved)
+    solution = optimize(moves.problem(deadline=60.0))
+    assert solution.certificate.valid
+    assert solution.start.label.count("/") == solution.goal.label.count("/") == 2
