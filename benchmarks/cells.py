@@ -20,7 +20,7 @@ from optimizer.collision.model import CollisionModel
 from optimizer.collision.path_planner import plan_paths
 from optimizer.deadline import Deadline
 from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.problem.arm import Arm
 from optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Shape, Sphere, capsule_between
 
@@ -87,7 +87,7 @@ def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
 
 def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
     """Configurations (nq,) of a TCP pose that hit nothing."""
-    kinematics = inverse_kinematics_for(arm.robot)
+    kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
         found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal")
     except (UnreachablePose, SingularPose):

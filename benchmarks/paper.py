@@ -21,7 +21,7 @@ from scipy.stats import spearmanr
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import Problem, optimize
-from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.problem.arm import Arm
 from optimizer.replay.evaluate import Evaluation, evaluate
 from optimizer.replay.recording import Waypoints
@@ -172,7 +172,7 @@ def table_1() -> list[str]:
 def table_2() -> list[str]:
     """Waypoints, and ours that reaches the same pose exactly and is nearest."""
     robot = load_robot("ur5e")
-    solver = inverse_kinematics_for(robot)
+    solver = required_inverse_kinematics(robot, "pose")
 
     def text(angles: Array) -> str:
         return ", ".join(f"{angle:.1f}" for angle in np.degrees(angles))

@@ -18,7 +18,7 @@ from models.robot import Array, Robot
 from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.sqp_method import Guess
 from optimizer.optimize import optimize, warm_up
@@ -118,7 +118,7 @@ def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
 
 
 def _branch(robot: Robot, T_goal: Array) -> BranchFilter:
-    label = inverse_kinematics_for(robot).branches(T_goal)[0].label
+    label = required_inverse_kinematics(robot, "goal").branches(T_goal)[0].label
     return BranchFilter(label.shoulder, label.elbow, label.wrist)
 
 

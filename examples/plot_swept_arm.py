@@ -22,6 +22,7 @@ from app.schemas.request import OptimizeRequest
 from models.robot import Array
 from optimizer.collision.bodies import TOOL, Body
 from optimizer.collision.model import CollisionModel
+from optimizer.kinematics.tcp import tcp_pose
 from optimizer.optimize import optimize
 
 # Okabe and Ito's blue to orange, which colour-blind readers can tell apart
@@ -131,8 +132,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     figure = plt.figure(figsize=(9, 7.2))
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     axes.add_collection3d(Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average"))
-    T_last_tcp = problem.arm.robot.T_last_flange @ problem.arm.T_flange_tcp
-    path = (model.frames(curve(np.linspace(0, spline.duration, 200)))[:, -1] @ T_last_tcp)[:, :3, 3]
+    path = tcp_pose(problem.arm, curve(np.linspace(0, spline.duration, 200)))[:, :3, 3]
     axes.plot(*path.T, color="black", linewidth=1.6, zorder=10, label="path of the TCP")
     for point, share, name in ((path[0], 0.0, "start"), (path[-1], 1.0, "goal")):
         axes.scatter(*point, color=to_hex(OVER_TIME(share)), edgecolors="black", s=45, zorder=11, label=name)

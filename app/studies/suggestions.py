@@ -12,11 +12,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from app.convert.arm import robot_named
-from app.convert.pose import to_matrix
+from app.convert.arm import to_arm
 from app.schemas.arm import ArmRequest
 from app.schemas.request import MAX_DURATION, OptimizeRequest
-from optimizer.kinematics.tcp import turned_poses
+from optimizer.kinematics.tcp import rotated_poses
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]
@@ -145,9 +144,9 @@ def _without(request: Fields, *names: str) -> Fields:
     return {name: value for name, value in request.items() if name not in names}
 
 
-def _poses(base: Base, turns: list[Any]) -> list[Fields]:
-    asked = OptimizeRequest.model_validate(base.request)
-    poses = turned_poses(robot_named(asked.robot), to_matrix(asked.tcp), np.array(base.q_goal), turns)
+def _poses(base: Base, rotvecs: list[Any]) -> list[Fields]:
+    arm = to_arm(OptimizeRequest.model_validate(base.request))
+    poses = rotated_poses(arm, np.array(base.q_goal), rotvecs)
     return [{"pose": {"position": at.tolist(), "quaternion": quaternion.tolist()}} for at, quaternion in poses]
 
 

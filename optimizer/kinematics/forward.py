@@ -1,4 +1,4 @@
-"""Forward kinematics of many configurations at once."""
+"""Forward kinematics of n configurations at once."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from models.robot import Array
 
 
 def joint_placements(model: pin.Model) -> Array:
-    """Where every joint of a chain is mounted on the link before it (nq, 4, 4)."""
+    """Poses (nq, 4, 4) of the joints of a chain, each in the frame of the link before it."""
     return np.array([placement.homogeneous for placement in model.jointPlacements][1:])
 
 
 def link_frames(placements: Array, q: Array) -> Array:
-    """T_base_link (n, nq + 1, 4, 4) of revolute joints about z, mounted at `placements`, for q (n, nq) [rad].
+    """T_base_link (n, nq + 1, 4, 4) for q (n, nq) [rad] of revolute joints about z at `placements` (nq, 4, 4).
 
-    The first is the base's own frame, the identity; link k's lies on joint k, with z along its axis.
+    Frame 0 is that of the base, the identity. Frame k, of link k, lies on joint k with z along the joint's axis.
     """
     frames = np.zeros((len(q), q.shape[1] + 1, 4, 4))
     frames[:, 0] = np.eye(4)
-    turns = np.zeros((*q.shape, 4, 4))
-    turns[..., 0, 0] = turns[..., 1, 1] = np.cos(q)
-    turns[..., 1, 0] = np.sin(q)
-    turns[..., 0, 1] = -turns[..., 1, 0]
-    turns[..., 2, 2] = turns[..., 3, 3] = 1
-    turns = placements @ turns
+    rotations = np.zeros((*q.shape, 4, 4))
+    rotations[..., 0, 0] = rotations[..., 1, 1] = np.cos(q)
+    rotations[..., 1, 0] = np.sin(q)
+    rotations[..., 0, 1] = -rotations[..., 1, 0]
+    rotations[..., 2, 2] = rotations[..., 3, 3] = 1
+    steps = placements @ rotations
     for j in range(q.shape[1]):
-        np.matmul(frames[:, j], turns[:, j], out=frames[:, j + 1])
+        np.matmul(frames[:, j], steps[:, j], out=frames[:, j + 1])
     return frames

@@ -1,4 +1,9 @@
-"""Inverse kinematics: every branch of a pose, labelled, with every full turn that the joint ranges allow."""
+"""Inverse kinematics: every branch of a pose, labelled, with every full turn that the joint ranges allow.
+
+`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. So far there is
+one, the closed form of Universal Robots' arms in `ur_closed_form`. For any other arm it returns None: such an arm takes
+joint positions as targets, not poses.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +11,23 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from math import ceil, floor, tau
+from typing import Protocol
 
 import numpy as np
 
 from models.robot import Array, Limits, Robot
-from optimizer.exceptions import SingularPose, UnreachablePose
+from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.ur_closed_form import ROUNDING, ClosedForm
+from optimizer.kinematics.jacobians import geometric_jacobian
+from optimizer.kinematics.tcp import flange_pose
+from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
 from optimizer.problem.branches import Label
-
-__all__ = ["IKSolution", "InverseKinematics", "Label", "inverse_kinematics_for", "turns"]
 
 # Below this smallest singular value of the Jacobian (rows in m and rad) a solution counts as singular. A pose that is
 # singular on paper, once rounded to double precision, has solutions of up to 2e-8. Above it a pose determines the
 # joints to 1e-8 rad. One configuration in 1.5 million drawn at random lies below it.
 SINGULAR = 3e-8
-# of an answer's forward kinematics against the pose [m, rad]
+# greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9
 
 
@@ -48,31 +54,98 @@ class PrincipalSolution:
     smallest_singular_value: float
 
 
-class InverseKinematics:
-    """Solves for one robot. Raises ValueError when built for an arm that has no closed form."""
+class InverseKinematics(Protocol):
+    """Inverse kinematics of one robot."""
 
-    def __init__(self, robot: Robot) -> None:
+    def label(self, q: Array) -> Label:
+        """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
+        ...
+
+    def branches(self, T_base_flange: Array) -> list[PrincipalSolution]:
+        """Every branch that reaches the flange pose (4, 4), singular ones too; an empty list if out of reach."""
+        ...
+
+    def solve(
+        self,
+        T_base_tcp: Array,
+        T_flange_tcp: Array | None = None,
+        limits: Limits | None = None,
+        windings: bool = True,
+        target: str = "goal",
+    ) -> list[IKSolution]:
+        """Every configuration inside the limits (default: the robot's) that puts the TCP at T_base_tcp (4, 4).
+
+        `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity. With `windings` there
+        is one solution for each combination of full turns that the position limits allow. Without, there is one per
+        branch, the one whose joints are nearest to zero. Singular configurations are left out. The solutions of a
+        branch are together, nearest to zero first.
+
+        Raises UnreachablePose or SingularPose, both naming `target`, if there is no solution.
+        """
+        ...
+
+
+@cache
+def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
+    """The robot's inverse kinematics, built once; None for an arm that has none here."""
+    form = URClosedForm.of(robot.model)
+    return None if form is None else ClosedFormInverseKinematics(robot, form)
+
+
+def required_inverse_kinematics(robot: Robot, field: str) -> InverseKinematics:
+    """The robot's inverse kinematics, for the pose in `field` of a request.
+
+    Raises InvalidProblem, with this field named, for an arm that has none here.
+    """
+    kinematics = inverse_kinematics_for(robot)
+    if kinematics is None:
+        raise InvalidProblem(
+            field, f"There is no inverse kinematics for {robot.name}: give joint positions (`q`) instead of a pose."
+        )
+    return kinematics
+
+
+class ClosedForm(Protocol):
+    """All branches of a flange pose as formulas, for one family of arms."""
+
+    def label(self, q: Array) -> Label:
+        """The branch of a configuration q (nq,) [rad]."""
+        ...
+
+    def solve(self, T: Array) -> tuple[Array, list[Label]]:
+        """Configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their n labels."""
+        ...
+
+    def distance_to_reach(self, T: Array) -> float:
+        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution."""
+        ...
+
+
+class ClosedFormInverseKinematics:
+    """`InverseKinematics` by a closed form, each solution confirmed by forward kinematics."""
+
+    def __init__(self, robot: Robot, form: ClosedForm) -> None:
         self._limits = robot.limits
-        self._closed_form = ClosedForm.of(robot.model)
+        self._form = form
         self._placements = joint_placements(robot.model)
         self._T_last_flange = robot.T_last_flange
 
     def label(self, q: Array) -> Label:
-        """The branch of a configuration q (nq,). A full turn of a joint does not change it."""
-        return self._closed_form.label(q)
+        """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
+        return self._form.label(q)
 
     def branches(self, T_base_flange: Array) -> list[PrincipalSolution]:
-        """Every branch that reaches the flange pose (4, 4), singular ones too; none out of reach.
+        """Every branch that reaches the flange pose (4, 4), singular ones too; an empty list if out of reach.
 
-        Raises nothing. Of a continuum of solutions (a stretched wrist) one member stands for all.
+        Of a continuum of solutions (a stretched wrist) one member stands for all.
         """
         T = _orthonormal(T_base_flange)
-        q, labels = self._closed_form.solve(T)
+        q, labels = self._form.solve(T)
         if not labels:
             return []
         T_reached, jacobian = self._forward(q)
         singular_values = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
-        # never a wrong answer: what forward kinematics does not confirm is not one
+        # never a wrong answer: a solution that forward kinematics does not confirm is dropped
         position = np.linalg.norm(T_reached[:, :3, 3] - T[:3, 3], axis=1)
         rotation = np.linalg.norm(T_reached[:, :3, :3] - T[:3, :3], axis=(1, 2)) / np.sqrt(2)
         confirmed = np.maximum(position, rotation) < ACCURACY
@@ -89,22 +162,15 @@ class InverseKinematics:
         windings: bool = True,
         target: str = "goal",
     ) -> list[IKSolution]:
-        """Every configuration inside the limits (default: the robot's) that puts the TCP at T_base_tcp (4, 4).
-
-        With `windings`, one for each combination of full turns that the position limits allow; without, of every branch
-        the one whose joints are nearest to zero. Singular configurations are left out. Each branch's solutions are
-        together, nearest to zero first.
-
-        Raises UnreachablePose or SingularPose, both naming `target`, when there is none.
-        """
-        T = T_base_tcp if T_flange_tcp is None else T_base_tcp @ _inverse(T_flange_tcp)
+        """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see `InverseKinematics`."""
+        T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
         branches = self.branches(T)
         if not branches:
             raise self._out_of_reach(T, target)
         singular, solutions = [], []
         for branch in branches:
-            choices = turns(branch.q, limits.q_min, limits.q_max)
+            choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
             if not all(choices):
                 continue
             value = branch.smallest_singular_value
@@ -122,40 +188,32 @@ class InverseKinematics:
             raise UnreachablePose(
                 target,
                 None,
-                f"The {target} pose is within reach but every arm configuration for it breaks a position limit: "
+                f"The {target} pose is within reach, but every arm configuration for it violates a position limit: "
                 "widen limits.position or move the pose.",
             )
         raise SingularPose(target, max(singular or [branch.smallest_singular_value for branch in branches]))
 
     def _out_of_reach(self, T: Array, target: str) -> UnreachablePose | SingularPose:
-        distance = self._closed_form.distance_to_reach(_orthonormal(T))
+        distance = self._form.distance_to_reach(_orthonormal(T))
         if distance <= ROUNDING:
             # only members of a continuum reach it, other than the one that stands for all
             return SingularPose(target, 0.0)
         return UnreachablePose(
             target,
             distance,
-            f"The {target} pose is {distance:.4g} m out of reach in this orientation: move it closer to where the arm "
-            "can go, or turn it.",
+            f"The {target} pose is {distance:.4g} m out of reach in this orientation: move the position closer to the "
+            "robot's workspace, or change the orientation.",
         )
 
     def _forward(self, q: Array) -> tuple[Array, Array]:
-        """T_base_flange (n, 4, 4) and its geometric Jacobian (n, 6, nq), linear part first, in base axes."""
-        frames = link_frames(self._placements, q)[:, 1:]
+        """T_base_flange (n, 4, 4) and its geometric Jacobian (n, 6, nq)."""
+        frames = link_frames(self._placements, q)
         T = frames[:, -1] @ self._T_last_flange
-        axes, arms = frames[..., :3, 2], T[:, None, :3, 3] - frames[..., :3, 3]
-        jacobian = np.concatenate([np.cross(axes, arms), axes], axis=2).swapaxes(1, 2)
-        return T, jacobian
+        return T, geometric_jacobian(frames, T[:, :3, 3])
 
 
-@cache
-def inverse_kinematics_for(robot: Robot) -> InverseKinematics:
-    """The robot's inverse kinematics, built once. Raises ValueError for an arm that has no closed form."""
-    return InverseKinematics(robot)
-
-
-def turns(q: Array, q_min: Array, q_max: Array) -> list[list[float]]:
-    """Per joint, its angle in q (nq,) with every number of full turns within the limits, nearest to zero first [rad].
+def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[float]]:
+    """Per joint, the angles q + 2πk [rad] within the limits, nearest to zero first; q, q_min, q_max (nq,).
 
     An angle that lies beyond a limit by rounding alone counts as on it.
     """
@@ -173,10 +231,3 @@ def _orthonormal(T: Array) -> Array:
     R = polished[:3, :3]
     polished[:3, :3] = 1.5 * R - 0.5 * R @ R.T @ R
     return polished
-
-
-def _inverse(T: Array) -> Array:
-    inverse = np.eye(4)
-    inverse[:3, :3] = T[:3, :3].T
-    inverse[:3, 3] = -T[:3, :3].T @ T[:3, 3]
-    return inverse

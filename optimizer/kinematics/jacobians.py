@@ -1,4 +1,7 @@
-"""How points of a serial chain move, for many configurations at once. Frames as `kinematics.link_frames` gives them."""
+"""Jacobians of points and directions of a serial chain, for n configurations at once.
+
+The frames (n, nq + 1, 4, 4) are those of `forward.link_frames`.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,9 @@ from models.robot import Array
 
 
 def point_jacobian(frames: Array, link: int, x: Array) -> Array:
-    """∂x/∂q (n, 3, nq) of points x (n, 3) [m] fixed to a link: column j is z_j × (x - p_j), zero beyond the link.
+    """∂x/∂q (n, 3, nq) of points x (n, 3) [m], base frame, fixed to a link: column j is z_j × (x - p_j).
 
-    frames (n, nq + 1, 4, 4); link k is moved by joints 1 … k.
+    Joints 1 … k move link k: the columns of the joints beyond are zero.
     """
     J = np.zeros((len(x), 3, frames.shape[1] - 1))
     axes, origins = frames[:, 1 : link + 1, :3, 2], frames[:, 1 : link + 1, :3, 3]
@@ -19,15 +22,24 @@ def point_jacobian(frames: Array, link: int, x: Array) -> Array:
 
 
 def direction_jacobian(frames: Array, d: Array) -> Array:
-    """∂d/∂q (n, 3, nq) of directions d (n, 3) fixed to the last link: column j is z_j × d."""
+    """∂d/∂q (n, 3, nq) of directions d (n, 3), base frame, fixed to the last link: column j is z_j × d."""
     return np.asarray(np.cross(frames[:, 1:, :3, 2], d[:, None]).transpose(0, 2, 1))
 
 
-def velocity_gradient(frames: Array, J: Array, v: Array) -> Array:
-    """∂(J v)/∂q (n, 3, nq) for a point's Jacobian J (n, 3, nq) and joint speeds v (n, nq).
+def geometric_jacobian(frames: Array, x: Array) -> Array:
+    """Jacobian (n, 6, nq) of a frame fixed to the last link with its origin at x (n, 3) [m].
 
-    A turn of joint k carries along what the joints after it contribute, and moves the point under the turn of the
-    joints up to it: z_k × Σ_{j>k} J_j v_j + (Σ_{j≤k} v_j z_j) × J_k.
+    Rows in base axes: linear velocity [m/rad] first, then angular velocity, whose column j is z_j.
+    """
+    linear = point_jacobian(frames, frames.shape[1] - 1, x)
+    return np.concatenate([linear, frames[:, 1:, :3, 2].transpose(0, 2, 1)], axis=1)
+
+
+def velocity_gradient(frames: Array, J: Array, v: Array) -> Array:
+    """∂(J v)/∂q (n, 3, nq) for a point's Jacobian J (n, 3, nq) and joint speeds v (n, nq) [rad/s].
+
+    Joint k rotates the contributions of the joints after it, and moves the point within the rotation of the joints up
+    to it. Column k is therefore z_k × Σ_{j>k} J_j v_j + (Σ_{j≤k} v_j z_j) × J_k.
     """
     axes = frames[:, 1:, :3, 2]
     parts = J * v[:, None, :]

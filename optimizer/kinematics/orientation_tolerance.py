@@ -9,12 +9,12 @@ from scipy.stats import qmc
 from models.robot import Array
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
-# of the tool's axis against the direction: below it their common normal is any [1]
+# sine of the angle between two axes below which they count as parallel: any common normal will do
 PARALLEL = 1e-12
 
 
 def tilt(pose: ConeOrientedPose, R: Array) -> Array:
-    """Rotation vector (3,) [rad], in the base frame, that takes `direction` to where R (3, 3) puts `axis`."""
+    """Rotation vector (3,) [rad], base frame, from `direction` to `axis` as it points at the orientation R (3, 3)."""
     pointing = R @ pose.axis
     normal = np.cross(pose.direction, pointing)
     sine = float(np.linalg.norm(normal))
@@ -25,12 +25,12 @@ def tilt(pose: ConeOrientedPose, R: Array) -> Array:
 
 
 def excess_angle(pose: ConeOrientedPose, R: Array) -> float:
-    """Angle [rad] by which R (3, 3) lies beyond the orientations allowed: 0 for these."""
+    """Angle [rad] by which the tool axis at R (3, 3) lies outside the cone; 0 for an allowed orientation."""
     return max(0.0, float(np.linalg.norm(tilt(pose, R))) - pose.half_angle)
 
 
 def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
-    """The orientation allowed (3, 3) that is the least rotation away from R (3, 3)."""
+    """The allowed orientation (3, 3) at the least angle from R (3, 3)."""
     excess = excess_angle(pose, R)
     if excess == 0.0:
         return R
@@ -39,9 +39,10 @@ def nearest_orientation(pose: ConeOrientedPose, R: Array) -> Array:
 
 
 def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
-    """So many orientations allowed (count, 3, 3), spread evenly, always the same.
+    """`count` allowed orientations (count, 3, 3), evenly spread and always the same.
 
-    The axis falls evenly on the cone's cap of the sphere, the rotation about it evenly on the circle.
+    The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly over the circle. The
+    points are of a Halton sequence.
     """
     points = qmc.Halton(3, scramble=False).random(count) if pose.half_angle > 0 else np.zeros((count, 3))
     if pose.half_angle == 0:
@@ -51,7 +52,7 @@ def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
     u = _across(pose.direction)
     across = np.cos(2 * np.pi * azimuth)[:, None] * u
     across += np.sin(2 * np.pi * azimuth)[:, None] * np.cross(pose.direction, u)
-    R0 = _turning(pose.axis, pose.direction)
+    R0 = _least_rotation(pose.axis, pose.direction)
     return np.array(
         [
             pin.exp3(t * a) @ R0 @ pin.exp3(2 * np.pi * s * pose.axis)
@@ -67,8 +68,8 @@ def _across(axis: Array) -> Array:
     return np.asarray(across / np.linalg.norm(across))
 
 
-def _turning(a: Array, b: Array) -> Array:
-    """The least rotation (3, 3) that takes the unit vector a to b."""
+def _least_rotation(a: Array, b: Array) -> Array:
+    """The rotation (3, 3) of least angle from the unit vector a to the unit vector b."""
     normal = np.cross(a, b)
     sine = float(np.linalg.norm(normal))
     if sine < PARALLEL:

@@ -1,6 +1,6 @@
-"""Limits on where the arm is and how fast it passes: a tool axis within a cone, speeds of the TCP and the elbow.
+"""Path constraints: a tool axis within a cone, and limits on the speeds of TCP and elbow.
 
-Each gives shares for configurations and speeds: 1 is on the limit, more breaks it; and the gradients of these shares.
+Each gives ratios value / limit for joint positions and speeds, and their gradients. A ratio above 1 violates the limit.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
 from optimizer.problem.tool_cone import ToolCone
 
-# below this a direction's deviation [rad] or a point's speed [m/s] has no gradient to speak of
+# angle [rad] or speed [m/s] below which the gradient is replaced by a finite one: both have a kink at zero
 AT_REST = 1e-9
 
 
 class ConstraintRatios(NamedTuple):
-    """ConstraintRatios (n, c) of c limits, and their gradients by q and by v (n, c, nq)."""
+    """Ratios value / limit (n, c) of c constraints at n states, and their gradients by q and by v (n, c, nq)."""
 
     value: Array
     by_q: Array
@@ -32,19 +32,19 @@ class ConstraintRatios(NamedTuple):
 
 
 class PathConstraint(Protocol):
-    """A limit along the path: names of its c shares, and the shares at n states."""
+    """A constraint along the path: names of its c ratios, and the ratios at n states."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """A name for every share."""
+        """A name for every ratio."""
         ...
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """ConstraintRatios (n, c) for frames (n, nq + 1, 4, 4), q and v (n, nq)."""
+        """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         ...
 
     def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
-        """The same with gradients."""
+        """Ratios and gradients at the same states."""
         ...
 
 
@@ -63,15 +63,15 @@ class ToolConeConstraint:
 
     @staticmethod
     def of(arm: Arm, cone: ToolCone) -> ToolConeConstraint:
-        """The constraint of an arm's cone, its axis turned from the TCP's frame into the last link's."""
+        """The constraint of an arm's cone, with its axis transformed from the TCP frame into that of the last link."""
         return ToolConeConstraint(T_last_tcp(arm)[:3, :3] @ cone.axis, cone.direction, cone.half_angle)
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """ConstraintRatios (n, 1)."""
+        """Ratios (n, 1) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         return (self._angle(frames[:, -1, :3, :3] @ self.axis) / self.half_angle)[:, None]
 
     def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
-        """ConstraintRatios and gradients: the angle grows by -d(cos)/sin."""
+        """Ratios and gradients at the same states; the angle's differential is -d(cos) / sin."""
         pointing = frames[:, -1, :3, :3] @ self.axis
         angle = self._angle(pointing)
         slope = -(self.direction @ direction_jacobian(frames, pointing))
@@ -81,7 +81,7 @@ class ToolConeConstraint:
         )
 
     def _angle(self, pointing: Array) -> Array:
-        """(n,) [rad]; by atan2, exact near zero and near a half turn too."""
+        """Angles (n,) [rad] to `direction`; atan2 is exact near zero and near a half turn, too."""
         across = np.linalg.norm(np.cross(pointing, self.direction), axis=1)
         return np.asarray(np.arctan2(across, pointing @ self.direction))
 
@@ -101,12 +101,12 @@ class PointSpeedConstraint:
         return (self.name,) * len(self.points)
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """ConstraintRatios (n, c)."""
+        """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         velocities = [point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)]
         return np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1) / self.limit
 
     def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
-        """ConstraintRatios and gradients."""
+        """Ratios and gradients at the same states."""
         value, by_q, by_v = [], [], []
         for x in self._positions(frames):
             J = point_jacobian(frames, self.link, x)
@@ -124,30 +124,30 @@ class PointSpeedConstraint:
 
 @dataclass(frozen=True)
 class PathConstraints:
-    """All limits along the path of one arm whose joints are mounted at `placements` (nq, 4, 4)."""
+    """All path constraints of one arm whose joints are mounted at `placements` (nq, 4, 4)."""
 
     placements: Array
     limits: Sequence[PathConstraint]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """A name for every share."""
+        """A name for every ratio."""
         return tuple(name for limit in self.limits for name in limit.names)
 
     def ratios(self, q: Array, v: Array) -> Array:
-        """ConstraintRatios (n, c) at q, v (n, nq)."""
+        """Ratios (n, c) at q [rad] and v [rad/s] (n, nq)."""
         frames = link_frames(self.placements, q)
         return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
     def linearised(self, q: Array, v: Array) -> ConstraintRatios:
-        """ConstraintRatios and gradients at q, v (n, nq)."""
+        """Ratios and gradients at q [rad] and v [rad/s] (n, nq)."""
         frames = link_frames(self.placements, q)
         parts = [limit.linearised(frames, q, v) for limit in self.limits]
         return ConstraintRatios(*(np.concatenate(each, axis=1) for each in zip(*parts, strict=True)))
 
 
 def path_constraint_list(arm: Arm) -> list[PathConstraint]:
-    """Limits on where the tool points and how fast TCP and elbow move."""
+    """The path constraints of an arm: tool cone, speed of the TCP, speed of the elbow."""
     limits: list[PathConstraint] = []
     if arm.tool_cone is not None:
         limits.append(ToolConeConstraint.of(arm, arm.tool_cone))
@@ -159,6 +159,6 @@ def path_constraint_list(arm: Arm) -> list[PathConstraint]:
 
 
 def path_constraints_of(arm: Arm) -> PathConstraints | None:
-    """These limits together, None where there are none."""
+    """The path constraints of an arm together; None if it has none."""
     limits = path_constraint_list(arm)
     return PathConstraints(joint_placements(arm.robot.model), limits) if limits else None

@@ -1,10 +1,10 @@
-"""Inverse kinematics along a path of the TCP: Levenberg-Marquardt from point to point, each from the one before.
+"""Inverse kinematics along a path of the TCP: Levenberg-Marquardt, each point from the configuration of the last.
 
-For positions alone (three equations, so that the arm turns as it likes) or whole poses. A step is the damped least
-squares step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for arms), which of all steps with its
-effect turns the joints least. MINPACK's own, in scipy, takes no fewer equations than unknowns.
+The points are positions alone (three equations, orientation free) or whole poses. A step is the damped least squares
+step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for arms). Of all steps with the same effect, it
+moves the joints least. MINPACK's Levenberg-Marquardt, in scipy, cannot be used: it needs as many equations as unknowns.
 
-A configuration is written only where the path is reached and the arm is not nearly singular and within its limits.
+A configuration is part of the motion only if it reaches its point, is not nearly singular and is within the limits.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ import pinocchio as pin
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
 from optimizer.problem.arrays import frozen
 from optimizer.problem.pose import Pose
 
 MOST_ITERATIONS = 200
-# the search for a point ends below this error [m, rad]: a ten-thousandth of the finest tolerance
+# error [m, rad] at which the search for a point has converged: a ten-thousandth of the finest tolerance
 CONVERGED = 1e-13
-# of a joint [rad]: beyond it the linear model that a step is made for says little
+# longest step of a joint [rad]: beyond it, the linearisation is a poor model
 LONGEST_STEP = 0.5
 LEAST_DAMPING, FIRST_DAMPING, MOST_DAMPING = 1e-15, 1e-3, 1e10
 
@@ -34,7 +35,7 @@ Reason = Literal["unreachable", "near_singular", "outside_limits"]
 
 @dataclass(frozen=True)
 class PathPoint:
-    """What became of a point: the nearest q (nq,) found, its errors [m, rad] and smallest singular value.
+    """Result for one point: the nearest q (nq,) [rad] found, its errors [m, rad] and smallest singular value.
 
     The singular value is of the TCP's Jacobian: its three translational rows [m] for a position, all six [m, rad] for
     a pose. `rotation_error` is None for a position.
@@ -48,23 +49,24 @@ class PathPoint:
 
     @property
     def reached(self) -> bool:
-        """Whether the TCP is where it was asked to be."""
+        """Whether the TCP reaches the point."""
         return self.reason != "unreachable"
 
     @property
     def written(self) -> bool:
-        """Whether the configuration belongs to the motion."""
+        """Whether the configuration is part of the motion."""
         return self.reason is None
 
 
 def follow(
     arm: Arm, targets: Sequence[Pose] | Array, guess: Array, tolerance: float = 1e-6, near_singular: float = 1e-2
 ) -> list[PathPoint]:
-    """Waypoints along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
+    """Configurations along a path of positions (n, 3) [m] or poses of the TCP in the base frame.
 
-    The search for each point starts from the last one that was reached, first from `guess` (nq,) [rad], and once more
-    from the guess where that fails. A point is reached within `tolerance` [m, rad]; `near_singular` is the least
-    smallest singular value that is written. Raises InvalidProblem or OutsideLimits.
+    The search for the first point starts from `guess` (nq,) [rad], for each other point from the last configuration
+    that is part of the motion. If that fails, it starts once more from `guess`. A point is reached if its error is at
+    most `tolerance` [m, rad]. `near_singular` is the least smallest singular value of a configuration that is part of
+    the motion. Raises InvalidProblem or OutsideLimits.
     """
     guess = frozen(guess, (arm.robot.nq,), "guess")
     arm.check_inside("guess", guess)
@@ -109,13 +111,12 @@ class _Search:
 
     def __init__(self, arm: Arm) -> None:
         self._model = arm.robot.model.copy()
-        flange = self._model.frames[self._model.getFrameId("flange")]
-        placement = flange.placement * pin.SE3(np.array(arm.T_flange_tcp))
-        self._tcp = self._model.addFrame(pin.Frame("tcp", flange.parentJoint, placement, pin.FrameType.OP_FRAME))
+        last = self._model.njoints - 1
+        self._tcp = self._model.addFrame(pin.Frame("tcp", last, pin.SE3(T_last_tcp(arm)), pin.FrameType.OP_FRAME))
         self._data = self._model.createData()
 
     def solve(self, wanted: Array, start: Array) -> _Found:
-        """The configuration nearest to a position (3,) or pose (4, 4) that the search from `start` (nq,) comes to."""
+        """The configuration at which the search from `start` (nq,) for a position (3,) or pose (4, 4) ends."""
         q, error, damping = start, self._error(wanted, start), FIRST_DAMPING
         jacobian = self._jacobian(q)[: len(error)]
         for _ in range(MOST_ITERATIONS):
@@ -129,7 +130,7 @@ class _Search:
                 jacobian, damping = self._jacobian(q)[: len(error)], max(damping / 10, LEAST_DAMPING)
             else:
                 damping *= 10
-        # a full turn more or less reaches the same: the nearest is meant
+        # full turns of a joint reach the same pose: the configuration nearest to the start is meant
         q = start + (q - start + np.pi) % (2 * np.pi) - np.pi
         return _Found(
             q,
@@ -139,16 +140,16 @@ class _Search:
         )
 
     def _error(self, wanted: Array, q: Array) -> Array:
-        """From the TCP to what is wanted, in base axes: translation (3,) [m] and, for a pose, rotation (3,) [rad]."""
+        """From the TCP to the point, in base axes: translation (3,) [m] and, for a pose, rotation vector (3,) [rad]."""
         pin.forwardKinematics(self._model, self._data, q)
         T = pin.updateFramePlacement(self._model, self._data, self._tcp)
         if wanted.ndim == 1:
             return np.asarray(wanted - T.translation)
-        turn = T.rotation @ pin.log3(T.rotation.T @ wanted[:3, :3])
-        return np.concatenate([wanted[:3, 3] - T.translation, turn])
+        rotation = T.rotation @ pin.log3(T.rotation.T @ wanted[:3, :3])
+        return np.concatenate([wanted[:3, 3] - T.translation, rotation])
 
     def _jacobian(self, q: Array) -> Array:
-        """Of the TCP (6, nq) in base axes, translation first."""
+        """Geometric Jacobian of the TCP (6, nq) in base axes, linear rows first."""
         return np.asarray(
             pin.computeFrameJacobian(self._model, self._data, q, self._tcp, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         )

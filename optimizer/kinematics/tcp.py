@@ -1,14 +1,15 @@
-"""Where the TCP is, and poses that differ from it by a rotation about its own origin."""
+"""The TCP: its frame, pose and Jacobian, and poses that differ from it by a rotation about its own origin."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from models.robot import Array, Robot
+from models.robot import Array
+from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.kinematics.jacobians import geometric_jacobian
 from optimizer.problem.arm import Arm
 
 
@@ -17,14 +18,34 @@ def T_last_tcp(arm: Arm) -> Array:
     return np.asarray(arm.robot.T_last_flange @ arm.T_flange_tcp)
 
 
-def turned_poses(robot: Robot, T_flange_tcp: Array, q: Array, rotvecs: Sequence[Array]) -> list[tuple[Array, Array]]:
-    """Position (3,) [m] and quaternion x, y, z, w (4,), in the base frame, of the TCP at q (nq,) after each turn.
+def flange_pose(T_base_tcp: Array, T_flange_tcp: Array) -> Array:
+    """Pose (4, 4) of the flange in the base frame that puts the TCP at T_base_tcp (4, 4)."""
+    R, p = T_flange_tcp[:3, :3], T_flange_tcp[:3, 3]
+    T_tcp_flange = np.eye(4)
+    T_tcp_flange[:3, :3] = R.T
+    T_tcp_flange[:3, 3] = -R.T @ p
+    return np.asarray(T_base_tcp @ T_tcp_flange)
 
-    `T_flange_tcp` is (4, 4); each turn is a rotation vector (3,) [rad] in the TCP frame, about the TCP's origin: the
-    position is the same for all.
+
+def tcp_pose(arm: Arm, q: Array) -> Array:
+    """Pose T_base_tcp (..., 4, 4) of the TCP in the base frame for joint positions q (..., nq) [rad]."""
+    q = np.asarray(q, dtype=float)
+    frames = link_frames(joint_placements(arm.robot.model), q.reshape(-1, arm.robot.nq))
+    return np.asarray(frames[:, -1] @ T_last_tcp(arm)).reshape(*q.shape[:-1], 4, 4)
+
+
+def tcp_jacobian(arm: Arm, q: Array) -> Array:
+    """Geometric Jacobian (6, nq) of the TCP at q (nq,) [rad]: linear rows [m] first, in base axes."""
+    frames = link_frames(joint_placements(arm.robot.model), q[None])
+    return np.asarray(geometric_jacobian(frames, (frames[:, -1] @ T_last_tcp(arm))[:, :3, 3])[0])
+
+
+def rotated_poses(arm: Arm, q: Array, rotvecs: Sequence[Array]) -> list[tuple[Array, Array]]:
+    """Position (3,) [m] and quaternion x, y, z, w (4,) of the TCP at q (nq,) [rad] after each rotation, in base frame.
+
+    Each rotation is a rotation vector (3,) [rad] in the TCP frame, about the origin of the TCP. The position is
+    therefore the same for all.
     """
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, np.asarray(q, dtype=float))
-    T = data.oMf[robot.model.getFrameId("flange")].homogeneous @ T_flange_tcp
+    T = tcp_pose(arm, q)
     orientation = Rotation.from_matrix(T[:3, :3])
-    return [(T[:3, 3].copy(), (orientation * Rotation.from_rotvec(turn)).as_quat()) for turn in rotvecs]
+    return [(T[:3, 3].copy(), (orientation * Rotation.from_rotvec(rotvec)).as_quat()) for rotvec in rotvecs]

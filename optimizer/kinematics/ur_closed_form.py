@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics of arms built like Universal Robots': inner axes parallel, the last three offset.
+"""Closed-form inverse kinematics of arms of Universal Robots' form: inner axes parallel, the last three offset.
 
 The arm has the standard Denavit-Hartenberg table
 
@@ -21,15 +21,17 @@ from scipy.optimize import minimize_scalar
 from models.robot import Array
 from optimizer.problem.branches import Label
 
-# how far beyond its reach [m, or sine of the wrist angle] a pose may lie that rounding alone put there
+# distance [m, or sine of the wrist angle] beyond the reach at which a pose may lie by rounding alone
 ROUNDING = 1e-10
-# of the search for the nearest reachable position: both wrists at so many shoulder angles, then refined
+# greatest difference between the table's forward kinematics and the model's [m, 1]
+EQUAL = 1e-12
+# shoulder angles of the search for the nearest reachable position, for each wrist; the best is then refined
 SHOULDER_ANGLES = 720
 
 
 @dataclass(frozen=True)
-class ClosedForm:
-    """The lengths [m] of the table above, signed."""
+class URClosedForm:
+    """The closed form for the signed lengths [m] of the table above."""
 
     d1: float
     a2: float
@@ -39,38 +41,31 @@ class ClosedForm:
     d6: float
 
     @classmethod
-    def of(cls, model: pin.Model) -> ClosedForm:
-        """Read the lengths from a Pinocchio model with a frame `flange`.
-
-        Raises ValueError when the model is not built that way: its branches have no closed form here.
-        """
-        flange = model.getFrameId("flange")
-        if model.nq == 6:
-            data = model.createData()
-            pin.framesForwardKinematics(model, data, np.zeros(6))
-            elbow, wrist_1, wrist_2 = (data.oMi[j].translation for j in (3, 4, 5))
-            end = data.oMf[flange].translation
-            # at zero the arm lies along x, the second axis along -y
-            d1, d4 = float(elbow[2]), -float(wrist_2[1])
-            candidate = cls(
-                d1=d1,
-                a2=float(elbow[0]),
-                a3=float(wrist_1[0] - elbow[0]),
-                d4=d4,
-                d5=d1 - float(end[2]),
-                d6=-float(end[1]) - d4,
-            )
-            if candidate._describes(model, data, flange):
-                return candidate
-        raise ValueError(
-            f"{model.name} has no closed-form inverse kinematics here: only arms with Universal Robots' axes have."
+    def of(cls, model: pin.Model) -> URClosedForm | None:
+        """The closed form of a Pinocchio model with a frame `flange`; None if the table does not describe the model."""
+        if model.nq != 6:
+            return None
+        flange, data = model.getFrameId("flange"), model.createData()
+        pin.framesForwardKinematics(model, data, np.zeros(6))
+        elbow, wrist_1, wrist_2 = (data.oMi[j].translation for j in (3, 4, 5))
+        end = data.oMf[flange].translation
+        # at zero the arm lies along x, the second axis along -y
+        d1, d4 = float(elbow[2]), -float(wrist_2[1])
+        form = cls(
+            d1=d1,
+            a2=float(elbow[0]),
+            a3=float(wrist_1[0] - elbow[0]),
+            d4=d4,
+            d5=d1 - float(end[2]),
+            d6=-float(end[1]) - d4,
         )
+        return form if form._describes(model, data, flange) else None
 
     def _describes(self, model: pin.Model, data: pin.Data, flange: int) -> bool:
-        """Whether forward kinematics by the table is the model's, at configurations in general position."""
+        """Whether the table gives the forward kinematics of the model, at configurations in general position."""
         for q in np.random.default_rng(0).uniform(-pi, pi, (4, 6)):
             pin.framesForwardKinematics(model, data, q)
-            if np.abs(data.oMf[flange].homogeneous - self._forward(q)).max() > 1e-12:
+            if np.abs(data.oMf[flange].homogeneous - self._forward(q)).max() > EQUAL:
                 return False
         return True
 
@@ -104,10 +99,10 @@ class ClosedForm:
         )
 
     def solve(self, T: Array) -> tuple[Array, list[Label]]:
-        """All configurations, shape (n, 6), angles in [-pi, pi], that put the flange at T (4, 4); and their labels.
+        """All configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their labels.
 
-        n is at most eight, zero out of reach. On a singularity the branches that meet there count once, and of a
-        continuum (wrist stretched: sin(q5) = 0) one member stands for all.
+        n is at most eight, and zero if T is out of reach. At a singularity the branches that meet there count once. Of
+        a continuum (wrist stretched: sin(q5) = 0) one member stands for all.
         """
         rows, labels = [], []
         for q1, ahead in self._shoulders(T):
@@ -122,7 +117,7 @@ class ClosedForm:
         return np.clip(q - tau * np.round(q / tau), -pi, pi), labels
 
     def _shoulders(self, T: Array) -> list[tuple[float, float]]:
-        """First angle, and how far ahead of the first axis the last axis' origin then lies [m]."""
+        """First angle, and the distance [m] of the last axis' origin ahead of the first axis at this angle."""
         x, y = float(T[0, 3] - self.d6 * T[0, 2]), float(T[1, 3] - self.d6 * T[1, 2])
         distance = hypot(x, y)
         if distance < abs(self.d4) - ROUNDING:
@@ -176,10 +171,10 @@ class ClosedForm:
         return found
 
     def distance_to_reach(self, T: Array) -> float:
-        """How far T (4, 4) must shift [m], its orientation kept, to have a solution; 0 where it has one.
+        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution; 0 if it has one.
 
-        With the first angle given, the offset out of the arm's plane and the fourth axis' excess over its reach in that
-        plane are at right angles to each other; what is left is a search over that one angle.
+        At a given first angle, the offset out of the arm's plane and the excess of the fourth axis over its reach in
+        this plane are at right angles. The distance is therefore a minimum over one angle.
         """
         least, most = self._reach
         axis = T[:3, 2]
@@ -209,8 +204,9 @@ class ClosedForm:
         return best
 
     def _distance_with_stretched_wrist(self, T: Array) -> float:
-        """The same where the wrist is stretched at an exact first angle, so that the fourth axis may lie anywhere about
-        the fifth joint's circle; infinite elsewhere.
+        """The same distance [m] with the wrist stretched; infinite if no first angle stretches it.
+
+        With the wrist stretched, the fourth axis may lie anywhere on a circle about the fifth joint.
         """
         least, most = self._reach
         best = np.inf

@@ -7,8 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Array, Robot
-from optimizer.exceptions import InvalidProblem, NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import InverseKinematics, inverse_kinematics_for, turns
+from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
+from optimizer.kinematics.inverse import (
+    full_turn_alternatives,
+    inverse_kinematics_for,
+    required_inverse_kinematics,
+)
 from optimizer.kinematics.orientation_tolerance import sample_orientations
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -63,17 +67,9 @@ def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], 
     return reached, unreachable
 
 
-def inverse_kinematics_of(robot: Robot) -> InverseKinematics | None:
-    """The robot's inverse kinematics; None for an arm that has none."""
-    try:
-        return inverse_kinematics_for(robot)
-    except ValueError:
-        return None
-
-
 def label_of(robot: Robot, q: Array) -> str:
     """The branch of joint positions q (nq,); `given` for an arm whose branches have no names."""
-    kinematics = inverse_kinematics_of(robot)
+    kinematics = inverse_kinematics_for(robot)
     return GIVEN if kinematics is None else str(kinematics.label(q))
 
 
@@ -83,9 +79,7 @@ def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, s
     if not isinstance(target, Pose | ConeOrientedPose):
         problem.arm.check_inside(name, target)
         return [EndConfiguration(label_of(robot, target), target, [[value] for value in target.tolist()], True, index)]
-    kinematics = inverse_kinematics_of(robot)
-    if kinematics is None:
-        raise InvalidProblem(name, f"There is no inverse kinematics for {robot.name}: give joint positions (`q`).")
+    kinematics = required_inverse_kinematics(robot, name)
     if isinstance(target, ConeOrientedPose):
         return _ends_of_samples(prepared, name, target, index, samples)
     solutions = kinematics.solve(target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name)
@@ -95,7 +89,8 @@ def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, s
             name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
         )
     return [
-        EndConfiguration(str(s.label), s.q, turns(s.q, limits.q_min, limits.q_max), False, index) for s in solutions
+        EndConfiguration(str(s.label), s.q, full_turn_alternatives(s.q, limits.q_min, limits.q_max), False, index)
+        for s in solutions
     ]
 
 

@@ -13,13 +13,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 
 from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import SINGULAR
+from optimizer.kinematics.inverse import SINGULAR, required_inverse_kinematics
 from optimizer.kinematics.orientation_tolerance import nearest_orientation, tilt
+from optimizer.kinematics.tcp import flange_pose, tcp_jacobian, tcp_pose
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.free_spline import COARSE, FreeSpline
@@ -31,7 +31,7 @@ from optimizer.nlp.sqp import FEASIBILITY, solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import UNVISITED, Candidate, bound
-from optimizer.search.ends import EndConfiguration, inverse_kinematics_of, label_of
+from optimizer.search.ends import EndConfiguration, label_of
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import REST_POINTS
 from optimizer.trajectories.spline import sample
@@ -217,7 +217,8 @@ def goal_constraints(
     prepared: PreparedProblem, pose: ConeOrientedPose, q_goal: Array, radius: float
 ) -> GoalConstraints:
     """To first order, how the goal (nq,) may change: the TCP keeps its place, and its axis stays within the cone."""
-    R, jacobian = _tcp(prepared, q_goal)
+    arm = prepared.problem.arm
+    R, jacobian = tcp_pose(arm, q_goal)[:3, :3], tcp_jacobian(arm, q_goal)
     rows, lower, upper = [jacobian[:3]], [np.zeros(3)], [np.zeros(3)]
     if pose.half_angle < np.pi:
         tilted, pointing = tilt(pose, R), R @ pose.axis
@@ -241,26 +242,14 @@ def project_to_goal(prepared: PreparedProblem, goal: EndConfiguration, q: Array)
     """The configuration (nq,) nearest to q (nq,) that has the TCP in place and an orientation allowed, if any."""
     pose, problem = goal.tolerance, prepared.problem
     assert pose is not None
-    R, _ = _tcp(prepared, q)
-    kinematics, limits = inverse_kinematics_of(problem.arm.robot), problem.arm.active_limits
-    assert kinematics is not None  # else the goal would have been refused
-    T_base_flange = pose.with_orientation(nearest_orientation(pose, R)).T @ np.linalg.inv(problem.arm.T_flange_tcp)
+    arm, limits = problem.arm, problem.arm.active_limits
+    T_base_tcp = pose.with_orientation(nearest_orientation(pose, tcp_pose(arm, q)[:3, :3])).T
+    kinematics = required_inverse_kinematics(arm.robot, "goal")
     found = []
-    for branch in kinematics.branches(T_base_flange):
+    for branch in kinematics.branches(flange_pose(T_base_tcp, arm.T_flange_tcp)):
         if branch.smallest_singular_value < SINGULAR:
             continue
         near = branch.q + 2 * np.pi * np.round((q - branch.q) / (2 * np.pi))
         if problem.allows(branch.label) and ((near >= limits.q_min) & (near <= limits.q_max)).all():
             found.append(near)
     return min(found, key=lambda near: float(np.abs(near - q).max()), default=None)
-
-
-def _tcp(prepared: PreparedProblem, q: Array) -> tuple[Array, Array]:
-    """Orientation (3, 3) of the TCP and its Jacobian (6, nq), linear part first, in base axes."""
-    model, problem = prepared.model, prepared.problem
-    data, flange = model.createData(), model.getFrameId("flange")
-    jacobian = pin.computeFrameJacobian(model, data, q, flange, pin.LOCAL_WORLD_ALIGNED)
-    R_flange = pin.updateFramePlacement(model, data, flange).rotation
-    arm = R_flange @ problem.arm.T_flange_tcp[:3, 3]
-    linear = jacobian[:3] + np.cross(jacobian[3:], arm, axis=0)
-    return np.asarray(R_flange @ problem.arm.T_flange_tcp[:3, :3]), np.concatenate([linear, jacobian[3:]])

@@ -20,6 +20,8 @@ import numpy as np
 from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
 from optimizer.energy.dwell import holding_power
+from optimizer.kinematics.forward import joint_placements
+from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import Candidate
@@ -126,7 +128,7 @@ class _Family:
 
     @cached_property
     def _placements(self) -> Array:
-        return np.array([placement.homogeneous for placement in self.prepared.model.jointPlacements][1:])
+        return joint_placements(self.prepared.model)
 
     @cached_property
     def arms(self) -> Array:
@@ -158,10 +160,8 @@ class _Family:
     @cached_property
     def _tool(self) -> tuple[Array, Array]:
         """T_last_tcp (4, 4), and the TCP's chain: lengths [m] from the fourth joint to the fifth and to the sixth."""
-        model = self.prepared.model
-        flange = model.frames[model.getFrameId("flange")].placement.homogeneous
         lengths = np.linalg.norm(self._placements[INNER + 1 :, :3, 3], axis=1)
-        return np.asarray(flange @ self.prepared.problem.arm.T_flange_tcp), lengths
+        return T_last_tcp(self.prepared.problem.arm), np.asarray(lengths)
 
     @cached_property
     def _shells(self) -> list[tuple[Array, float, float]]:

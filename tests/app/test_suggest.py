@@ -14,7 +14,8 @@ from app.schemas.common import QuaternionPose
 from app.schemas.suggestions import Suggestions
 from models.registry import load_robot
 from optimizer.kinematics.inverse import inverse_kinematics_for
-from optimizer.kinematics.tcp import turned_poses
+from optimizer.kinematics.tcp import rotated_poses
+from optimizer.problem.arm import Arm
 from tests.app.requests import HOME, NEAR, move
 from tests.app.test_studies import ABSENT, SECRET, added, begin
 
@@ -89,7 +90,7 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
     _, content = slow
     robot = load_robot("ur5e")
     T_tcp = to_matrix(QuaternionPose(**TOOL))
-    ((position, _),) = turned_poses(robot, T_tcp, np.array(NEAR), [np.zeros(3)])
+    ((position, _),) = rotated_poses(Arm(robot=robot, T_flange_tcp=T_tcp), np.array(NEAR), [np.zeros(3)])
     goals = [entry["request"]["optimize"]["goal"] for entry in steps(content, "orientation")]
     (free,) = [goal for goal in goals if "pose" in goal]
     assert free["pose"]["orientation"]["free_about"] == [0.0, 0.0, 1.0]
@@ -106,8 +107,8 @@ def test_other_orientations_are_of_the_same_point(slow: Any) -> None:
 
 def test_turns_are_about_the_axis_asked_for() -> None:
     turn = np.array([0.0, 0.0, 0.5])
-    robot = load_robot("ur5e")
-    (at, before), (still_at, after) = turned_poses(robot, np.eye(4), np.array(HOME), [np.zeros(3), turn])
+    arm = Arm(robot=load_robot("ur5e"))
+    (at, before), (still_at, after) = rotated_poses(arm, np.array(HOME), [np.zeros(3), turn])
     R_before, R_after = (
         to_matrix(QuaternionPose(position=[0.0] * 3, quaternion=q.tolist()))[:3, :3] for q in (before, after)
     )

@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline
 
 from models.robot import Array, Robot
 from optimizer.exceptions import InvalidProblem
-from optimizer.kinematics.inverse import InverseKinematics
+from optimizer.kinematics.inverse import ClosedFormInverseKinematics
 from optimizer.methods import METHODS
 from optimizer.optimize import optimize
 from optimizer.pareto import pareto
@@ -164,8 +164,8 @@ def test_joint_targets_ask_no_inverse_kinematics(monkeypatch: pytest.MonkeyPatch
     def solved(*_: Any, **__: Any) -> None:
         raise AssertionError("inverse kinematics was asked")
 
-    monkeypatch.setattr(InverseKinematics, "solve", solved)
-    monkeypatch.setattr(InverseKinematics, "branches", solved)
+    monkeypatch.setattr(ClosedFormInverseKinematics, "solve", solved)
+    monkeypatch.setattr(ClosedFormInverseKinematics, "branches", solved)
     solution = optimize(moves.problem(deadline=60.0))
     assert solution.certificate.valid
     assert solution.start.label.count("/") == solution.goal.label.count("/") == 2

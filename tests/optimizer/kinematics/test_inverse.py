@@ -14,8 +14,8 @@ from scipy.optimize import minimize
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import SINGULAR, IKSolution, inverse_kinematics_for
+from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
+from optimizer.kinematics.inverse import SINGULAR, IKSolution, inverse_kinematics_for, required_inverse_kinematics
 
 ROBOT = load_robot("ur5e")
 IK = inverse_kinematics_for(ROBOT)
@@ -376,12 +376,15 @@ def test_another_kind_of_arm_is_refused() -> None:
     other = ROBOT.model.copy()
     placement = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.2, 0.0), np.array([0.1, 0.0, 0.0]))
     other.jointPlacements[3] = other.jointPlacements[3] * placement
-    with pytest.raises(ValueError, match="closed-form"):
-        inverse_kinematics_for(replace(ROBOT, model=other))
+    robot = replace(ROBOT, model=other)
+    assert inverse_kinematics_for(robot) is None
+    with pytest.raises(InvalidProblem, match="give joint positions") as refusal:
+        required_inverse_kinematics(robot, "goal.any_of.0.pose")
+    assert refusal.value.field == "goal.any_of.0.pose"
 
 
 def test_is_built_once() -> None:
-    assert inverse_kinematics_for(ROBOT) is IK
+    assert inverse_kinematics_for(ROBOT) is IK is required_inverse_kinematics(ROBOT, "goal")
 
 
 def test_answers_are_ordered_by_branch() -> None:
