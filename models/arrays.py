@@ -1,4 +1,4 @@
-"""The one check of arrays that come from a file or a caller: numbers, shape, finite; and read-only ever after."""
+"""The check of arrays from a file or a caller: numbers, of the right shape, finite. They are read-only from then on."""
 
 from __future__ import annotations
 

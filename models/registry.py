@@ -6,13 +6,15 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-import numpy as np
 import pinocchio as pin
 import yaml
 
+from models.arrays import read_only
 from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, LinkCapsule, Robot, link_names
 
 ROBOTS = ("ur5e",)
+# Pinocchio's name of a revolute joint about z
+REVOLUTE = "JointModelRZ"
 
 
 def robot_names() -> tuple[str, ...]:
@@ -31,6 +33,7 @@ def load_robot(name: str) -> Robot:
     drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
     model.armature = drives.rotor_inertia
     limits, electronics, motion = figures["limits"], figures["electronics"], figures["default_motion"]
+    capsules = _capsules(figures, model)
     return Robot(
         name=name,
         title=figures["title"],
@@ -50,13 +53,10 @@ def load_robot(name: str) -> Robot:
         ),
         friction_laws=_friction_laws(figures, model.nq),
         default_motion=DefaultMotion(float(motion["velocity"]["value"]), float(motion["acceleration"]["value"])),
-        capsules=tuple(
-            LinkCapsule(link, _read_only([row[:3], row[3:6]]), row[6])
-            for link, name in enumerate(link_names(model))
-            for row in figures["collision"][name]["value"]
-        ),
-        never_meet=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
+        capsules=capsules,
+        never_in_collision=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
         figures=figures,
+        elbow=_elbow(figures, capsules),
     )
 
 
@@ -70,10 +70,12 @@ def load_figures(name: str) -> dict[str, Any]:
 
 
 def _load_model(name: str) -> pin.Model:
-    """The URDF as a Pinocchio model. Fails on an arm that is not a chain of one-turn joints ending in `flange`."""
+    """The URDF as a Pinocchio model. Raises ValueError if it is not a chain of revolute joints about z to `flange`."""
     model = pin.buildModelFromXML(_read(name, f"{name}.urdf"))
-    if not (model.nq == model.nv == model.njoints - 1 and model.existFrame("flange")):
-        raise ValueError(f"{name}.urdf must be a chain of revolute joints with a link named `flange`.")
+    # the kinematics are those of axes along z, and of an angle for each joint
+    chain = list(model.parents)[1:] == list(range(model.njoints - 1))
+    if not (chain and all(j.shortname() == REVOLUTE for j in list(model.joints)[1:]) and model.existFrame("flange")):
+        raise ValueError(f"{name}.urdf must be a chain of revolute joints about z with a link named `flange`.")
     return model
 
 
@@ -84,17 +86,26 @@ def _read(name: str, file: str) -> str:
 
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:
-    """A figure's value as a read-only array, shape (nq,): the robot is shared by all who load it."""
-    values = _read_only(figure["value"])
-    if values.shape != (nq,):
-        raise ValueError(f"A figure over joints must have {nq} values, not shape {values.shape}.")
-    return values
+    """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises ValueError."""
+    return read_only(figure["value"], (nq,), "A figure over joints")
 
 
-def _read_only(values: Any) -> Array:
-    array = np.array(values, dtype=float)
-    array.setflags(write=False)
-    return array
+def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, ...]:
+    """Capsules of all links, from the base on; those of a link in the order of its figure."""
+    rows = [
+        (link, read_only(row, (7,), f"A capsule of {name}"))
+        for link, name in enumerate(link_names(model))
+        for row in figures["collision"][name]["value"]
+    ]
+    return tuple(LinkCapsule(link, row[:6].reshape(2, 3), float(row[6])) for link, row in rows)
+
+
+def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCapsule | None:
+    """The last capsule of the link that the figure `elbow` names; None for a robot without this figure."""
+    if "elbow" not in figures["collision"]:
+        return None
+    link = figures["collision"]["elbow"]["value"]
+    return [capsule for capsule in capsules if capsule.link == link][-1]
 
 
 def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:

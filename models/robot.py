@@ -1,4 +1,4 @@
-"""What a robot is: its Pinocchio model and the figures that cost energy or set limits."""
+"""A robot: its Pinocchio model, and its figures: limits, drives, electronics, friction, capsules."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Limits:
     tau_max: Array
 
     def scaled(self, factors: Limits | float) -> Limits:
-        """Limits on speed, acceleration, jerk and torque times a factor, or factors per joint."""
+        """These limits with those on speed, acceleration, jerk and torque multiplied by a factor, or one per joint."""
         rates = ("v_max", "a_max", "j_max", "tau_max")
         return replace(
             self,
@@ -35,7 +35,7 @@ class Limits:
         )
 
     def tightened(self, **given: Array | None) -> Limits:
-        """These limits with the given ones in their place. Whether they are tighter is the caller's to check."""
+        """These limits with the given ones in their place. The caller checks that they are tighter."""
         return replace(self, **{name: value for name, value in given.items() if value is not None})
 
 
@@ -45,7 +45,7 @@ class FrictionLaw:
 
     tau_f(v) = coulomb · v / sqrt(v² + knee²) + curved · asinh(v / speed) + viscous · v
 
-    The first term is Coulomb friction whose jump is spread over `knee` [rad/s], the second the concave rise that
+    The first term is Coulomb friction with its step spread over `knee` [rad/s], the second the concave rise that
     strain-wave gears show, the third viscous friction. Arrays have shape (nq,): coulomb, curved [N·m],
     speed [rad/s], viscous [N·m·s/rad].
     """
@@ -87,7 +87,10 @@ class Drives:
 
 @dataclass(frozen=True)
 class Electronics:
-    """What the arm draws besides its motors [W]; `regeneration`: the fraction of surplus that the supply takes back."""
+    """Power [W] of the arm's electronics, without the motors.
+
+    `regeneration` is the fraction of surplus power that is fed back to the supply.
+    """
 
     idle_power: float
     controller_power: float
@@ -96,7 +99,7 @@ class Electronics:
 
 @dataclass(frozen=True)
 class DefaultMotion:
-    """How the robot's own controller moves when it is told nothing: leading-axis trapezoid [rad/s, rad/s²]."""
+    """The robot controller's default motion: speed [rad/s] and acceleration [rad/s²] of a leading-axis trapezoid."""
 
     velocity: float
     acceleration: float
@@ -118,12 +121,13 @@ class LinkCapsule:
 class Robot:
     """A robot arm: serial chain of revolute joints, world frame = `base`, last frame = `flange`. Compared by identity.
 
-    `model` holds link inertias and rotor inertia (as armature) but neither payload nor tilted gravity: those belong
-    to a problem (see `with_payload`). `friction_laws` are named; the first one is the default. `figures` is what
-    `GET /robots/{name}` shows: every figure with its unit, source and trust letter.
+    `model` holds link inertias and rotor inertia (as armature), but neither payload nor tilted gravity: `loaded_model`
+    adds them. `friction_laws` are named; the first one is the default. `figures` is what `GET /robots/{name}` shows:
+    every figure with its unit, source and trust letter.
 
-    Every link lies within its `capsules`. `never_meet` holds pairs of links that cannot touch at any joint positions;
-    neighbours are not among them.
+    Every link lies within its `capsules`. `never_in_collision` holds pairs of links that cannot touch at any joint
+    positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be limited; None for an
+    arm without one.
     """
 
     name: str
@@ -136,8 +140,9 @@ class Robot:
     friction_laws: dict[str, FrictionLaw]
     default_motion: DefaultMotion
     capsules: tuple[LinkCapsule, ...]
-    never_meet: frozenset[tuple[int, int]]
+    never_in_collision: frozenset[tuple[int, int]]
     figures: dict[str, Any] = field(repr=False)
+    elbow: LinkCapsule | None = None
 
     @property
     def nq(self) -> int:
@@ -160,14 +165,6 @@ class Robot:
         return np.asarray(self.model.frames[self.model.getFrameId("flange")].placement.homogeneous)
 
     @property
-    def elbow(self) -> LinkCapsule | None:
-        """The capsule around the elbow, the outermost of the upper arm's; None where no joint is named elbow."""
-        if "elbow_joint" not in self.joint_names:
-            return None
-        link = self.joint_names.index("elbow_joint")
-        return next((capsule for capsule in reversed(self.capsules) if capsule.link == link), None)
-
-    @property
     def friction(self) -> FrictionLaw:
         """The default friction law."""
         return next(iter(self.friction_laws.values()))
@@ -175,11 +172,11 @@ class Robot:
     def loaded_model(
         self, mass: float, com: Array, inertia: Array, gravity: Array, link_mass_scale: Array | None = None
     ) -> pin.Model:
-        """A copy of the model with a payload at the flange and another gravity, for the verifier and the tests.
+        """A copy of the model with a payload fixed to the flange, another gravity and scaled links.
 
-        mass [kg], com [m] in the flange frame, inertia (3, 3) about the com in flange axes [kg·m²],
-        gravity (3,) in the base frame [m/s²]. `link_mass_scale` (nq,) multiplies mass and inertia of the moving links,
-        not of the rotors.
+        mass [kg], com (3,) [m] in the flange frame, inertia (3, 3) [kg·m²] about the com in flange axes, gravity (3,)
+        [m/s²] in the base frame. `link_mass_scale` (nq,) multiplies mass and inertia of the moving links, not of the
+        rotors.
         """
         model = self.model.copy()
         for i, scale in enumerate([] if link_mass_scale is None else link_mass_scale.tolist(), start=1):

@@ -65,7 +65,7 @@ class CollisionModel:
             # next to each other, or never near each other
             apart = [i for i in own if link - self.bodies[i].link > 1]
             if k in own:
-                apart = [i for i in apart if (self.bodies[i].link, link) not in arm.robot.never_meet]
+                apart = [i for i in apart if (self.bodies[i].link, link) not in arm.robot.never_in_collision]
             around = range(len(moved), len(self.bodies)) if link > 0 else ()
             pairs += [(i, k) for i in (*apart, *around)]
         self.pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)

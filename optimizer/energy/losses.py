@@ -3,7 +3,7 @@
 tau_motor = tau + friction(v),  i = tau_motor / torque_constant
 inverter  = constant + linear |i| + quadratic i²  (Hansen, Öltjen, Meike, Ortmaier 2012)
 P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)),  base = idle + controller
-P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0), or as the bus has it: see `optimizer.bus`
+P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0), or as the bus has it: see `optimizer.energy.bus_flow`
 
 The formulas take numpy arrays (report, certificate) or CasADi symbols (optimiser) through `xp`, the module whose
 `sqrt` and `asinh` fit. The optimiser smooths |x| to sqrt(x² + width²); with width 0 the same lines are exact.

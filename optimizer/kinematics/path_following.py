@@ -2,7 +2,7 @@
 
 The points are positions alone (three equations, orientation free) or whole poses. A step is the damped least squares
 step Jᵀ (J Jᵀ + μ I)⁻¹ e (Levenberg 1944, Marquardt 1963; Wampler 1986 for arms). Of all steps with the same effect, it
-moves the joints least. MINPACK's Levenberg-Marquardt, in scipy, cannot be used: it needs as many equations as unknowns.
+moves the joints least. scipy's Levenberg-Marquardt, from MINPACK, needs at least as many equations as unknowns.
 
 A configuration is part of the motion only if it reaches its point, is not nearly singular and is within the limits.
 """

@@ -85,7 +85,7 @@ def electrical(
       P_net + (1 - share) max(-P_net, 0) ≥ P_net. So too for a recuperating bus, whose share is its efficiency.
     - isolated: drawn = base + Σ max(P_j, 0) ≥ base + Σ P_j = P_net.
     - storage: with c charged of the net surplus s, total = ∫ (max(P_net, 0) - efficiency · c - share · (s - c)) dt (see
-      `optimizer.bus`) ≥ ∫ P_net dt, as c ≤ s and neither factor exceeds 1. The charge's fall is in the total, so the
+      `energy.bus_flow`) ≥ ∫ P_net dt, as c ≤ s and neither factor exceeds 1. The charge's fall is in the total, so the
       bound holds whatever the store begins with.
 
     Copper and inverter ≥ their constants.

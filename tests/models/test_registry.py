@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from models import registry
 from models.registry import load_figures, load_robot, robot_names
 from models.robot import Array, Robot
 
@@ -155,6 +156,38 @@ def test_shared_arrays_are_read_only(robot: Robot) -> None:
         robot.limits.q_max[0] = 7.0
 
 
+def test_the_elbow_is_a_figure(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The capsule about the third axis, at the far end of the upper arm; a robot without the figure has no elbow."""
+    assert robot.elbow is not None
+    assert robot.elbow.link == robot.figures["collision"]["elbow"]["value"] == 2
+    placement = robot.model.jointPlacements[3].translation
+    # both ends of the axis lie on the third joint's axis to within a capsule's radius
+    assert np.linalg.norm((robot.elbow.axis - placement)[:, :2], axis=1).max() < robot.elbow.radius
+    figures = load_figures("ur5e")
+    del figures["collision"]["elbow"]
+    monkeypatch.setattr(registry, "load_figures", lambda _: figures)
+    assert load_robot.__wrapped__("ur5e").elbow is None
+
+
+@pytest.mark.parametrize(
+    ("sound", "broken"),
+    [
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 1 0"/>'),
+        ('type="revolute"', 'type="prismatic"'),
+        ('type="revolute"', 'type="continuous"'),
+        ('"flange"', '"tool0"'),
+    ],
+)
+def test_another_kind_of_chain_is_refused(sound: str, broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kinematics here are of angles about z, one a joint: any other axis would give wrong poses without a word."""
+    texts = {file: registry._read("ur5e", file) for file in ("ur5e.urdf", "figures.yaml")}
+    assert sound in texts["ur5e.urdf"]
+    texts["ur5e.urdf"] = texts["ur5e.urdf"].replace(sound, broken)
+    monkeypatch.setattr(registry, "_read", lambda _, file: texts[file])
+    with pytest.raises(ValueError, match="revolute joints about z"):
+        load_robot.__wrapped__("ur5e")
+
+
 # where each link's mesh stands in the URDF's link frame: position and rpy, which the meshes themselves
 # do not say; from the maker's own description
 MESHES: dict[str, tuple[str, list[float], list[float]]] = {
@@ -191,4 +224,4 @@ def test_every_link_has_capsules(robot: Robot) -> None:
     assert robot.link_names == tuple(MESHES)
     assert {capsule.link for capsule in robot.capsules} == set(range(7))
     assert all(0.02 < capsule.radius < 0.1 and not capsule.axis.flags.writeable for capsule in robot.capsules)
-    assert all(first + 1 < second for first, second in robot.never_meet)
+    assert all(first + 1 < second for first, second in robot.never_in_collision)

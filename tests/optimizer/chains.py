@@ -55,7 +55,7 @@ def serial_chain(nq: int, capsules: bool = True) -> Robot:
         },
         default_motion=DefaultMotion(1.0, 1.5),
         capsules=_capsules(model) if capsules else (),
-        never_meet=frozenset(),
+        never_in_collision=frozenset(),
         figures={},
     )
 

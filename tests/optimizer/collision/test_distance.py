@@ -142,10 +142,10 @@ def test_nothing_to_compare() -> None:
 
 def test_links_that_never_meet() -> None:
     """Over every angle of the two joints between: a grid of three degrees and how far they move between its points."""
-    robot = replace(load_robot("ur5e"), never_meet=frozenset())
+    robot = replace(load_robot("ur5e"), never_in_collision=frozenset())
     model = CollisionModel(Arm(robot=robot))
     angles = np.deg2rad(np.arange(0, 360, 3))
-    for first, second in load_robot("ur5e").never_meet - {(0, 2)}:
+    for first, second in load_robot("ur5e").never_in_collision - {(0, 2)}:
         q = np.zeros((len(angles) ** 2, 6))
         q[:, first], q[:, first + 1] = (x.ravel() for x in np.meshgrid(angles, angles))
         for p in np.flatnonzero((model.links[model.pairs] == [first, second]).all(axis=1)):
