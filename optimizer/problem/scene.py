@@ -55,8 +55,8 @@ class Sphere:
 
 
 @dataclass(frozen=True)
-class Capsule:
-    """A segment of `length` [m] along z, centred at the origin, grown by `radius` [m]."""
+class _AlongZ:
+    """A body of revolution of `radius` and `length` [m] along z, centred at the origin."""
 
     radius: float
     length: float
@@ -66,26 +66,29 @@ class Capsule:
         _size("length", self.length)
 
     @property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(_on_axis(self.length), self.radius)
+    def _ends(self) -> Array:
+        """Ends (2, 3) [m] of the axis."""
+        return np.array([[0.0, 0.0, -self.length / 2], [0.0, 0.0, self.length / 2]])
 
 
 @dataclass(frozen=True)
-class Cylinder:
-    """A cylinder of `radius` [m] and `length` [m] along z, centred at the origin."""
-
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        _size("radius", self.radius)
-        _size("length", self.length)
+class Capsule(_AlongZ):
+    """A segment of `length` [m] along z, centred at the origin, grown by `radius` [m]."""
 
     @property
     def core(self) -> Core:
         """The form on which distances are computed."""
-        return Core(_on_axis(self.length), ring=self.radius)
+        return Core(self._ends, self.radius)
+
+
+@dataclass(frozen=True)
+class Cylinder(_AlongZ):
+    """A cylinder of `radius` [m] and `length` [m] along z, centred at the origin."""
+
+    @property
+    def core(self) -> Core:
+        """The form on which distances are computed."""
+        return Core(self._ends, ring=self.radius)
 
 
 @dataclass(frozen=True)
@@ -209,10 +212,6 @@ def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
     return Attachment(Capsule(radius, length), T)
-
-
-def _on_axis(length: float) -> Array:
-    return np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]])
 
 
 def _size(name: str, value: float) -> None:
