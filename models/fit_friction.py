@@ -2,8 +2,8 @@
 
 Both laws are members of `models.robot.FrictionLaw` with non-negative coefficients, fitted on relative errors:
 
-- `curved`: least worst error over the table. For a given `speed` that is a linear programme in coulomb, curved and
-  viscous (Boyd and Vandenberghe, Convex Optimization, 6.1.1), so what is left is a search over `speed`.
+- `curved`: least worst error over the table. For a given `speed` that is a linear program in coulomb, curved and
+  viscous (Boyd and Vandenberghe, Convex Optimization, 6.1.1), so the fit is a search over `speed` alone.
 - `coulomb_viscous`: least squares with `curved` held at zero.
 """
 
@@ -17,13 +17,13 @@ from scipy.optimize import linprog, minimize_scalar, nnls
 from models.registry import load_figures
 from models.robot import Array
 
-# curved · asinh(v / speed) is all but linear above the first and all but logarithmic below the second [rad/s]
+# range of `speed` [rad/s]: below it, curved · asinh(v / speed) is almost logarithmic over the table, above it linear
 LEAST_SPEED, GREATEST_SPEED = 1e-3, 1e1
 STARTS = 60
 
 
 def fit_curved(speed: Array, torque: Array, knee: float) -> tuple[float, float, float, float]:
-    """Coulomb, curved, speed, viscous of one joint from torque [N·m] at speed [rad/s], shape (k,) both."""
+    """Coefficients coulomb, curved, speed, viscous of one joint, from torque (k,) [N·m] at speed (k,) [rad/s]."""
 
     def best(log_speed: float) -> tuple[float, Array]:
         bend = np.arcsinh(speed / np.exp(log_speed))
@@ -47,7 +47,7 @@ def fit_curved(speed: Array, torque: Array, knee: float) -> tuple[float, float, 
 
 
 def fit_coulomb_viscous(speed: Array, torque: Array, knee: float) -> tuple[float, float, float, float]:
-    """Coulomb, curved = 0, speed = 1 (without effect), viscous of one joint; arguments as `fit_curved`."""
+    """Coefficients coulomb, curved = 0, speed = 1 (without effect), viscous of one joint; arguments as `fit_curved`."""
     terms = np.column_stack([speed / np.hypot(speed, knee), speed]) / torque[:, None]
     (coulomb, viscous), _ = nnls(terms, np.ones(speed.size))
     return float(coulomb), 0.0, 1.0, float(viscous)

@@ -166,7 +166,8 @@ class UnreachableTarget(Response):
     reason: str = described(
         "Why, and what to do about it.",
         None,
-        "The goal pose is 0.12 m out of reach in this orientation: move it closer to where the arm can go, or turn it.",
+        "The goal pose is 0.12 m out of reach in this orientation: move the position closer to the robot's workspace, "
+        "or change the orientation.",
     )
 
 

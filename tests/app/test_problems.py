@@ -15,6 +15,7 @@ from app.schemas import errors as problems
 from app.schemas.errors import PROBLEMS, Problem
 from app.settings import Settings
 from tests.app.requests import HOME, move
+from tests.optimizer.chains import serial_chain
 
 DOWN = [0.0, 1.0, 0.0, 0.0]
 
@@ -147,6 +148,13 @@ def test_not_ready(tmp_path: Any) -> None:
         assert client.get("/healthz").json() == {"status": "alive"}
     refused(answer, problems.NotReady)
     assert int(answer.headers["retry-after"]) > 0
+
+
+def test_a_pose_for_an_arm_without_inverse_kinematics(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.routes.ik.robot_named", lambda _: serial_chain(3))
+    answer = client.post("/ik", json={"pose": {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}})
+    (error,) = refused(answer, problems.Validation)["errors"]
+    assert error["loc"] == ["body", "pose"] and "give joint positions" in error["msg"]
 
 
 def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
