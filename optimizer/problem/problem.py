@@ -12,12 +12,12 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.targets import Target, members, validated
+from optimizer.solution import Objective
 
 if TYPE_CHECKING:
     from optimizer.problem.branches import Label
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
-Objective = Literal["electrical", "mechanical"]
 
 
 @dataclass(frozen=True, kw_only=True)
