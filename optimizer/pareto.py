@@ -27,6 +27,7 @@ from optimizer.deadline import Clock
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
 from optimizer.optimize import one_thread
 from optimizer.problem.problem import Problem
+from optimizer.search.fastest import fastest, fastest_of
 from optimizer.search.free_goal import between
 from optimizer.search.run import Run
 from optimizer.solution import Solution
@@ -114,12 +115,12 @@ class _Search:
     def front(self) -> Front:
         """The front. Raises the errors of `pareto`."""
         self.race.prepare()
-        fastest = self.race.fastest()
-        if fastest is None:
-            candidates = [candidate.report() for candidate in self.race.candidates]
-            late = self.race.deadline.passed
+        found = fastest(self.race.incumbent)
+        if found is None:
+            candidates = [candidate.report() for candidate in self.race.incumbent.candidates]
+            late = self.race.incumbent.deadline.passed
             raise DeadlineExceeded(candidates) if late else NoTrajectory(candidates)
-        spline, problem = fastest[1], self.problem
+        spline, problem = found[1], self.problem
         if problem.duration_max is not None and spline.duration > problem.duration_max:
             raise DurationTooShort(spline.duration)
         first = max(spline.duration, problem.duration_min or 0.0)
@@ -165,10 +166,10 @@ class _Search:
         """Work on a run, and note what comes of it; `duration` [s] is where it belongs if nothing does."""
         try:
             answer = run.solution()
-            node = _Node(answer.duration, answer, run.prepared.objective_of(answer.energy))
+            node = _Node(answer.duration, answer, answer.energy.of(self.problem.objective))
         except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
             node = _Node(duration, None, reason=str(error))
-        self.solves += run.solves
+        self.solves += run.incumbent.solves
         self.nodes.append(node)
         self.nodes.sort(key=lambda node: (node.duration, node.energy))
         return node
@@ -183,9 +184,9 @@ class _Search:
         self.entered.add(key)
         run = self.run([])
         run.prepare()
-        candidate = between(run.prepared, run.candidates, q_start, q_goal)
-        spline = run.fastest_of(candidate)
-        self.solves += run.solves
+        candidate = between(run.incumbent.prepared, run.incumbent.candidates, q_start, q_goal)
+        spline = fastest_of(run.incumbent, candidate)
+        self.solves += run.incumbent.solves
         if spline is None or not distinct(left.duration, spline.duration):
             return False
         durations = [spline.duration * (1 - share) for share in BEFORE_JUMP]
@@ -246,14 +247,14 @@ class _Search:
                 points.append(node.answer)
                 least = node.energy
         if not points:
-            raise DeadlineExceeded([candidate.report() for candidate in self.race.candidates])
+            raise DeadlineExceeded([candidate.report() for candidate in self.race.incumbent.candidates])
         return Front(
             status="optimal" if complete and all(point.status == "optimal" for point in points) else "feasible",
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],
             wall_time=self.clock() - self.began,
-            nlp_solves=self.solves + self.race.solves,
+            nlp_solves=self.solves + self.race.incumbent.solves,
         )
 
 

@@ -142,4 +142,4 @@ class PreparedProblem(Plant):
 
     def objective_of(self, energy: Energy) -> float:
         """The part of an energy that is minimised [J]."""
-        return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total
+        return energy.of(self.problem.objective)

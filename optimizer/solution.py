@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Literal
 
 from models.robot import Array
 from optimizer.trajectories.spline import Spline
+
+# what is minimised: energy drawn from the supply, or mechanical work
+Objective = Literal["electrical", "mechanical"]
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,10 @@ class Energy:
     mean_power: float
     storage: StorageUse | None = None
 
+    def of(self, objective: Objective) -> float:
+        """The part of the energy that an objective minimises [J]."""
+        return self.electrical.total if objective == "electrical" else self.mechanical.total
+
     def with_dwell(self, dwell: float) -> Energy:
         """The same with energy [J] drawn while the arm waits afterwards."""
         electrical = self.electrical
@@ -124,7 +132,14 @@ class UnreachableTarget:
     reason: str
 
 
-CandidateStatus = Literal["solved", "pruned", "infeasible", "failed", "unvisited"]
+class CandidateStatus(StrEnum):
+    """Outcome of a candidate."""
+
+    SOLVED = "solved"
+    PRUNED = "pruned"
+    INFEASIBLE = "infeasible"
+    FAILED = "failed"
+    UNVISITED = "unvisited"
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from optimizer.exceptions import JoulepathError
 from optimizer.optimize import one_thread, optimize
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem, narrowed
-from optimizer.search.run import SLACK, Run
+from optimizer.search.incumbent import SLACK
+from optimizer.search.run import Run
 from optimizer.solution import Certificate, Energy, Solution
 
 
@@ -50,7 +51,7 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
     except JoulepathError as error:
         return Changed(energy, certificate, None, error)
     left = deadline.left
-    same, best = prepared.objective_of(energy), prepared.objective_of(found.energy)
+    same, best = energy.of(problem.objective), found.energy.of(problem.objective)
     if certificate.valid and same < best * (1 - SLACK) and left > 0:
         try:
             with one_thread():
@@ -58,5 +59,5 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
         except JoulepathError:
             # too little time was left: the first answer stands
             return Changed(energy, certificate, found, None)
-        found = min(found, again, key=lambda each: prepared.objective_of(each.energy))
+        found = min(found, again, key=lambda each: each.energy.of(problem.objective))
     return Changed(energy, certificate, found, None)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.convert.fields import fields
-from app.convert.solution import _gap, _objective, baseline_fields, to_response
+from app.convert.solution import _gap, baseline_fields, to_response
 from app.schemas import request as asked
 from app.schemas.compare import ROW_FIELDS, CompareRequest
 from optimizer.problem.problem import MethodName
@@ -20,7 +20,7 @@ def to_comparison(
     failed: Mapping[MethodName, dict[str, Any]],
 ) -> dict[str, Any]:
     """The answer of `POST /compare`: what every method found, at least one, or the problem that it met."""
-    energies = {method: _objective(request, solution) for method, solution in found.items()}
+    energies = {method: solution.energy.of(request.objective) for method, solution in found.items()}
     best = min(energies, key=energies.__getitem__)
     # the same candidates, so the same bound, whatever the method
     bound = found[best].lower_bound

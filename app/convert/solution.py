@@ -28,7 +28,7 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "energy": {
             **energy_fields(solution.energy),
             "lower_bound": solution.lower_bound,
-            "optimality_gap": _gap(solution.lower_bound, _objective(request, solution)),
+            "optimality_gap": _gap(solution.lower_bound, solution.energy.of(request.objective)),
         },
         "baselines": baseline_fields(solution),
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
@@ -36,11 +36,6 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "certificate": certificate_fields(solution.certificate),
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
     }
-
-
-def _objective(request: asked.MotionRequest, solution: Solution) -> float:
-    energy = solution.energy
-    return energy.electrical.total if request.objective == "electrical" else energy.mechanical.total
 
 
 def _gap(bound: float, energy: float) -> float:

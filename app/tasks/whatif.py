@@ -137,16 +137,13 @@ class _Optimized(_Work):
         self, asked: OptimizeRequest, change: Change, content: dict[str, Any], found: Changed, best: Solution
     ) -> dict[str, Any]:
         _check(best)
-        totals = [
-            energy.electrical.total if asked.objective == "electrical" else energy.mechanical.total
-            for energy in (best.energy, found.same_motion)
-        ]
+        change_of_energy = best.energy.of(asked.objective) - found.same_motion.of(asked.objective)
         outcome = {
             "answer": self.shelf.add(to_response(_changed(asked, change), self.request_id, best)),
             "status": best.status,
             **_against(content, best.energy, best.duration),
         }
-        return {"reoptimised": outcome, "reoptimisation": totals[0] - totals[1]}
+        return {"reoptimised": outcome, "reoptimisation": change_of_energy}
 
 
 class _Evaluated(_Work):

@@ -12,9 +12,9 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.targets import Target, members, validated
+from optimizer.solution import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
-Objective = Literal["electrical", "mechanical"]
 
 # bounds on every planned duration [s]; the first also holds if start and goal are the same
 LEAST_DURATION = 0.01

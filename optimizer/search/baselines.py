@@ -57,7 +57,6 @@ def baselines(
         energy = motion_energy(problem, motion, tau, potential)
         if problem.cycle is not None:
             energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
-        theirs = energy.electrical.total if problem.objective == "electrical" else energy.mechanical.total
         result.append(
             Baseline(
                 name=name,
@@ -65,7 +64,7 @@ def baselines(
                 electrical=energy.electrical.total,
                 mechanical=energy.mechanical.total,
                 within_limits=within_limits(problem, motion, tau) and satisfies_path_constraints(motion.q, motion.v),
-                saving=saving(ours, theirs),
+                saving=saving(ours, energy.of(problem.objective)),
             )
         )
     return result

@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 from optimizer.deadline import Deadline
 from optimizer.methods.method import SolveResult
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Candidate
-
-PRUNED = "its lower bound is not below the best energy found"
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.solution import CandidateStatus
 
 
 def explore(
@@ -19,28 +18,29 @@ def explore(
     deadline: Deadline,
     most_solved: int | None = None,
 ) -> Candidate | None:
-    """Solve candidates in order of bound until no bound is below the best found; returns the best, None if none.
+    """Solve candidates in order of lower bound until none is below the incumbent; returns it, None if there is none.
 
-    With `most_solved`, candidates beyond so many solved ones are left unless a bound rules them out.
+    After `most_solved` solved candidates the others are not solved.
     """
     best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
     for candidate in sorted(candidates, key=lambda e: (e.lower_bound, e.shortest)):
-        if candidate.status != "unvisited" or candidate.deferred:
+        if candidate.status is not CandidateStatus.UNVISITED or candidate.deferred:
             continue
         if best is not None and best.energy is not None and candidate.lower_bound >= best.energy:
-            candidate.status, candidate.reason = "pruned", PRUNED
+            candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
             continue
-        if most_solved is not None and sum(e.status == "solved" for e in candidates) >= most_solved:
-            candidate.reason = f"the method solves no more than {most_solved} candidates"
+        if most_solved is not None and sum(e.status is CandidateStatus.SOLVED for e in candidates) >= most_solved:
+            message = f"the method solves no more than {most_solved} candidates"
+            candidate.settle(CandidateStatus.UNVISITED, Reason.ENOUGH_SOLVED, message)
             continue
         if deadline.passed:
             break
-        candidate.attempt = outcome = attempt(candidate)
-        if outcome.status == "out of time":
+        candidate.attempt = result = attempt(candidate)
+        if result.status == "out of time":
             break
-        candidate.status, candidate.reason = outcome.status, outcome.reason
-        if outcome.spline is not None:
-            candidate.energy = prepared.objective_of(prepared.energy(outcome.spline))
+        candidate.settle(CandidateStatus(result.status), Reason.METHOD, result.reason)
+        if result.spline is not None:
+            candidate.energy = prepared.objective_of(prepared.energy(result.spline))
             if best is None or best.energy is None or candidate.energy < best.energy:
                 best = candidate
     return best

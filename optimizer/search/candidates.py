@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from itertools import product
 
 import numpy as np
@@ -18,21 +19,34 @@ from optimizer.search.end_feasibility import check_configurations, raise_if_none
 from optimizer.search.ends import EndConfiguration
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.solution import CandidateReport, CandidateStatus
+from optimizer.trajectories.spline import Spline
 
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
 MOST_PAIRS = 32768
 # two relative windings that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
-UNVISITED = "not reached before the deadline"
-DEFERRED = "other orientations have smaller lower bounds"
+
+
+class Reason(Enum):
+    """Why a candidate has its status. The value is the message; a candidate may carry a more exact one beside it."""
+
+    NOT_REACHED = "not reached before the deadline"
+    DEFERRED = "other orientations have smaller lower bounds"
+    ENOUGH_SOLVED = "the method solves no more candidates"
+    BOUND = "its lower bound is not below the best energy found"
+    INVALID_END = "the arm cannot be at one of its ends"
+    TOO_SLOW = "takes longer than allowed"
+    METHOD = "as the method says"
+    NOT_CONFIRMED = "the certificate did not confirm it"
 
 
 @dataclass
 class Candidate:
-    """A start and goal pair and what is known of it; `energy` is exact, in the objective [J].
+    """A start and goal configuration with the state of their search; `energy` [J] is the exact value of the objective.
 
-    What is `deferred` is not explored: there are others like it that promise more.
+    `shortest` [s] is a proven least duration. `holdable`: the arm can be at both ends. A candidate that is `deferred`
+    is not solved yet, because similar candidates have a smaller lower bound.
     """
 
     start: EndConfiguration
@@ -41,27 +55,38 @@ class Candidate:
     q_goal: Array
     lower_bound: float = 0.0
     shortest: float = 0.0
-    status: CandidateStatus = "unvisited"
-    reason: str = UNVISITED
+    status: CandidateStatus = CandidateStatus.UNVISITED
+    reason: Reason = Reason.NOT_REACHED
+    message: str = Reason.NOT_REACHED.value
     energy: float | None = None
     attempt: SolveResult | None = field(default=None, repr=False)
     holdable: bool = True
     deferred: bool = False
 
+    def settle(self, status: CandidateStatus, reason: Reason, message: str | None = None) -> None:
+        """Set the status with its reason; the `message` is the reason's own unless given."""
+        self.status, self.reason, self.message = status, reason, reason.value if message is None else message
+
+    @property
+    def spline(self) -> Spline:
+        """The motion of a solved candidate."""
+        assert self.attempt is not None and self.attempt.spline is not None
+        return self.attempt.spline
+
     @property
     def duration(self) -> float:
-        """Length of the motion found [s]; NaN where none is."""
+        """Duration of the motion found [s]; NaN if there is none."""
         return self.attempt.spline.duration if self.attempt and self.attempt.spline else np.nan
 
     def report(self) -> CandidateReport:
-        """The candidate as it is answered."""
+        """The candidate as the answer reports it."""
         return CandidateReport(
             start=self.start.label,
             goal=self.goal.label,
             q_start=self.q_start,
             q_goal=self.q_goal,
             status=self.status,
-            reason=self.reason,
+            reason=self.message,
             lower_bound=self.lower_bound,
             energy=self.energy,
             duration=None if self.energy is None else self.duration,
@@ -99,9 +124,10 @@ def pairs(
                 )
             for combination in product(*options):
                 both = np.array(combination)
-                result.append(Candidate(start, goal, both[:, 0], both[:, 1], deferred=goal.tolerance is not None))
-                if goal.tolerance is not None:
-                    result[-1].reason = DEFERRED
+                candidate = Candidate(start, goal, both[:, 0], both[:, 1], deferred=goal.tolerance is not None)
+                if candidate.deferred:
+                    candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+                result.append(candidate)
     return result
 
 
@@ -147,10 +173,11 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
         for name in ("start", "goal"):
             ruling = ruled_out[id(getattr(candidate, name))]
             if ruling is not None:
-                candidate.status, candidate.reason = "infeasible", f"at the {name}, {ruling.reason}"
+                message = f"at the {name}, {ruling.reason}"
+                candidate.settle(CandidateStatus.INFEASIBLE, Reason.INVALID_END, message)
                 candidate.lower_bound, candidate.holdable = np.inf, False
                 break
         if candidate.holdable and not np.isfinite(value):
-            candidate.status, candidate.reason = "infeasible", f"takes at least {least:.4f} s"
+            candidate.settle(CandidateStatus.INFEASIBLE, Reason.TOO_SLOW, f"takes at least {least:.4f} s")
     for name, ends in sides.items():
         raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in ends], ruled[name])

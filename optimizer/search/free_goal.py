@@ -9,18 +9,16 @@ held, until turning pays no more.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.deadline import Deadline
 from optimizer.exceptions import JoulepathError
 from optimizer.kinematics.inverse import SINGULAR, required_inverse_kinematics
 from optimizer.kinematics.orientation_tolerance import nearest_orientation, tilt
 from optimizer.kinematics.tcp import flange_pose, tcp_jacobian, tcp_pose
-from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.free_spline import COARSE, FreeSpline
 from optimizer.methods.method import SolveResult
@@ -30,8 +28,11 @@ from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import FEASIBILITY, solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.search.candidates import UNVISITED, Candidate, bound
+from optimizer.search.attempts import solver_of
+from optimizer.search.candidates import Candidate, Reason, bound
 from optimizer.search.ends import EndConfiguration, label_of
+from optimizer.search.incumbent import Incumbent
+from optimizer.solution import CandidateStatus
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import REST_POINTS
 from optimizer.trajectories.spline import sample
@@ -59,10 +60,11 @@ def activate_deferred(candidates: Sequence[Candidate]) -> bool:
     opened = 0
     for candidate in sorted((e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)):
         kind = (candidate.start.label, candidate.goal.label, candidate.goal.target)
-        if candidate.status != "unvisited" or alike[kind] == ALIKE:
+        if candidate.status is not CandidateStatus.UNVISITED or alike[kind] == ALIKE:
             continue
         alike[kind] += 1
-        candidate.deferred, candidate.reason = False, UNVISITED
+        candidate.deferred = False
+        candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
         opened += 1
         if opened == BATCH:
             break
@@ -111,38 +113,33 @@ def _with_goal(prepared: PreparedProblem, candidate: Candidate, q_goal: Array) -
     return fresh
 
 
-def refine_goals(
-    prepared: PreparedProblem,
-    candidates: Sequence[Candidate],
-    count: Callable[[SolveResult], SolveResult],
-    deadline: Deadline,
-) -> list[Candidate]:
-    """New candidates, better than those they were turned from: the best solved samples, each of branches of its own."""
+def refine_goals(incumbent: Incumbent) -> list[Candidate]:
+    """New candidates, found by refining the goal orientation of the best solved samples.
+
+    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of less energy than their
+    sample are returned.
+    """
+    solved = [each for each in incumbent.candidates if each.energy is not None and each.goal.tolerance is not None]
     chosen: dict[tuple[str, str, int], Candidate] = {}
-    for candidate in sorted((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0):
-        if candidate.goal.tolerance is not None:
-            chosen.setdefault((candidate.start.label, candidate.goal.label, candidate.goal.target), candidate)
-    turned = [
-        (candidate, refine_goal(prepared, candidate, count, deadline))
-        for candidate in list(chosen.values())[:MOST_REFINED]
-    ]
-    return [better for candidate, better in turned if better is not candidate]
+    for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
+        chosen.setdefault((candidate.start.label, candidate.goal.label, candidate.goal.target), candidate)
+    samples = list(chosen.values())[:MOST_REFINED]
+    refined = [(candidate, refine_goal(incumbent, candidate)) for candidate in samples]
+    return [better for candidate, better in refined if better is not candidate]
 
 
-def refine_goal(
-    prepared: PreparedProblem, candidate: Candidate, count: Callable[[SolveResult], SolveResult], deadline: Deadline
-) -> Candidate:
-    """The candidate with its goal turned for as long as that pays; the candidate itself where it does not pay.
+def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
+    """The candidate with its goal moved over the goal set while the energy decreases; itself if it never does.
 
-    `count` is told of every attempt. The candidate must be solved, its goal's orientation free in part.
+    The candidate must be solved, and its goal's orientation free in part.
     """
     best, radius = candidate, RADIUS
     for _ in range(ROUNDS):
-        if deadline.passed or radius < LEAST_RADIUS:
+        if incumbent.deadline.passed or radius < LEAST_RADIUS:
             break
-        guess = _proposal(prepared, best, radius, count, deadline)
-        q_goal = None if guess is None else project_to_goal(prepared, best.goal, guess.points[-1])
-        fresh = None if guess is None or q_goal is None else _solved(prepared, best, q_goal, guess, count, deadline)
+        guess = _proposal(incumbent, best, radius)
+        q_goal = None if guess is None else project_to_goal(incumbent.prepared, best.goal, guess.points[-1])
+        fresh = None if guess is None or q_goal is None else _solved(incumbent, best, q_goal, guess)
         if fresh is None or (fresh.energy or 0.0) >= (best.energy or 0.0):
             radius /= 4
             continue
@@ -153,64 +150,53 @@ def refine_goal(
     return best
 
 
-def _solved(
-    prepared: PreparedProblem,
-    candidate: Candidate,
-    q_goal: Array,
-    guess: Guess,
-    count: Callable[[SolveResult], SolveResult],
-    deadline: Deadline,
-) -> Candidate | None:
-    """The candidate with another goal, solved; None where it has no motion."""
+def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Guess) -> Candidate | None:
+    """The candidate with another goal (nq,) [rad], solved; None if it has no motion."""
+    prepared = incumbent.prepared
     fresh = _with_goal(prepared, candidate, q_goal)
     if fresh is None:
         return None
-    solver = solver_for(prepared, candidate.q_start, q_goal, deadline, _window(prepared, q_goal, guess.duration))
+    solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))
     guess.points[-REST_POINTS:] = q_goal
-    # the guess is a motion of the free spline's own kind, for other methods just a goal
-    outcome = count(solver.improve(guess) if type(solver) is FreeSpline else solver.solve())
-    if outcome.spline is None:
+    # the guess is a motion of the free spline's own kind; other methods only take its goal
+    result = incumbent.add_effort(solver.improve(guess) if type(solver) is FreeSpline else solver.solve())
+    if result.spline is None:
         return None
-    fresh.attempt, fresh.status, fresh.reason = outcome, "solved", REFINED_GOAL
-    fresh.energy = prepared.objective_of(prepared.energy(outcome.spline))
+    fresh.attempt = result
+    fresh.settle(CandidateStatus.SOLVED, Reason.METHOD, REFINED_GOAL)
+    fresh.energy = prepared.objective_of(prepared.energy(result.spline))
     return fresh
 
 
-def _proposal(
-    prepared: PreparedProblem,
-    candidate: Candidate,
-    radius: float,
-    count: Callable[[SolveResult], SolveResult],
-    deadline: Deadline,
-) -> Guess | None:
-    """The motion of least energy to any goal on the plane that touches the continuum at the candidate's goal."""
-    assert (
-        candidate.goal.tolerance is not None and candidate.attempt is not None and candidate.attempt.spline is not None
-    )
-    spline, problem = candidate.attempt.spline, prepared.problem
+def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Guess | None:
+    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away."""
+    assert candidate.goal.tolerance is not None
+    prepared, spline = incumbent.prepared, candidate.spline
     space = bspline.uniform(COARSE)
     if spline.degree == space.degree and len(spline.control_points) == COARSE:
         points = spline.control_points
     else:
         at = np.linspace(0.0, 1.0, FIT_SAMPLES)
         points = space.fit(sample(spline, at * spline.duration)[0], at)
-    coordinates = Coordinates.joints(candidate.q_start, candidate.q_goal, problem.arm.active_limits)
-    interval = _window(prepared, candidate.q_goal, spline.duration)
+    coordinates = Coordinates.joints(candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits)
+    interval = _interval_of(prepared, candidate.q_goal, spline.duration)
     allowed = goal_constraints(prepared, candidate.goal.tolerance, candidate.q_goal, radius)
     program = NonlinearProgram(
         prepared.kernel, space, interval.p, coordinates, interval.t_min, interval.t_max, interval.constant, allowed
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
-    result = solve(program, free, spline.duration, None, deadline)
-    count(SolveResult("failed", "a proposal", result.iterations, 1))
+    result = solve(program, free, spline.duration, None, incumbent.deadline)
+    incumbent.add_effort(SolveResult("failed", "a proposal", result.iterations, 1))
     if result.violation > FEASIBILITY:
         return None
     return Guess(space, program.points(result.free), result.duration)
 
 
-def _window(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:
-    """Of the duration_intervals of durations, the one that a motion of that duration [s] is in, or else the nearest."""
-    return min(duration_intervals(prepared, q_goal), key=lambda w: max(w.t_min - duration, duration - w.t_max, 0.0))
+def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:
+    """The interval of durations that holds `duration` [s], else the nearest."""
+    return min(
+        duration_intervals(prepared, q_goal), key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0)
+    )
 
 
 def goal_constraints(

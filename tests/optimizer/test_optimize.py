@@ -72,8 +72,7 @@ def _compiled() -> None:
 
 def total(solution: Solution, task: Problem) -> float:
     """The energy that was minimised [J]."""
-    energy = solution.energy
-    return energy.electrical.total if task.objective == "electrical" else energy.mechanical.total
+    return solution.energy.of(task.objective)
 
 
 def shortest(start: Array = START, goal: Array = GOAL, **given: Any) -> float:
@@ -356,7 +355,7 @@ def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refuse
             return replace(honest, worst_ratio=honest.worst_ratio | {"torque": 1.01})
         return honest
 
-    monkeypatch.setattr("optimizer.search.run.certify", judge)
+    monkeypatch.setattr("optimizer.search.incumbent.certify", judge)
     task = problem(goal=tcp_pose(GOAL), windings=False, deadline=5.0)
     if refused == "the first":
         assert optimize(task).certificate.valid and len(judged) > 1

@@ -52,8 +52,7 @@ def mechanical() -> Problem:
 
 
 def objective(asked: Problem, answer: Solution) -> float:
-    energy = answer.energy
-    return energy.electrical.total if asked.objective == "electrical" else energy.mechanical.total
+    return answer.energy.of(asked.objective)
 
 
 @pytest.fixture(scope="module", params=[joints, straight_line, jumping, mechanical], ids=lambda make: make.__name__)

@@ -77,11 +77,6 @@ def replayed(asked: Problem, solution: Solution) -> tuple[float, dict[str, Array
     return float(np.trapezoid(np.maximum(net, 0) - electronics.regeneration * np.maximum(-net, 0), t)), peaks
 
 
-def own_energy(asked: Problem, solution: Solution) -> float:
-    energy = solution.energy
-    return energy.electrical.total if asked.objective == "electrical" else energy.mechanical.total
-
-
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_joints_to_joints(robot: Robot, objective: str) -> None:
     """Certified, above its bound, no worse than any baseline, and worth as much by Pinocchio."""
@@ -89,7 +84,7 @@ def test_joints_to_joints(robot: Robot, objective: str) -> None:
     solution = optimize(asked)
     assert solution.certificate.valid and solution.status == "optimal"
     energy, peaks = replayed(asked, solution)
-    assert own_energy(asked, solution) == pytest.approx(energy, rel=SUMMED)
+    assert solution.energy.of(asked.objective) == pytest.approx(energy, rel=SUMMED)
     assert 0 <= solution.lower_bound <= energy
     for name, peak in peaks.items():
         assert (peak <= getattr(robot.limits, name) * (1 + HELD)).all()

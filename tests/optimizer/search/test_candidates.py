@@ -189,7 +189,7 @@ def test_torque_that_cannot_hold_an_end_rules_it_out() -> None:
         needed = np.abs(torques(some.problem, candidate.q_goal[None], np.zeros((1, 6)), np.zeros((1, 6))))[0, 1]
         assert candidate.status == ("unvisited" if needed <= 80 else "infeasible")
         assert candidate.status == "unvisited" or (
-            ROBOT.joint_names[1] in candidate.reason and np.isinf(candidate.lower_bound)
+            ROBOT.joint_names[1] in candidate.message and np.isinf(candidate.lower_bound)
         )
     assert {candidate.status for candidate in found} == {"infeasible", "unvisited"}
 
@@ -266,7 +266,7 @@ def test_durations_rule_candidates_out() -> None:
     for candidate in found:
         assert (candidate.status == "infeasible") == (candidate.shortest > 1.2)
         assert np.isinf(candidate.lower_bound) == (candidate.shortest > 1.2)
-        assert candidate.status != "infeasible" or f"{candidate.shortest:.4f}" in candidate.reason
+        assert candidate.status != "infeasible" or f"{candidate.shortest:.4f}" in candidate.message
 
 
 def test_every_candidate_is_reported() -> None:

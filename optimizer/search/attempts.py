@@ -1,0 +1,67 @@
+"""Attempts on one candidate: solve it from nothing, or from samples of a known motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.methods import solver_for
+from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
+from optimizer.methods.method import Method, SolveResult
+from optimizer.search.candidates import Candidate
+from optimizer.search.incumbent import Incumbent
+
+
+def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
+    """The solver of the problem's method for a candidate, in one interval of durations."""
+    return solver_for(incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval)
+
+
+def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
+    """Solve the candidate in each of its duration intervals; returns the result of least energy.
+
+    If no interval has a motion, a result that the deadline cut off comes before the others.
+    """
+    best, results = incumbent.best(), list[SolveResult]()
+    for interval in duration_intervals(incumbent.prepared, candidate.q_goal):
+        if interval.t_max < candidate.shortest:
+            continue
+        solver = solver_of(incumbent, candidate, interval)
+        if best is not None and best.energy is not None:
+            solver.best_known = best.energy
+        results.append(incumbent.add_effort(solver.solve()))
+    solved = [result for result in results if result.spline is not None]
+    if len(solved) > 1:
+        solved.sort(key=lambda result: _objective(incumbent, result))
+    late = [result for result in results if result.status == "out of time"]
+    incumbent.cut_short |= bool(late)
+    return (solved + late + results)[0]
+
+
+def _objective(incumbent: Incumbent, result: SolveResult) -> float:
+    prepared = incumbent.prepared
+    return np.inf if result.spline is None else prepared.objective_of(prepared.energy(result.spline))
+
+
+def solve_from(
+    incumbent: Incumbent,
+    candidate: Candidate,
+    samples: tuple[Array, Array],
+    fine: bool,
+    surplus_value: float | None = None,
+    duration: float | None = None,
+) -> None:
+    """Optimise the candidate from samples of a motion, q (k, nq) [rad] at t (k,) [s]; accept what needs less energy.
+
+    `fine` asks for more control points. `surplus_value` [1] is the assumed value of a joule of net surplus on a bus
+    with energy storage. `duration` [s] fixes the duration.
+    """
+    q, t = samples
+    for interval in duration_intervals(incumbent.prepared, candidate.q_goal, surplus_value):
+        if duration is not None:
+            interval = replace(interval, t_min=duration, t_max=duration)
+        result = incumbent.add_effort(solver_of(incumbent, candidate, interval).solve_from(q, t, fine))
+        if result.spline is not None:
+            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))

@@ -1,0 +1,53 @@
+"""The fastest motion: over one candidate, over all of them, and what to do if only that one is short enough."""
+
+from __future__ import annotations
+
+from optimizer.exceptions import DurationTooShort
+from optimizer.methods.duration_intervals import fastest as all_durations
+from optimizer.search import free_goal
+from optimizer.search.attempts import solve_from, solver_of
+from optimizer.search.candidates import Candidate
+from optimizer.search.incumbent import Incumbent
+from optimizer.trajectories.spline import Spline, sampled
+
+
+def find_fastest(incumbent: Incumbent) -> None:
+    """Called when no candidate has a motion within `duration_max`: optimise from the fastest motion if it is in time.
+
+    Raises DurationTooShort if even the fastest motion found takes longer.
+    """
+    longest = incumbent.problem.duration_max
+    if longest is None:
+        return
+    found = fastest(incumbent)
+    if found is None:
+        least = min(candidate.shortest for candidate in incumbent.candidates)
+        if least > longest:
+            raise DurationTooShort(least)
+        return
+    candidate, spline = found
+    if spline.duration > longest:
+        raise DurationTooShort(spline.duration)
+    solve_from(incumbent, candidate, sampled(spline), fine=True)
+
+
+def fastest(incumbent: Incumbent) -> tuple[Candidate, Spline] | None:
+    """The fastest motion over all candidates, and its candidate; None if the deadline passes before one is found.
+
+    The durations that the problem allows do not count.
+    """
+    free_goal.activate_deferred(incumbent.candidates)
+    winner, best = None, None
+    open_candidates = [each for each in incumbent.candidates if each.holdable and not each.deferred]
+    for candidate in sorted(open_candidates, key=lambda each: each.shortest):
+        if (best is not None and candidate.shortest >= best.duration) or incumbent.deadline.passed:
+            break
+        spline = fastest_of(incumbent, candidate)
+        if spline is not None and (best is None or spline.duration < best.duration):
+            winner, best = candidate, spline
+    return None if winner is None or best is None else (winner, best)
+
+
+def fastest_of(incumbent: Incumbent, candidate: Candidate) -> Spline | None:
+    """The fastest motion of one candidate, whatever durations the problem allows; None if none was found."""
+    return incumbent.add_effort(solver_of(incumbent, candidate, all_durations(incumbent.prepared)).solve()).spline

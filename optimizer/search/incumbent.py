@@ -1,0 +1,92 @@
+"""The incumbent of a search: the best motion found so far, among the candidates, with the effort spent on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from optimizer.certificate import certify
+from optimizer.deadline import Deadline
+from optimizer.methods import METHODS
+from optimizer.methods.method import Method, SolveResult
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.solution import CandidateStatus, Certificate, Energy
+from optimizer.trajectories.spline import Spline
+
+# a baseline counts as better only beyond this share, the error of the quadratures that are compared
+SLACK = 1e-6
+
+
+@dataclass
+class Incumbent:
+    """State of one search, shared by all of its stages.
+
+    `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all attempts. `cut_short` says
+    that an attempt ended at the deadline although another attempt on the same candidate found a motion.
+    """
+
+    prepared: PreparedProblem
+    deadline: Deadline
+    candidates: list[Candidate] = field(default_factory=list)
+    iterations: int = 0
+    solves: int = 0
+    cut_short: bool = False
+
+    @property
+    def problem(self) -> Problem:
+        """The problem that is solved."""
+        return self.prepared.problem
+
+    @property
+    def method(self) -> type[Method]:
+        """The problem's method."""
+        return METHODS[self.problem.method]
+
+    @property
+    def uses_storage(self) -> bool:
+        """Whether the objective depends on the charge of energy storage on the bus."""
+        return self.problem.arm.bus.mode == "storage" and self.problem.objective == "electrical"
+
+    def best(self) -> Candidate | None:
+        """The solved candidate of least energy; None if no candidate is solved."""
+        solved = (candidate for candidate in self.candidates if candidate.energy is not None)
+        return min(solved, key=lambda candidate: candidate.energy or 0.0, default=None)
+
+    def add_effort(self, result: SolveResult) -> SolveResult:
+        """Add an attempt's effort to the totals; returns the result unchanged."""
+        self.iterations += result.iterations
+        self.solves += result.solves
+        return result
+
+    def accept_if_better(self, candidate: Candidate, result: SolveResult, energy: Energy) -> None:
+        """Take a result as the candidate's own if the candidate has none or one of more energy.
+
+        A candidate that the certificate did not confirm takes no further result.
+        """
+        objective = energy.of(self.problem.objective)
+        if candidate.reason is Reason.NOT_CONFIRMED:
+            return
+        if candidate.energy is None or objective < candidate.energy:
+            candidate.attempt, candidate.energy = result, objective
+            candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
+
+    def reject(self, candidate: Candidate) -> None:
+        """Drop a motion that the certificate did not confirm. Candidates that its energy pruned are open again."""
+        candidate.settle(CandidateStatus.FAILED, Reason.NOT_CONFIRMED)
+        candidate.energy = candidate.attempt = None
+        for other in self.candidates:
+            if other.status is CandidateStatus.PRUNED:
+                other.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+
+    def certified(self, candidate: Candidate, spline: Spline, energy: Energy) -> Certificate:
+        """The certificate of a candidate's motion, checked against the targets of this candidate."""
+        asked = narrowed(self.problem, candidate.start.target, candidate.goal.target)
+        return certify(asked, spline, candidate.q_start, candidate.q_goal, energy)
+
+    def allows(self, duration: float) -> bool:
+        """Whether the problem allows a duration [s]; a baseline between equal ends has the duration 0."""
+        least, most = self.problem.duration_min or LEAST_DURATION, self.problem.duration_max or np.inf
+        return bool(least * (1 - SLACK) <= duration <= most * (1 + SLACK))

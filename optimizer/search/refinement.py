@@ -1,0 +1,106 @@
+"""Refinement of the incumbent: finer motions, other values of the surplus, and the comparison with the baselines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.methods.method import SolveResult
+from optimizer.search.attempts import solve_from
+from optimizer.search.baselines import baselines, guesses, nearest
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.incumbent import SLACK, Incumbent
+from optimizer.solution import Baseline, BaselineName
+from optimizer.trajectories.ruckig_motion import time_optimal_spline
+from optimizer.trajectories.spline import Spline, peak_rates, retimed, sampled, time_scale
+from optimizer.trajectories.time_scalings import quintic_spline
+
+# assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
+# pays for it to what the storage gives back
+SURPLUS_VALUES = (0.75, 0.5, 0.25)
+
+
+def refine(incumbent: Incumbent, candidate: Candidate) -> None:
+    """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
+    method, problem, deadline = incumbent.method, incumbent.problem, incumbent.deadline
+    if method.may_refine(candidate.spline) and not deadline.passed:
+        solve_from(incumbent, candidate, sampled(candidate.spline), fine=False)
+    if not method.guess_baselines:
+        return
+    if incumbent.uses_storage:
+        supply = problem.arm.regeneration
+        for share in SURPLUS_VALUES:
+            if not deadline.passed:
+                value = supply + share * max(problem.arm.bus.efficiency - supply, 0.0)
+                solve_from(incumbent, candidate, sampled(candidate.spline), fine=False, surplus_value=value)
+    longest, spline = problem.duration_max or 0.0, candidate.spline
+    may_be_slower = problem.objective == "mechanical" and spline.duration < longest * (1 - SLACK)
+    if may_be_slower and not deadline.passed:
+        # the smoothed |tau v| is above zero at rest, the work is not: a free duration ends too soon
+        slower = retimed(spline, longest / spline.duration)
+        solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
+
+
+def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
+    """The baselines, after a feasible baseline of less energy was used as initial guess, first coarse, then fine.
+
+    Only the method's `guess_baselines` are initial guesses. If one still needs less energy and is of the method's own
+    kind (`accepted_baselines`), it becomes the answer itself: what another parametrisation does better is not.
+    """
+    for last, fine in ((False, False), (False, True), (True, True)):
+        table, q_nearest = _table(incumbent, best)
+        usable = incumbent.method.accepted_baselines if last else incumbent.method.guess_baselines
+        better = [
+            each.name
+            for each in table
+            if each.name in usable and each.within_limits and each.saving < -SLACK and incumbent.allows(each.duration)
+        ]
+        if not better:
+            return table
+        candidate = next(
+            each
+            for each in incumbent.candidates
+            if (each.q_start == best.q_start).all() and (each.q_goal == q_nearest).all()
+        )
+        if candidate.reason is Reason.NOT_CONFIRMED:
+            return table
+        if last:
+            accept_baseline(incumbent, candidate, better)
+            break
+        motions = guesses(incumbent.problem, best.q_start, q_nearest, best.duration)
+        for name in better:
+            if not incumbent.deadline.passed:
+                solve_from(incumbent, candidate, (motions[name].q, motions[name].t), fine)
+        best = incumbent.best() or best
+    return _table(incumbent, incumbent.best() or best)[0]
+
+
+def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Array]:
+    """The baselines from the start of the best candidate, and the nearest goal (nq,) [rad] that they go to."""
+    assert best.energy is not None
+    prepared, problem = incumbent.prepared, incumbent.problem
+    q_goals = np.array([each.q_goal for each in incumbent.candidates if (each.q_start == best.q_start).all()])
+    oracle = prepared.torques, prepared.potential, prepared.satisfies_path_constraints
+    table = baselines(problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
+    return table, nearest(problem, best.q_start, q_goals)
+
+
+def accept_baseline(incumbent: Incumbent, candidate: Candidate, better: list[BaselineName]) -> None:
+    """Accept the baselines `better` as motions of the candidate, each as an exact spline, if they are certified."""
+    best = incumbent.best()
+    assert best is not None
+    limits, duration = incumbent.problem.arm.active_limits, best.duration
+    fastest = time_optimal_spline(limits, candidate.q_start, candidate.q_goal)
+    motions: dict[BaselineName, Spline] = {
+        "ruckig": fastest,
+        "ruckig_slowed": retimed(fastest, duration / fastest.duration),
+        "quintic": quintic_spline(candidate.q_start, candidate.q_goal, duration),
+    }
+    for name in better:
+        needed = time_scale(peak_rates(motions[name]) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+        spline = retimed(motions[name], max(needed, 1.0))
+        energy = incumbent.prepared.energy(spline)
+        if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
+            incumbent.accept_if_better(
+                candidate, SolveResult("solved", f"the {name} motion itself", spline=spline), energy
+            )
