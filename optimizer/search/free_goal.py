@@ -27,7 +27,7 @@ from optimizer.methods.method import SolveResult
 from optimizer.methods.sqp_method import Guess
 from optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import FEASIBILITY, solve
+from optimizer.nlp.sqp import solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import UNVISITED, Candidate, bound
@@ -203,7 +203,7 @@ def _proposal(
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
     result = solve(program, free, spline.duration, None, deadline)
     count(SolveResult("failed", "a proposal", result.iterations, 1))
-    if result.violation > FEASIBILITY:
+    if not result.feasible:
         return None
     return Guess(space, program.points(result.free), result.duration)
 
