@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -25,6 +26,11 @@ class Limits:
     a_max: Array
     j_max: Array
     tau_max: Array
+
+    @cached_property
+    def rates(self) -> Array:
+        """Limits on speed, acceleration and jerk, (3, nq)."""
+        return np.stack([self.v_max, self.a_max, self.j_max])
 
     def scaled(self, factors: Limits | float) -> Limits:
         """These limits with those on speed, acceleration, jerk and torque multiplied by a factor, or one per joint."""

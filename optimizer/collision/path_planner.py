@@ -16,6 +16,7 @@ from optimizer.collision.model import CollisionModel, collision_model
 from optimizer.collision.state_validity import FreeSpace
 from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
+from optimizer.trajectories import quintic
 
 # how far the joints may leave the range between start and goal [rad], in turn from run to run: what is near comes
 # first, and no way winds a joint
@@ -80,7 +81,7 @@ def along(path: Array, duration: float, v_max: Array) -> tuple[Array, Array]:
     """
     lengths = _lengths(path, v_max)
     s = np.linspace(0.0, 1.0, SAMPLES)
-    passed = s**3 * (10 - 15 * s + 6 * s**2)
+    passed = quintic.fraction(s)
     # the mean over a window that narrows to nothing at the ends, which it must not move
     window = np.minimum(ROUNDING, np.minimum(passed, 1 - passed))
     spread = passed[:, None] + window[:, None] * np.linspace(-1.0, 1.0, 9)

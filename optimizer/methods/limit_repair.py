@@ -8,7 +8,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.kinematics.path_constraints import PathConstraints
-from optimizer.nlp.sqp import FEASIBILITY
+from optimizer.nlp.nonlinear_program import FEASIBILITY
 
 # the solver works within limits tightened by this share, so that its own tolerance does not break the real ones
 MARGIN = 2 * FEASIBILITY

@@ -18,8 +18,8 @@ from optimizer.methods.limit_repair import MARGIN, initial_bounds, tightened
 from optimizer.methods.method import Method, SolveResult
 from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import FEASIBILITY, solve
+from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from optimizer.nlp.sqp import SqpStatus, solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Clearance
@@ -79,7 +79,7 @@ class SqpMethod(Method):
             guessed = spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
             pairs = self.prepared.active_pairs(guessed)
         path = self.prepared.with_clearance(pairs) if guarded else self.prepared.path
-        program = replace(program, path=path, room=initial_bounds(path))
+        program = replace(program, path=path, path_bounds=initial_bounds(path))
         limits = self.prepared.problem.arm.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
         duration = self._first_duration(program, free, guess.duration)
@@ -87,7 +87,7 @@ class SqpMethod(Method):
         for solves in range(1, REPAIRS + 1):
             result = solve(program, free, duration, multiplier, deadline)
             iterations += result.iterations
-            if result.status == "out of time":
+            if result.status is SqpStatus.OUT_OF_TIME:
                 return SolveResult("out of time", "the deadline passed", iterations, solves)
             if result.violation > FEASIBILITY:
                 reason = f"found no motion of {guess.space.n} control points that holds the limits"
@@ -125,16 +125,16 @@ class SqpMethod(Method):
         self, program: NonlinearProgram, pairs: Indices, nearby: Indices, beyond: Array, hit: Clearance | None
     ) -> NonlinearProgram:
         """The program with the limits along its path tightened, and all of `nearby` watched instead of `pairs`."""
-        room = program.room - beyond
+        room = program.path_bounds - beyond
         if len(nearby) > len(pairs):
             path = self.prepared.with_clearance(nearby)
             widened = initial_bounds(path)
             widened[np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))] = room
-            return replace(program, path=path, room=widened)
+            return replace(program, path=path, path_bounds=widened)
         if hit is not None and program.path is not None and not beyond.any():
             # met nowhere, but not proven either: a hair more between the points that are held
             room -= np.where(np.array(program.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
-        return replace(program, room=room)
+        return replace(program, path_bounds=room)
 
     def _beyond(self, spline: Spline, path: PathConstraints | None, hit: Clearance | None) -> Array:
         """By how much each share of the limits along the path must shrink, (c,): they are broken between the points."""
@@ -156,7 +156,7 @@ class SqpMethod(Method):
     def _first_duration(self, program: NonlinearProgram, free: Array, least: float) -> float:
         """The cheapest of a few durations at which the guess holds the limits on speed, acceleration and jerk."""
         limits = program.limits
-        rates = np.stack([limits.v_max, limits.a_max, limits.j_max])
+        rates = limits.rates
         peaks = np.abs(program.kinematics(free)).max(axis=1)
         shortest = max(time_scale(peaks / rates), least, program.t_min)
         if shortest >= program.t_max:
@@ -178,7 +178,7 @@ class SqpMethod(Method):
 
     def _stretched(self, spline: Spline, factors: Limits) -> Spline:
         """The motion retimed until speed, acceleration and jerk hold their limits, if that takes next to no time."""
-        needed = time_scale(1 / np.stack([factors.v_max, factors.a_max, factors.j_max]))
+        needed = time_scale(1 / factors.rates)
         return spline if needed > MOST_STRETCH or spline.duration * needed > self.t_max else retimed(spline, needed)
 
     def _excess(self, spline: Spline) -> Limits | None:

@@ -23,6 +23,7 @@ from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 from models.robot import Array, Limits
 from optimizer.problem.arm import Arm
 from optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints
+from optimizer.trajectories import quintic
 from optimizer.trajectories.time_scalings import blend_time
 
 # A cubic spline forgets a row's value by a factor of 3.7 from row to row: 48 rows further on, 1e-27 of it is left, and
@@ -83,7 +84,7 @@ def _segments(motion: Waypoints, limits: Limits, rows: slice, start: float) -> P
     if motion.interpolation == "linear":
         law, lengths = [1 / T, 0 * T], T
     elif motion.interpolation == "quintic":
-        law, lengths = [6 / T**5, -15 / T**4, 10 / T**3, 0 * T, 0 * T, 0 * T], T
+        law, lengths = quintic.coefficients(T), T
     else:
         blend = blend_time(limits, displacement, T)
         speed = 1 / (T - blend)

@@ -72,13 +72,14 @@ def baselines(
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
     """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]."""
-    fastest = time_optimal(problem.arm.active_limits, q_start, q_goal)
+    limits = problem.arm.active_limits
+    fastest = time_optimal(limits, q_start, q_goal)
     return {
-        "trapezoid": trapezoid(problem, q_start, q_goal, duration),
+        "trapezoid": trapezoid(limits, q_start, q_goal, duration),
         "quintic": quintic(q_start, q_goal, duration),
         "ruckig": fastest,
         "ruckig_slowed": fastest.scaled_to(duration),
-        "controller_default": controller_default(problem, q_start, q_goal),
+        "controller_default": controller_default(limits, problem.arm.robot.default_motion, q_start, q_goal),
     }
 
 

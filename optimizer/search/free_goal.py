@@ -25,7 +25,7 @@ from optimizer.methods.method import SolveResult
 from optimizer.methods.sqp_method import Guess
 from optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import FEASIBILITY, solve
+from optimizer.nlp.sqp import solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.attempts import solver_of
@@ -187,7 +187,7 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Gues
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
     result = solve(program, free, spline.duration, None, incumbent.deadline)
     incumbent.add_effort(SolveResult("failed", "a proposal", result.iterations, 1))
-    if result.violation > FEASIBILITY:
+    if not result.feasible:
         return None
     return Guess(space, program.points(result.free), result.duration)
 

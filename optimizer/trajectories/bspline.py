@@ -13,6 +13,7 @@ import numpy.typing as npt
 from scipy.interpolate import BSpline
 
 from models.robot import Array
+from optimizer.trajectories import quintic
 from optimizer.trajectories.quadrature import quadrature
 
 DEGREE = 5
@@ -118,8 +119,7 @@ class Basis:
     def quintic(self) -> Array:
         """Control values (n,) of the rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which every such space contains."""
         x = greville(self.knots)
-        values = x**3 * (10 - 15 * x + 6 * x**2)
-        return np.asarray(np.linalg.solve(basis_matrix(self.knots, x), values), dtype=float)
+        return np.asarray(np.linalg.solve(basis_matrix(self.knots, x), quintic.fraction(x)), dtype=float)
 
     @staticmethod
     def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:

@@ -9,21 +9,21 @@ from models.robot import Array, Limits
 from optimizer.trajectories import bspline
 from optimizer.trajectories.quadrature import lobatto_nodes
 from optimizer.trajectories.spline import Spline
-from optimizer.trajectories.time_scalings import SampledMotion, rest
+from optimizer.trajectories.time_scalings import SampledMotion, standstill
 
-CLOSEST_BREAKS = (
-    1e-5  # share of a motion: nearer jumps of jerk are one, for rounding would make jerk of its own between them
-)
+# jumps of jerk closer than this, as a fraction of the duration, count as one: between two of them, rounding would make
+# jerk of its own
+CLOSEST_BREAKS = 1e-5
 
 
 def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
-    """Ruckig's motion from rest to rest, joints ending together, each of up to seven phases of constant jerk.
+    """Ruckig's motion from rest to rest. All joints end together, each after up to seven phases of constant jerk.
 
-    Raises RuntimeError should Ruckig find no motion: between configurations at rest there always is one.
+    Raises RuntimeError if Ruckig finds no motion; between configurations at rest one always exists.
     """
     found = _ruckig(limits, q_start, q_goal)
     if found.duration == 0:
-        return rest(q_start, 0.0)
+        return standstill(q_start, 0.0)
     profiles = found.profiles[0]
     tau, weights = lobatto_nodes(_breaks(found))
     t = tau * found.duration
@@ -41,9 +41,9 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
 
 
 def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
-    """Ruckig's motion without loss: a spline with threefold knots wherever the jerk of a joint jumps.
+    """Ruckig's motion as an exact spline, with threefold knots where the jerk of a joint jumps.
 
-    Between equal configurations, which takes Ruckig no time at all, it stands still for a second.
+    Between equal configurations Ruckig's motion takes no time: the spline stands still for one second.
     """
     found = _ruckig(limits, q_start, q_goal)
     if found.duration == 0:
@@ -58,7 +58,7 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
 
 
 def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
-    """Where Ruckig's motion is (k, nq) at the shares `at` (k,) of its duration."""
+    """Positions (k, nq) [rad] of Ruckig's motion at the fractions `at` (k,) of its duration."""
     return _positions(_ruckig(limits, q_start, q_goal), at)
 
 
@@ -79,7 +79,7 @@ def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
 
 
 def _breaks(found: ruckig.Trajectory) -> Array:
-    """Where in [0, 1] the jerk of any joint jumps, both ends included, ascending."""
+    """Fractions in [0, 1] of the duration at which the jerk of any joint jumps, with both ends, ascending."""
     phases = np.array([profile.t for profile in found.profiles[0]])
     ends = np.append(phases.cumsum(axis=1), [0.0, found.duration]) / found.duration
     return np.asarray(np.unique(np.round(ends, 12)))

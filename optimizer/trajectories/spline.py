@@ -12,6 +12,13 @@ from models.robot import Array
 from optimizer.trajectories import bspline
 from optimizer.trajectories.quadrature import quadrature
 
+# quadrature panels: their greatest length [s], and their least and greatest number unless knot spans ask for more
+LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
+# samples per knot span at which the peaks of speed, acceleration and jerk are searched
+RATE_POINTS = 33
+# samples of a motion that another is fitted to
+FIT_SAMPLES = 201
+
 
 @dataclass(frozen=True)
 class Spline:
@@ -26,25 +33,31 @@ class Spline:
         """Length of the motion [s]."""
         return float(self.knots[-1])
 
-
-LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
-# points per knot span at which peaks of speed, acceleration and jerk are looked for
-RATE_POINTS = 33
+    @property
+    def curve(self) -> BSpline:
+        """SciPy's spline: curve(t, d) is the d-th derivative of q, (k, nq), at times t (k,) [s]."""
+        return BSpline(self.knots, self.control_points, self.degree)
 
 
 def spline_of(basis: bspline.Basis, points: Array, duration: float) -> Spline:
-    """A motion in a spline space: its points (n, nq) there, lasting `duration` [s]."""
+    """The motion of `duration` [s] with the points (n, nq) [rad] of a spline space."""
     return Spline(basis.degree, basis.knots * duration, basis.to_spline(points))
 
 
 def sample(spline: Spline, t: Array) -> tuple[Array, Array, Array]:
-    """q, v, a (k, nq) at times t (k,)."""
-    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    """q [rad], v [rad/s], a [rad/s²], (k, nq) each, at times t (k,) [s]."""
+    curve = spline.curve
     return curve(t), curve(t, 1), curve(t, 2)
 
 
+def sampled(spline: Spline) -> tuple[Array, Array]:
+    """FIT_SAMPLES samples q (k, nq) [rad] at equally spaced times t (k,) [s], to fit another spline to."""
+    t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
+    return np.asarray(spline.curve(t)), t
+
+
 def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, Array]:
-    """Quadrature weights (k,) [s] and q, v, a (k, nq) at Gauss-Legendre points of panels of a knot span at most."""
+    """Quadrature weights (k,) [s] and q, v, a (k, nq) at the Gauss-Legendre points of panels within the knot spans."""
     longest = max(min(LONGEST_PANEL, spline.duration / LEAST_PANELS), spline.duration / MOST_PANELS)
     points, weights = quadrature(spline.knots, per_panel, longest)
     return weights, *sample(spline, points)
@@ -53,12 +66,11 @@ def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, A
 def peak_rates(spline: Spline) -> Array:
     """Greatest absolute speed, acceleration and jerk of every joint, (3, nq).
 
-    Every knot span is expanded around its middle, so that both sides of a repeated knot count, and samples are
-    raised to the vertex of the parabola through their neighbours: exact for a quintic's jerk, which is such a parabola.
-    Samples are denser where the degree is higher.
+    Every knot span is expanded around its middle, so that both sides of a repeated knot count. Every sample is raised
+    to the vertex of the parabola through it and its neighbours: exact for a quintic's jerk, which is such a parabola.
+    Samples are denser if the degree is higher.
     """
-    terms = spline.degree + 1
-    curve = BSpline(spline.knots, spline.control_points, spline.degree)
+    terms, curve = spline.degree + 1, spline.curve
     edges = np.unique(spline.knots)
     middle, half = (edges[:-1] + edges[1:]) / 2, np.diff(edges) / 2
     # the spans as polynomials in x ∈ [-1, 1] around their middles
@@ -70,27 +82,35 @@ def peak_rates(spline: Spline) -> Array:
         values = np.tensordot(powers[:, : terms - d], series[d:], axes=1) / half[:, None] ** d
         low, top, high = np.abs(values[:-2]), np.abs(values[1:-1]), np.abs(values[2:])
         bend = 2 * top - low - high
-        # the vertex counts where it lies between the two outer samples
+        # the vertex counts only between the two outer samples
         vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
         peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=(0, 1)), (top + vertex).max(axis=(0, 1))))
     return np.array(peaks)
 
 
+def time_scales(ratios: Array) -> Array:
+    """The factors (...) on the duration that bring all ratios of speed, acceleration and jerk (..., 3, nq) to ≤ 1.
+
+    With time scaled by k, speed falls with k, acceleration with k², jerk with k³.
+    """
+    return np.asarray((ratios.max(axis=-1) ** (1 / np.arange(1, 4))).max(axis=-1))
+
+
 def time_scale(ratios: Array) -> float:
-    """The factor on the duration that brings speed, acceleration and jerk, ratios (3, nq) of their limits, to these."""
-    return float((ratios.max(axis=1) ** (1 / np.arange(1, 4))).max())
+    """The factor of `time_scales` for one motion, ratios (3, nq)."""
+    return float(time_scales(ratios))
+
+
+def least_time_scale(spline: Spline, rates: Array) -> float:
+    """The least factor on the duration at which the motion is within the limits `rates` (3, nq) of `Limits.rates`."""
+    return time_scale(peak_rates(spline) / rates)
 
 
 def retimed(spline: Spline, factor: float) -> Spline:
-    """The same path and law in `factor` times the duration."""
+    """The motion along the same path with time scaled by `factor`."""
     return replace(spline, knots=spline.knots * factor)
 
 
-# samples of a motion that another is fitted to
-FIT_SAMPLES = 201
-
-
-def sampled(spline: Spline) -> tuple[Array, Array]:
-    """Samples q (k, nq) of a motion at times t (k,), to learn from."""
-    t = np.linspace(0.0, spline.duration, FIT_SAMPLES)
-    return np.asarray(BSpline(spline.knots, spline.control_points, spline.degree)(t)), t
+def lasting(spline: Spline, duration: float) -> Spline:
+    """The motion along the same path with time scaled so that it takes exactly `duration` [s]."""
+    return replace(spline, knots=spline.knots / spline.duration * duration)

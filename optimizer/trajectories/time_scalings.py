@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Array, Limits
-from optimizer.problem.problem import Problem
+from models.robot import Array, DefaultMotion, Limits
 from optimizer.trajectories import bspline
 from optimizer.trajectories.quadrature import LOBATTO, lobatto_nodes
+from optimizer.trajectories.quintic import PEAKS, derivatives
 from optimizer.trajectories.spline import Spline
 
 
@@ -18,7 +18,7 @@ from optimizer.trajectories.spline import Spline
 class SampledMotion:
     """A motion as quadrature samples: t, weights (k,) [s], q, v, a (k, nq), and the exact peaks (nq,) of its rates.
 
-    The weights add up to the duration. A motion of no duration has one sample of weight zero.
+    The weights add up to the duration. A motion of zero duration has one sample of weight zero.
     """
 
     t: Array
@@ -36,9 +36,9 @@ class SampledMotion:
         return float(self.t[-1])
 
     def scaled_to(self, duration: float) -> SampledMotion:
-        """The same path and law in another duration: v falls with the factor k, a with k², jerk with k³."""
+        """The motion along the same path with time scaled by k to `duration` [s]: v / k, a / k², jerk / k³."""
         if self.duration == 0:
-            return rest(self.q[0], duration)
+            return standstill(self.q[0], duration)
         k = duration / self.duration
         return replace(
             self,
@@ -52,8 +52,8 @@ class SampledMotion:
         )
 
 
-def rest(q: Array, duration: float) -> SampledMotion:
-    """Standing still at q (nq,); the duration may be zero."""
+def standstill(q: Array, duration: float) -> SampledMotion:
+    """No motion at q (nq,) for `duration` ≥ 0 [s]."""
     if duration > 0:
         return quintic(q, q, duration)
     none = np.zeros(len(q))
@@ -61,34 +61,24 @@ def rest(q: Array, duration: float) -> SampledMotion:
 
 
 def quintic(q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
-    """q = q_start + Δ (10 τ³ - 15 τ⁴ + 6 τ⁵), τ = t / T: at rest, v = a = 0, at both ends.
-
-    Peaks: 15/8 Δ/T, 10/√3 Δ/T², 60 Δ/T³.
-    """
+    """q = q_start + s(t / T) · (q_goal - q_start) with the quintic s: v = a = 0 at both ends."""
     tau, weights = lobatto_nodes(np.array([0.0, 1.0]))
-    law = np.stack(
-        [
-            tau**3 * (10 - 15 * tau + 6 * tau**2),
-            30 * (tau * (1 - tau)) ** 2 / duration,
-            60 * tau * (1 - tau) * (1 - 2 * tau) / duration**2,
-        ]
-    )
-    peaks = np.array([15 / 8 / duration, 10 / math.sqrt(3) / duration**2, 60 / duration**3])
-    return _sampled(tau * duration, weights * duration, q_start, q_goal - q_start, law, peaks)
+    powers = np.array([1.0, duration, duration**2, duration**3])
+    law = derivatives(tau) / powers[:3, None]
+    return _sampled(tau * duration, weights * duration, q_start, q_goal - q_start, law, PEAKS / powers[1:])
 
 
-def trapezoid(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
-    """A trapezoid of speed in a given duration, all joints in step, speeding up and slowing down for `blend_time`."""
-    blend = float(blend_time(problem.arm.active_limits, q_goal - q_start, np.asarray(duration)))
+def trapezoid(limits: Limits, q_start: Array, q_goal: Array, duration: float) -> SampledMotion:
+    """A trapezoid of speed in `duration` [s], all joints in step; they accelerate and decelerate for `blend_time`."""
+    blend = float(blend_time(limits, q_goal - q_start, np.asarray(duration)))
     return _trapezoid(q_start, q_goal, duration, blend)
 
 
 def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
-    """How long (...,) [s] trapezoids of speed over `displacement` (..., nq) speed up, and slow down, in durations T
-    (...,).
+    """Time (...,) [s] for which a trapezoid of speed accelerates, and decelerates, over `displacement` (..., nq) [rad].
 
-    T/3 each: of all trapezoids that one has the least ∫ a² dt. Where T/3 breaks the speed limit it is less, where it
-    breaks the acceleration limit more; where nothing holds both, T/3 stays.
+    T/3 of the duration T (...,) [s]: of all trapezoids this one has the least ∫ a² dt. It is shorter if T/3 exceeds the
+    speed limit, and longer if T/3 exceeds the acceleration limit. If no time satisfies both limits, it is T/3.
     """
     # speed Δ / (T - b) ≤ v_max, and acceleration Δ / (b (T - b)) ≤ a_max
     longest = np.minimum(duration / 2, duration - (np.abs(displacement) / limits.v_max).max(axis=-1))
@@ -98,18 +88,18 @@ def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
     return np.asarray(np.where(shortest <= longest, np.clip(blend, np.minimum(shortest, longest), longest), blend))
 
 
-def controller_default(problem: Problem, q_start: Array, q_goal: Array) -> SampledMotion:
-    """The robot's own controller at its default speed and acceleration, or the limits where those are tighter.
+def controller_default(limits: Limits, default: DefaultMotion, q_start: Array, q_goal: Array) -> SampledMotion:
+    """The motion of the robot's controller at its default speed and acceleration, or at the limits if tighter.
 
-    The joint that needs longest leads with a trapezoid; the others keep in step with it (UR script manual, `movej`).
+    The joint that needs longest moves with a trapezoid of speed; the others keep in step with it (UR script manual,
+    `movej`).
     """
-    limits, default = problem.arm.active_limits, problem.arm.robot.default_motion
     displacement = np.abs(q_goal - q_start)
-    # 1 / (greatest speed and acceleration of the law s(t) from 0 to 1 that all joints share)
+    # 1 / (greatest speed and acceleration of the time scaling s(t) from 0 to 1 that all joints share)
     slow = float((displacement / np.minimum(limits.v_max, default.velocity)).max())
     lazy = float((displacement / np.minimum(limits.a_max, default.acceleration)).max())
     if slow == 0:
-        return rest(q_start, 0.0)
+        return standstill(q_start, 0.0)
     blend = lazy / slow
     if blend < slow:
         return _trapezoid(q_start, q_goal, slow + blend, blend)
@@ -143,9 +133,8 @@ def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> 
 
 
 def _sampled(t: Array, weights: Array, q_start: Array, displacement: Array, law: Array, peaks: Array) -> SampledMotion:
-    """The straight line q_start + s(t) · displacement; `law` (3, k) holds s and its derivatives, `peaks` (3,) the
-    rates'."""
+    """q = q_start + s(t) · displacement; `law` (3, k) holds s, ds/dt, d²s/dt², `peaks` (3,) the greatest rates of s."""
     s, rate, acceleration = law[:, :, None] * displacement
-    with np.errstate(invalid="ignore"):  # infinite jerk of a joint that stays where it is: none
+    with np.errstate(invalid="ignore"):  # infinite jerk times zero displacement is none
         peak_v, peak_a, peak_jerk = np.nan_to_num(np.abs(displacement) * peaks[:, None], nan=0.0, posinf=np.inf)
     return SampledMotion(t, weights, q_start + s, rate, acceleration, peak_v, peak_a, peak_jerk)

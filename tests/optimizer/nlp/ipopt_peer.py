@@ -72,11 +72,10 @@ class Peer:
     def solve(self, program: NonlinearProgram, free: Array, duration: float) -> Optimum:
         """The optimum near a guess, under the program's own limits and duration bounds."""
         limits, line = program.limits, program.coordinates
-        rates = np.stack([limits.v_max, limits.a_max, limits.j_max])
         bounds = np.concatenate([np.ones(self._rows), np.tile(limits.tau_max, self._nodes)])
         found = self._solver(
             x0=np.append(free.T.ravel(), duration),
-            p=np.concatenate([program.p, line.start, line.goal, rates.T.ravel()]),
+            p=np.concatenate([program.p, line.start, line.goal, limits.rates.T.ravel()]),
             lbx=np.append(np.repeat(limits.q_min, self._m), program.t_min),
             ubx=np.append(np.repeat(limits.q_max, self._m), program.t_max),
             lbg=-bounds,

@@ -14,7 +14,7 @@ from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import SolveResult
 from optimizer.methods.sqp_method import NO_BETTER
 from optimizer.nlp.clearance_constraint import COUNTED, RESERVE, SCALE, ClearanceConstraint
-from optimizer.nlp.sqp import NEAR_PATH
+from optimizer.nlp.working_set_qp import NEAR_PATH
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene, Sphere

@@ -11,11 +11,12 @@ from scipy.interpolate import BSpline
 from scipy.optimize import nnls
 
 from models.robot import Array, Limits
+from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.plant import KNEE
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import FEASIBILITY, Result, solve
+from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from optimizer.nlp.sqp import Result, SqpStatus, solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import DEGREE, Basis
@@ -91,7 +92,7 @@ def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
     mine = program(start, goal, **given)
     guess = quintic(mine), 1.4 * shortest(start, goal, given["own"])
     ours, theirs = solve(mine, *guess), peer.solve(mine, *guess)
-    assert ours.status == "solved" and theirs.converged
+    assert ours.status is SqpStatus.SOLVED and theirs.converged
     assert ours.cost == pytest.approx(theirs.cost, rel=PEER)
     # the optimum is flat in the duration: a thousandth of the cost is some percent of the time
     assert ours.duration == pytest.approx(theirs.duration, rel=0.02)
@@ -106,7 +107,7 @@ def test_mechanical_optimum_leaves_ipopt_little(peer: Peer, k: int) -> None:
     mine = program(start, goal, objective="mechanical", duration_max=1.5 * shortest(start, goal), **conditions(k))
     ours = solve(mine, quintic(mine), mine.t_max)
     theirs = peer.solve(mine, ours.free, ours.duration)
-    assert ours.status == "solved" and theirs.converged
+    assert ours.status is SqpStatus.SOLVED and theirs.converged
     assert theirs.cost > ours.cost * (1 - REST)
     assert ours.cost < mine.value(quintic(mine), mine.t_max)[0]
 
@@ -121,10 +122,10 @@ def unexplained(of: NonlinearProgram, found: Result) -> float:
     line = of.derivatives(found.free, T, np.zeros_like(found.multiplier))
     near = 1 - 5e-4
     rows = []
-    ratio = of.kinematics(found.free) / (of.rates * T ** np.arange(1, 4)[:, None])[:, None, :]
+    ratio = of.kinematics(found.free) / (of.limits.rates * T ** np.arange(1, 4)[:, None])[:, None, :]
     for d, g, j in zip(*np.nonzero(np.abs(ratio) > near), strict=True):
         row = np.zeros((m, r))
-        row[:, j] = of.basis.at_grid[d, g, of.basis.free] / (of.rates[d, j] * T ** (d + 1))
+        row[:, j] = of.basis.at_grid[d, g, of.basis.free] / (of.limits.rates[d, j] * T ** (d + 1))
         rows.append(np.sign(ratio[d, g, j]) * np.append(row.ravel(), -(d + 1) / T * ratio[d, g, j]))
     share = line.tau / of.limits.tau_max
     k, j = np.nonzero(np.abs(share) > near)
@@ -151,14 +152,14 @@ def test_active_limits_explain_the_gradient(objective: str, kind: str) -> None:
         longest = None if objective == "electrical" else 1.5 * shortest(start, goal, given["own"])
         mine = program(start, goal, kind=kind, objective=objective, duration_max=longest, **given)
         found = solve(mine, quintic(mine), 1.5 * shortest(start, goal, given["own"]))
-        assert found.status == "solved"
+        assert found.status is SqpStatus.SOLVED
         assert unexplained(mine, found) < STATIONARY
 
 
 def test_the_conditions_are_not_met_elsewhere() -> None:
     """The measure above does tell: a straight quintic at leisure is far from optimal."""
     mine = program(START, GOAL)
-    guess = Result("solved", quintic(mine), 1.5, 0.0, 0, 0.0, 0.0, np.zeros((len(COARSE.nodes), 6)))
+    guess = Result(SqpStatus.SOLVED, quintic(mine), 1.5, 0.0, 0, 0.0, 0.0, np.zeros((len(COARSE.nodes), 6)))
     assert unexplained(mine, guess) > 0.5
 
 
@@ -170,7 +171,7 @@ def test_limits_are_held(kind: str) -> None:
         own = given["own"]
         mine = program(start, goal, kind=kind, **given)
         found = solve(mine, quintic(mine), 2 * shortest(start, goal, own))
-        assert found.status == "solved" and found.violation <= FEASIBILITY
+        assert found.status is SqpStatus.SOLVED and found.violation <= FEASIBILITY
         curve = BSpline(COARSE.knots * found.duration, mine.joint_points(found.free), DEGREE)
         t = np.linspace(0.0, found.duration, 4001)
         for d, maxima in enumerate((own.v_max, own.a_max, own.j_max)):
@@ -196,7 +197,7 @@ def test_positions_stay_inside_a_narrow_range() -> None:
     narrow = program(START, GOAL, own=own, **given)
     found = solve(narrow, quintic(narrow), 2.5)
     q = narrow.joint_points(found.free)
-    assert found.status == "solved"
+    assert found.status is SqpStatus.SOLVED
     assert (q >= q_min - 1e-9).all() and (q <= q_max + 1e-9).all()
     assert found.cost > free.cost
 
@@ -205,7 +206,7 @@ def test_a_fixed_duration_is_kept() -> None:
     mine = program(START, GOAL, **fixed(1.234))
     for guess in (0.5, 1.234, 3.0):
         found = solve(mine, quintic(mine), guess)
-        assert found.status == "solved" and found.duration == 1.234
+        assert found.status is SqpStatus.SOLVED and found.duration == 1.234
 
 
 def test_durations_stay_between_their_bounds() -> None:
@@ -216,7 +217,7 @@ def test_durations_stay_between_their_bounds() -> None:
     for t_min, t_max in ((1.2 * best, 2 * best), (0.01, 0.9 * best)):
         mine = program(START, GOAL, robot=lazy, duration_min=t_min, duration_max=t_max)
         found = solve(mine, quintic(mine), best)
-        assert found.status == "solved"
+        assert found.status is SqpStatus.SOLVED
         assert found.duration == pytest.approx(t_min if t_min > best else t_max, rel=1e-9)
         assert t_min <= found.duration <= t_max
 
@@ -227,7 +228,7 @@ def test_too_little_time_is_told(share: float) -> None:
     own = limits(v_max=1.5)
     mine = program(START, GOAL, own=own, **fixed(share * shortest(START, GOAL, own)))
     found = solve(mine, quintic(mine), mine.t_max)
-    assert found.status != "solved" and found.violation > FEASIBILITY
+    assert found.status is not SqpStatus.SOLVED and found.violation > FEASIBILITY
 
 
 def test_too_little_torque_is_told() -> None:
@@ -235,7 +236,7 @@ def test_too_little_torque_is_told() -> None:
     own = limits(tau_max=[150, 8, 150, 28, 28, 28])
     mine = program(START, GOAL, own=own)
     found = solve(mine, quintic(mine), 1.5)
-    assert found.status != "solved" and found.violation > FEASIBILITY
+    assert found.status is not SqpStatus.SOLVED and found.violation > FEASIBILITY
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 3])
@@ -243,8 +244,8 @@ def test_the_deadline_is_looked_at_in_every_iteration(ticks: int) -> None:
     """A clock that reaches the deadline after a number of readings; what has been found so far is returned."""
     mine = program(START, GOAL)
     readings = iter(range(1000))
-    found = solve(mine, quintic(mine), 3.0, deadline=ticks - 0.5, clock=lambda: float(next(readings)))
-    assert found.status == "out of time" and found.iterations == ticks + 1
+    found = solve(mine, quintic(mine), 3.0, deadline=Deadline(ticks - 0.5, clock=lambda: float(next(readings))))
+    assert found.status is SqpStatus.OUT_OF_TIME and found.iterations == ticks + 1
     assert found.cost == pytest.approx(mine.value(found.free, found.duration)[0])
 
 
@@ -254,7 +255,7 @@ def test_an_optimum_is_left_alone() -> None:
         mine = program(start, goal)
         first = solve(mine, quintic(mine), 1.5 * shortest(start, goal))
         again = solve(mine, first.free, first.duration, first.multiplier)
-        assert again.status == "solved" and again.iterations <= 3
+        assert again.status is SqpStatus.SOLVED and again.iterations <= 3
         assert again.cost == pytest.approx(first.cost, rel=SAME)
 
 
@@ -266,7 +267,7 @@ def test_electrical_optimum_does_not_depend_on_the_guess() -> None:
     for stretch in (0.7, 1.1, 2.0, 6.0):
         free = quintic(mine) + 0.1 * rng.normal(size=(mine.free_count, mine.r))
         found = solve(mine, free, stretch * shortest(START, GOAL))
-        assert found.status == "solved"
+        assert found.status is SqpStatus.SOLVED
         costs.append(found.cost)
     assert np.ptp(costs) < SAME * min(costs)
 
@@ -283,7 +284,7 @@ def test_in_haste_a_joint_moves_as_its_seven_segments() -> None:
     coordinates = Coordinates.joints(START, goal, ROBOT.limits)
     mine = NonlinearProgram(task.kernel, space, task.fastest_parameters, coordinates, 0.01, 600.0)
     found = solve(mine, quintic(mine), 3.0)
-    assert found.status == "solved"
+    assert found.status is SqpStatus.SOLVED
     assert (
         least * (1 - FEASIBILITY) <= found.duration <= least * 1.002
     )  # knots stay where they were for another duration

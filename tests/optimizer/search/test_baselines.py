@@ -94,7 +94,7 @@ def test_every_motion_is_what_it_says(name: str) -> None:
 def test_durations(name: str) -> None:
     own = {
         "ruckig": time_optimal(problem().arm.active_limits, START, GOAL).duration,
-        "controller_default": controller_default(problem(), START, GOAL).duration,
+        "controller_default": controller_default(ROBOT.limits, ROBOT.default_motion, START, GOAL).duration,
     }
     motion = guesses(problem(), START, GOAL, DURATION)[name]  # type: ignore[index]
     expected = own.get(name, DURATION)
@@ -114,7 +114,7 @@ def test_trapezoid_in_thirds() -> None:
     """Unless a limit objects: 1.5 Δ/T and 4.5 Δ/T²; its jerk is unbounded where a joint moves."""
     goal = GOAL.copy()
     goal[4] = START[4]
-    motion, displacement = trapezoid(problem(goal=goal), START, goal, DURATION), np.abs(goal - START)
+    motion, displacement = trapezoid(ROBOT.limits, START, goal, DURATION), np.abs(goal - START)
     assert motion.peak_v == pytest.approx(1.5 * displacement / DURATION, rel=EXACT)
     assert motion.peak_a == pytest.approx(4.5 * displacement / DURATION**2, rel=EXACT)
     assert motion.peak_jerk.tolist() == [math.inf] * 4 + [0.0, math.inf]
@@ -123,12 +123,12 @@ def test_trapezoid_in_thirds() -> None:
 def test_trapezoid_keeps_to_limits_where_it_can() -> None:
     """The blend that a limit asks for meets that limit exactly; where speed and acceleration disagree, thirds stay."""
     goal = one_joint(1.0)
-    slow = trapezoid(problem(goal=goal, limits=limits(v_max=1.2)), START, goal, 1.0)
+    slow = trapezoid(limits(v_max=1.2), START, goal, 1.0)
     assert slow.peak_v.max() == pytest.approx(1.2, rel=EXACT)
-    lazy = trapezoid(problem(goal=goal, limits=limits(a_max=4.2)), START, goal, 1.0)
+    lazy = trapezoid(limits(a_max=4.2), START, goal, 1.0)
     assert lazy.peak_a.max() == pytest.approx(4.2, rel=1e-9)  # by a square root near its branch point at 4
     for impossible in (limits(v_max=1.2, a_max=4.2), limits(v_max=0.9), limits(a_max=3.9)):
-        motion = trapezoid(problem(goal=goal, limits=impossible), START, goal, 1.0)
+        motion = trapezoid(impossible, START, goal, 1.0)
         assert motion.peak_v.max() == pytest.approx(1.5, rel=EXACT)
 
 
@@ -178,7 +178,7 @@ def test_slowing_scales_the_rates() -> None:
 )
 def test_controller_default_duration(displacement: float, duration: float) -> None:
     """A move of one joint, from the UR's default 1.0472 rad/s and 1.3963 rad/s²."""
-    motion = controller_default(problem(), START, one_joint(displacement))
+    motion = controller_default(ROBOT.limits, ROBOT.default_motion, START, one_joint(displacement))
     assert motion.duration == pytest.approx(duration, rel=EXACT)
     assert motion.peak_a.max() == pytest.approx(1.3963, rel=EXACT)
     assert motion.peak_v.max() <= 1.0472 * (1 + EXACT)
@@ -187,10 +187,10 @@ def test_controller_default_duration(displacement: float, duration: float) -> No
 def test_controller_default_is_led_by_one_axis() -> None:
     """The longest displacement sets the pace, the others keep in step on a straight line; tighter limits count."""
     displacement = np.abs(GOAL - START)
-    motion = controller_default(problem(), START, GOAL)
+    motion = controller_default(ROBOT.limits, ROBOT.default_motion, START, GOAL)
     assert motion.duration == pytest.approx(displacement.max() / 1.0472 + 1.0472 / 1.3963, rel=EXACT)
     assert motion.peak_v == pytest.approx(1.0472 * displacement / displacement.max(), rel=EXACT)
-    tight = controller_default(problem(limits=limits(v_max=0.5, a_max=1.0)), START, GOAL)
+    tight = controller_default(limits(v_max=0.5, a_max=1.0), ROBOT.default_motion, START, GOAL)
     assert tight.duration == pytest.approx(displacement.max() / 0.5 + 0.5 / 1.0, rel=EXACT)
 
 

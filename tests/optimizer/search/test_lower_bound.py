@@ -99,7 +99,7 @@ def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: in
         points = start + np.outer(space.quintic, goal - start)
         points[space.free] += bend * rng.normal(size=(space.n - 6, 6))
         spline = spline_of(space, points, 1.0)
-        peaks = peak_rates(spline) / np.stack([own.v_max, own.a_max, own.j_max])
+        peaks = peak_rates(spline) / own.rates
         duration = float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9)
         t, weights = quadrature(space.knots * duration, 24)
         curve = BSpline(space.knots * duration, points, DEGREE)

@@ -1,0 +1,119 @@
+"""Constraints along the motion (tool cone, TCP and elbow speed, clearance) as rows of an NLP, with their Hessian.
+
+Each constraint is a ratio value / limit of the joint positions q and speeds v. The NLP bounds every ratio at the path
+points of its basis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from models.robot import Array
+from optimizer.kinematics.path_constraints import ConstraintRatios, PathConstraints
+from optimizer.nlp.coordinates import Coordinates
+
+Index = npt.NDArray[np.intp]
+# step of q [rad] and v [rad/s] for finite differences of the ratios' gradients
+DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class PathConstraintValues:
+    """State and ratios at the M path points: q [rad] and v [rad/s] (M, nq), ratios (M, c) with gradients."""
+
+    q: Array
+    v: Array
+    ratios: ConstraintRatios
+
+
+@dataclass(frozen=True)
+class ActivePathConstraints:
+    """Constraints near their bounds: path point and column (rows,), slack (rows,), gradients (rows, n) by (s, T)."""
+
+    points: Index
+    columns: Index
+    slack: Array
+    gradients: Array
+
+
+@dataclass(frozen=True)
+class PathConstraintRows:
+    """Path constraints of one NLP as functions of its decision variables: free control points s (m, r), duration T.
+
+    `at_path` (2, M, n) and `at_path_free` (2, M, m) hold the basis functions and their first derivatives at the path
+    points, for all control points and for the free ones. `bounds` (c,) bounds the ratios.
+    """
+
+    constraints: PathConstraints | None
+    bounds: Array
+    coordinates: Coordinates
+    at_path: Array
+    at_path_free: Array
+
+    @property
+    def nq(self) -> int:
+        """Number of joints."""
+        return len(self.coordinates.origin)
+
+    @property
+    def n(self) -> int:
+        """Number of decision variables: the free control points row by row, then T."""
+        return int(self.at_path_free.shape[2]) * self.coordinates.r + 1
+
+    def values(self, points: Array, T: float) -> PathConstraintValues:
+        """Values for all control points (n, r); empty arrays without constraints."""
+        if self.constraints is None:
+            none = np.zeros((0, self.nq))
+            return PathConstraintValues(none, none, ConstraintRatios(none[:, :0], none[:, None], none[:, None]))
+        s, rising = self.at_path @ points
+        q, v = self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
+        return PathConstraintValues(q, v, self.constraints.linearised(q, v))
+
+    def active(self, values: PathConstraintValues, T: float, near: float) -> ActivePathConstraints:
+        """The constraints whose ratio exceeds `near` times its bound."""
+        if self.constraints is None:
+            none = np.zeros(0, dtype=np.intp)
+            return ActivePathConstraints(none, none, np.zeros(0), np.zeros((0, self.n)))
+        ratios = values.ratios
+        k, c = np.nonzero(ratios.value > near * self.bounds)
+        by_q, by_v = ratios.by_q[k, c], ratios.by_v[k, c]
+        at, rising = self.at_path_free[:, k, :, None]
+        P = self.coordinates.directions
+        by_points = at * (by_q @ P)[:, None] + rising * (by_v @ P / T)[:, None]
+        by_time = -np.einsum("rj,rj->r", by_v, values.v[k]) / T
+        gradients = np.hstack([by_points.reshape(len(k), self.n - 1), by_time[:, None]])
+        return ActivePathConstraints(k, c, self.bounds[c] - ratios.value[k, c], gradients)
+
+    def hessian(self, values: PathConstraintValues, T: float, weights: Array) -> Array:
+        """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the ratios' gradients."""
+        k = np.flatnonzero(weights.any(axis=1))
+        if self.constraints is None or not len(k):
+            return np.zeros((self.n, self.n))
+        nq, v = self.nq, values.v[k]
+        y = np.hstack([values.q[k], v])
+        stepped = np.concatenate([y[None], y + DIFFERENCE * np.eye(2 * nq)[:, None]]).reshape(-1, 2 * nq)
+        ratios = self.constraints.linearised(stepped[:, :nq], stepped[:, nq:])
+        w = np.tile(weights[k], (2 * nq + 1, 1))[..., None]
+        slopes = np.hstack([(w * ratios.by_q).sum(axis=1), (w * ratios.by_v).sum(axis=1)]).reshape(-1, len(k), 2 * nq)
+        bent = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
+        Y = np.concatenate(self._state_gradients(v, T, k), axis=1)
+        hessian: Array = Y.reshape(-1, self.n).T @ (bent @ Y).reshape(-1, self.n)
+        # second derivatives of v = s' / T by (s, T)
+        by_v, V = slopes[0][:, nq:], Y[:, nq:]
+        mixed = -np.einsum("kj,kjn->n", by_v, V)[:-1] / T
+        hessian[:-1, -1] += mixed
+        hessian[-1, :-1] += mixed
+        hessian[-1, -1] += 2 * float((by_v * v).sum()) / (T * T)
+        return hessian
+
+    def _state_gradients(self, v: Array, T: float, k: Index) -> tuple[Array, Array]:
+        """Gradients of q and v, (rows, nq, n) each, at the path points k (rows,), where the speed is v (rows, nq)."""
+        at, rising = self.at_path_free[:, k]
+        P, shape = self.coordinates.directions, (len(k), self.nq, self.n - 1)
+        Q = np.einsum("km,jr->kjmr", at, P).reshape(shape)
+        V = np.einsum("km,jr->kjmr", rising / T, P).reshape(shape)
+        none = np.zeros((len(k), self.nq, 1))
+        return np.concatenate([Q, none], axis=2), np.concatenate([V, -v[..., None] / T], axis=2)

@@ -1,0 +1,28 @@
+"""The rest-to-rest quintic s(τ) = 10 τ³ - 15 τ⁴ + 6 τ⁵ from 0 to 1, with s' = s'' = 0 at τ = 0 and τ = 1."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from models.robot import Array
+
+# greatest |s'|, |s''| and |s'''| by τ on [0, 1]
+PEAKS = np.array([15 / 8, 10 / math.sqrt(3), 60.0])
+
+
+def fraction(tau: Array) -> Array:
+    """s (k,) at τ (k,)."""
+    return np.asarray(tau**3 * (10 - 15 * tau + 6 * tau**2))
+
+
+def derivatives(tau: Array) -> Array:
+    """s, s' and s'' by τ, (3, k), at τ (k,)."""
+    return np.stack([fraction(tau), 30 * (tau * (1 - tau)) ** 2, 60 * tau * (1 - tau) * (1 - 2 * tau)])
+
+
+def coefficients(duration: Array) -> list[Array]:
+    """Coefficients of s(t / T) as a polynomial in t [s], highest power first, one array of the shape of T [s] each."""
+    none = 0 * duration
+    return [6 / duration**5, -15 / duration**4, 10 / duration**3, none, none, none]
