@@ -12,7 +12,7 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.collision.clearance_proof import clearance
+from optimizer.collision.clearance_proof import proven_clearance
 from optimizer.collision.model import collision_model
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.losses import breakdown
@@ -71,7 +71,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         balance_error=_worst(
             *(_relative(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
         ),
-        clearance=clearance(collision_model(problem.arm), spline) if problem.arm.collisions else None,
+        clearance=proven_clearance(collision_model(problem.arm), spline) if problem.arm.collisions else None,
     )
 
 

@@ -1,15 +1,10 @@
-"""What stands around the arm and what is fixed to it: shapes, validated on construction.
-
-Every shape is a convex core grown by a radius: a point or segment, a box, a cylinder's discs, a hull. Distances are
-computed on that form alone.
-"""
+"""Obstacles around the arm and shapes fixed to its flange, validated on construction."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -27,20 +22,6 @@ FLAT = 1e-6
 
 
 @dataclass(frozen=True)
-class Core:
-    """Points (m, 3) [m] whose hull, with every point widened to a disc of radius `ring` about z, grown by `radius`.
-
-    `half` (3,) is set for a box (half its edges). `plane`: the half-space below the point instead, z up.
-    """
-
-    points: Array
-    radius: float = 0.0
-    ring: float = 0.0
-    half: Array | None = None
-    plane: bool = False
-
-
-@dataclass(frozen=True)
 class Sphere:
     """A ball of `radius` [m] about the origin."""
 
@@ -48,11 +29,6 @@ class Sphere:
 
     def __post_init__(self) -> None:
         _size("radius", self.radius)
-
-    @property
-    def core(self) -> Core:
-        """Its form for distances."""
-        return Core(np.zeros((1, 3)), self.radius)
 
 
 @dataclass(frozen=True)
@@ -66,11 +42,6 @@ class Capsule:
         _size("radius", self.radius)
         _size("length", self.length)
 
-    @property
-    def core(self) -> Core:
-        """Its form for distances."""
-        return Core(_on_axis(self.length), self.radius)
-
 
 @dataclass(frozen=True)
 class Cylinder:
@@ -82,11 +53,6 @@ class Cylinder:
     def __post_init__(self) -> None:
         _size("radius", self.radius)
         _size("length", self.length)
-
-    @property
-    def core(self) -> Core:
-        """Its form for distances."""
-        return Core(_on_axis(self.length), ring=self.radius)
 
 
 @dataclass(frozen=True)
@@ -101,21 +67,10 @@ class Box:
             _size("size", edge)
         object.__setattr__(self, "size", size)
 
-    @property
-    def core(self) -> Core:
-        """Its form for distances."""
-        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-        return Core(signs * self.size / 2, half=self.size / 2)
-
 
 @dataclass(frozen=True)
 class HalfSpace:
     """All that lies below z = 0: a floor, or a wall whose z axis points into the room."""
-
-    @property
-    def core(self) -> Core:
-        """Its form for distances."""
-        return Core(np.zeros((1, 3)), plane=True)
 
 
 @dataclass(frozen=True)
@@ -138,11 +93,6 @@ class Mesh:
         except QhullError:
             raise InvalidProblem("vertices", "vertices span no body: give points that do not lie in a plane.") from None
         object.__setattr__(self, "vertices", numbers("vertices", vertices[hull.vertices], (-1, 3)))
-
-    @cached_property
-    def core(self) -> Core:
-        """Its form for distances."""
-        return Core(self.vertices)
 
 
 Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh
@@ -207,10 +157,6 @@ def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
     return Attachment(Capsule(radius, length), T)
-
-
-def _on_axis(length: float) -> Array:
-    return np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]])
 
 
 def _size(name: str, value: float) -> None:

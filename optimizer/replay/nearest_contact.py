@@ -46,10 +46,10 @@ class ClearanceMonitor:
         q = pieces.at(piece, t - pieces.breaks[piece])[0]
         spacing = max((end - begin) / (len(t) - 1), 0.0 if self.nearest is None else self.nearest.spacing)
         # most of the work is saved by what is far from everything: its bounding balls are enough then
-        within = min((c.distance for c in self._model.contacts(q[:: max(len(q) // COARSE, 1)])), default=np.inf)
+        within = min((c.distance for c in self._model.closest_pairs(q[:: max(len(q) // COARSE, 1)])), default=np.inf)
         at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
         for low in range(0, len(q), at_once):
-            contacts = self._model.contacts(q[low : low + at_once], within)
+            contacts = self._model.closest_pairs(q[low : low + at_once], within)
             for k, contact in enumerate(contacts, low):
                 if self.nearest is None or contact.distance < self.nearest.distance:
                     self.nearest = LeastClearance(contact.distance, contact.pair, float(t[k]), spacing)

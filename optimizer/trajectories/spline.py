@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -25,6 +26,11 @@ class Spline:
     def duration(self) -> float:
         """Length of the motion [s]."""
         return float(self.knots[-1])
+
+    @cached_property
+    def curve(self) -> BSpline:
+        """q and its derivatives as a function of time: `curve(t, order)` is (k, nq) at times t (k,) [s]."""
+        return BSpline(self.knots, self.control_points, self.degree)
 
 
 LONGEST_PANEL, LEAST_PANELS, MOST_PANELS = 0.2, 64, 2000
