@@ -33,7 +33,7 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
     # the later ones are graver: they do not depend on the load
     for k, contact in enumerate(
-        prepared.collisions.contacts(q, within=RESERVE) if prepared.problem.arm.collisions else ()
+        prepared.surroundings.model.closest_pairs(q, within=RESERVE) if prepared.problem.arm.collisions else ()
     ):
         if contact.distance < RESERVE:
             first, second = contact.pair
