@@ -63,10 +63,6 @@ class PreparedProblem(Plant):
         hold = float(self.holding_power(spline.control_points[-1]))
         return energy.with_dwell(dwell_energy(cycle, self.arm, hold, spline.duration))
 
-    def objective_of(self, energy: Energy) -> float:
-        """The part of an energy that is minimised [J]."""
-        return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total
-
     @cached_property
     def objective_parameters(self) -> Array:
         """Kernel parameters of the problem's objective."""
@@ -76,3 +72,7 @@ class PreparedProblem(Plant):
     def fastest_parameters(self) -> Array:
         """Kernel parameters that minimise the duration; a little energy beside it conditions the NLP."""
         return self.parameters(electrical=1.0, time=TIME_WEIGHT)
+
+    def objective_of(self, energy: Energy) -> float:
+        """The part of an energy that is minimised [J]."""
+        return energy.electrical.total if self.problem.objective == "electrical" else energy.mechanical.total

@@ -84,6 +84,7 @@ class _Proof:
 
     def __init__(self, model: CollisionModel, spline: Spline) -> None:
         self.model, self.geometry, self.spline = model, model.geometry, spline
+        self.curve = spline.curve
         self.levers = model.levers() * model.joints_between
         self.least = np.inf
         self.closest = (0, 0.0)
@@ -187,9 +188,7 @@ class _Proof:
         """
         h, degree = end - begin, self.spline.degree
         # the polynomial of each interval in powers of the elapsed fraction of it
-        powers = np.stack(
-            [self.spline.curve(begin, d) * (h**d / math.factorial(d))[:, None] for d in range(1, degree + 1)]
-        )
+        powers = np.stack([self.curve(begin, d) * (h**d / math.factorial(d))[:, None] for d in range(1, degree + 1)])
         orders = np.arange(1, degree + 1)[:, None, None]
         v = np.abs(_bernstein(powers * orders)).max(axis=0) / h[:, None]
         a = np.abs(_bernstein((powers * orders * (orders - 1))[1:])).max(axis=0) / h[:, None] ** 2
@@ -197,7 +196,7 @@ class _Proof:
 
     def instants(self, t: Array) -> _Instants:
         """Link frames at times (k,) [s]."""
-        return _Instants(t, self.model.frames(self.spline.curve(t)))
+        return _Instants(t, self.model.frames(self.curve(t)))
 
 
 def _bernstein(powers: Array) -> Array:

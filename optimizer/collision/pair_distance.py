@@ -50,21 +50,21 @@ class PairGeometry:
     def __init__(self, bodies: Sequence[Body], pairs: Indices) -> None:
         self.pairs = pairs
         cores = [body.core for body in bodies]
-        most = max(len(body.points) for body in bodies)
+        most = max((len(body.points) for body in bodies), default=0)
         # cores with fewer points repeat their last point
         self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
         self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
         self._disc_radii = np.array([core.disc_radius for core in cores])
-        self._ball_centres = np.array([body.ball_centre for body in bodies])
+        self._ball_centres = np.array([body.ball_centre for body in bodies]).reshape(-1, 3)
         self._ball_radii = np.array([body.ball_radius for body in bodies])
         self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
         self._half_sizes = np.array([np.zeros(3) if core.half_size is None else core.half_size for core in cores])
         self._T_link_core = np.array([body.T_link_core for body in bodies])
         growth = np.array([body.core.radius + body.margin for body in bodies])
         self._growth = growth[pairs].sum(axis=1)
-        self._half_space_first = np.array([core.is_half_space for core in cores])[pairs][:, 0]
-        segment = np.array([body.is_segment for body in bodies])[pairs]
-        box = np.array([core.half_size is not None for core in cores])[pairs]
+        self._half_space_first = np.array([core.is_half_space for core in cores], dtype=bool)[pairs][:, 0]
+        segment = np.array([body.is_segment for body in bodies], dtype=bool)[pairs]
+        box = np.array([core.half_size is not None for core in cores], dtype=bool)[pairs]
         kinds = np.select(
             [self._half_space_first, segment.all(axis=1), box[:, 0] & segment[:, 1], segment[:, 0] & box[:, 1]],
             [PairKind.HALF_SPACE, PairKind.SEGMENT_SEGMENT, PairKind.BOX_SEGMENT, PairKind.SEGMENT_BOX],

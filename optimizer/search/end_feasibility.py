@@ -37,7 +37,7 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     ):
         if contact.distance < RESERVE:
             first, second = contact.pair
-            words = f"{first} and {second} are {RESERVE - contact.distance:.4f} m nearer each other than they may be"
+            words = f"{first} and {second}: clearance {RESERVE - contact.distance:.4f} m too small"
             result[k] = InvalidReason(words, contact)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -27,9 +26,9 @@ class Spline:
         """Length of the motion [s]."""
         return float(self.knots[-1])
 
-    @cached_property
+    @property
     def curve(self) -> BSpline:
-        """q and its derivatives as a function of time: `curve(t, order)` is (k, nq) at times t (k,) [s]."""
+        """SciPy's spline: curve(t, d) is the d-th derivative of q, (k, nq), at times t (k,) [s]."""
         return BSpline(self.knots, self.control_points, self.degree)
 
 

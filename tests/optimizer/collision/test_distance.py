@@ -133,8 +133,9 @@ def test_what_is_compared() -> None:
     assert {b for a, b in pairs if a == "floor"} == {*links[1:], "tool", "payload"}, "the base does not move"
 
 
-def test_nothing_to_compare() -> None:
-    robot = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[:1])
+@pytest.mark.parametrize("capsules", [0, 1])
+def test_nothing_to_compare(capsules: int) -> None:
+    robot = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[:capsules])
     model = CollisionModel(Arm(robot=robot))
     assert model.signed_distances(np.zeros((3, 6)))[0].shape == (3, 0)
     assert model.closest_pairs(np.zeros((2, 6))) == []
