@@ -75,7 +75,7 @@ def cell_task(seed: int, index: int) -> CellTask:
         # the nearest configuration of the goal that can be come to
         for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
             if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, model=model):
-                blocked = model.least(np.linspace(q_start, q_goal, 200), 0.0) < 0
+                blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
                 return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
     raise AssertionError
 
@@ -92,7 +92,7 @@ def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
         found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal")
     except (UnreachablePose, SingularPose):
         return []
-    return [solution.q for solution in found if model.least(solution.q[None], 0.0) > 0]
+    return [solution.q for solution in found if model.least_distance(solution.q[None], 0.0) > 0]
 
 
 Draw = tuple[list[Obstacle], Callable[[], Array], Callable[[], Array]]

@@ -24,7 +24,7 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
 from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import FreeSpace
+from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
@@ -81,9 +81,9 @@ def run(task: CellTask, kind: str) -> Outcome:
     outcome.tried = dict(Counter(c.status for c in solution.candidates))
     found = solution.certificate.clearance
     outcome.proven = np.nan if found is None else found.min_clearance
-    space = FreeSpace(arm, CollisionModel(arm))
+    checker = StateValidityChecker(arm, CollisionModel(arm))
     t = np.append(np.arange(0.0, solution.duration, REPLAY), solution.duration)
-    outcome.hits = sum(not space.free(q) for q in sample(solution.trajectory.spline, t)[0])
+    outcome.hits = sum(not checker.is_valid(q) for q in sample(solution.trajectory.spline, t)[0])
     return outcome
 
 

@@ -64,7 +64,7 @@ def apart(seed: int, count: int) -> dict[str, Any]:
     model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):
-        if model.least(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:
+        if model.least_distance(np.stack([move.q_start, move.q_goal]), RESERVE) <= RESERVE:
             continue
         without, with_links = (solve(move, "bspline", collisions)[0] for collisions in (False, True))
         ratios.append(with_links / without)

@@ -84,7 +84,7 @@ def _apart(rng: np.random.Generator, robot: Robot) -> Array:
     model = CollisionModel(Arm(robot=robot))
     while True:
         q = rng.uniform(robot.limits.q_min, robot.limits.q_max)
-        if model.least(q[None], RESERVE) > RESERVE:
+        if model.least_distance(q[None], RESERVE) > RESERVE:
             return np.asarray(q)
 
 

@@ -14,7 +14,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap, to_hex, to_rgb
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-from scipy.interpolate import BSpline
 from scipy.spatial import ConvexHull
 
 from app.convert.request import to_problem
@@ -74,17 +73,17 @@ def quartered(t: Array) -> list[Array]:
 def surface(body: Body, T: Array) -> list[Array]:
     """Polygons of a body whose link is at T (4, 4)."""
     points = body.points @ T[:3, :3].T + T[:3, 3]
-    if body.core.plane:
+    if body.core.is_half_space:
         x, y = (np.linspace(m - h, m + h, 15) for m, h in zip(MIDDLE, HALF, strict=True))
         grid = np.stack([*np.meshgrid(x, y), np.zeros((15, 15))], axis=-1)
         R = (T @ body.T_link_core)[:3, :3]
         return quads(grid @ R.T + points[0])
     if body.is_segment:
         return capsule(points[0], points[-1], body.core.radius)
-    if body.core.ring:
+    if body.core.disc_radius:
         axis = (T @ body.T_link_core)[:3, :3]
         turn = np.linspace(0, 2 * np.pi, 2 * AROUND)
-        circle = body.core.ring * (np.cos(turn)[:, None] * axis[:, 0] + np.sin(turn)[:, None] * axis[:, 1])
+        circle = body.core.disc_radius * (np.cos(turn)[:, None] * axis[:, 0] + np.sin(turn)[:, None] * axis[:, 1])
         return hull(np.concatenate([point + circle for point in points]))
     return hull(points)
 
@@ -104,9 +103,8 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     problem = to_problem(request, request.deadline)
     solution = optimize(problem)
     spline = solution.trajectory.spline
-    curve = BSpline(spline.knots, spline.control_points, spline.degree)
     model = CollisionModel(problem.arm)
-    frames = model.frames(curve(np.linspace(0, spline.duration, instants)))
+    frames = model.frames(spline.curve(np.linspace(0, spline.duration, instants)))
     polygons: list[Array] = []
     colours: list[tuple[float, ...]] = []
 
@@ -118,7 +116,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     obstacles = {obstacle.name for obstacle in problem.arm.scene.obstacles}
     for body in model.bodies:
         if body.name in obstacles:
-            add(body, np.eye(4), OBSTACLE, 0.18 if body.core.plane else 0.4)
+            add(body, np.eye(4), OBSTACLE, 0.18 if body.core.is_half_space else 0.4)
             continue
         # what does not move is drawn once
         shown = range(instants) if body.link > 1 else [0]
@@ -132,7 +130,7 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
     figure = plt.figure(figsize=(9, 7.2))
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
     axes.add_collection3d(Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average"))
-    path = tcp_pose(problem.arm, curve(np.linspace(0, spline.duration, 200)))[:, :3, 3]
+    path = tcp_pose(problem.arm, spline.curve(np.linspace(0, spline.duration, 200)))[:, :3, 3]
     axes.plot(*path.T, color="black", linewidth=1.6, zorder=10, label="path of the TCP")
     for point, share, name in ((path[0], 0.0, "start"), (path[-1], 1.0, "goal")):
         axes.scatter(*point, color=to_hex(OVER_TIME(share)), edgecolors="black", s=45, zorder=11, label=name)

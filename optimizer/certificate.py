@@ -1,6 +1,7 @@
-"""The certificate: a motion replayed by Pinocchio on a fine grid, apart from the optimiser's basis and dynamics.
+"""Certificate of a motion: an independent check of the returned spline by Pinocchio on a grid of at most 1 ms.
 
-Nothing is taken from the solver but the spline that is returned to the caller and the energies claimed for it.
+It takes nothing from the solver except the spline and the energy reported for it. Torques, energies and the pose of the
+TCP come from Pinocchio's own recursions, not from the compiled kernel or the kinematics of the optimiser.
 """
 
 from __future__ import annotations
@@ -9,150 +10,183 @@ import math
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.collision.clearance_proof import clearance
+from optimizer.collision.clearance_proof import proven_clearance
 from optimizer.collision.model import collision_model
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.losses import breakdown
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.problem.arm import Arm
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Single, single
+from optimizer.problem.tool_cone import ToolCone
 from optimizer.solution import Certificate, Energy
 from optimizer.trajectories.limit_ratios import limit_ratios
 from optimizer.trajectories.quadrature import grid, simpson_weights
 from optimizer.trajectories.spline import Spline
 
-ENERGY_FLOOR = 1e-6  # J; below it a relative error says nothing
+ENERGY_FLOOR = 1e-6  # J; relative errors of energies below it are taken relative to it
 
 
 def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy) -> Certificate:
-    """Replay `spline` and hold it against everything that was asked and reported.
+    """Certificate of `spline` as a motion of `problem` whose energy is `reported`.
 
-    Of several targets, the problem must be `narrowed` to those reached. q_start, q_goal (nq,) [rad] are the joint
-    positions that the answer names as its ends. The grid is uniform, of at most 1 ms, and includes both ends. Motions
-    that leave the spline's own knots give NaN, which no tolerance passes.
+    A problem with several targets must be `narrowed` to those reached. q_start, q_goal (nq,) [rad] are the joint
+    positions that the answer names as its ends. The grid is uniform and includes both ends. A spline that does not
+    cover the grid gives NaN, which passes no tolerance.
     """
-    model = rigid_body_model(problem.arm)
-    data = model.createData()
-
-    t = grid(spline.duration)
-    curve = BSpline(spline.knots, spline.control_points, spline.degree, extrapolate=False)
-    q, v, a, jerk = (np.ascontiguousarray(curve(t, order)) for order in range(4))
-    tau = _inverse_dynamics(model, data, q, v, a)
-    tau_motor = tau + problem.arm.friction_law.torque(v)
-
-    energy = breakdown(
-        simpson_weights(t),
-        v,
-        tau,
-        potential=_change([pin.computePotentialEnergy(model, data, q[i]) for i in (0, -1)]),
-        kinetic=_change([pin.computeKineticEnergy(model, data, q[i], v[i]) for i in (0, -1)]),
-        arm=problem.arm,
-    )
+    arm, replay = problem.arm, _Replay(problem.arm, spline)
+    energy = replay.energy
     if problem.cycle is not None:
-        still = np.zeros_like(q[-1:])
-        hold = float(holding_power(problem.arm, _inverse_dynamics(model, data, q[-1:], still, still))[0])
-        energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, spline.duration))
-    limits = problem.arm.active_limits
+        dwell = dwell_energy(problem.cycle, arm, replay.final_holding_power, spline.duration)
+        energy = energy.with_dwell(dwell)
     return Certificate(
-        worst_ratio=limit_ratios(limits, q, v, a, jerk, tau_motor) | _path_ratios(problem, model, data, q, v),
-        start_error=_end_error(problem, single(problem.start), q_start, q[0], model, data),
-        goal_error=_end_error(problem, single(problem.goal), q_goal, q[-1], model, data),
-        rest_error=float(np.max([np.abs(v[[0, -1]]) / limits.v_max, np.abs(a[[0, -1]]) / limits.a_max])),
+        worst_ratio=replay.limit_ratios | replay.path_ratios,
+        start_error=replay.end_error(single(problem.start), q_start, replay.q[0]),
+        goal_error=replay.end_error(single(problem.goal), q_goal, replay.q[-1]),
+        rest_error=replay.rest_error,
         energy_error=_worst(
-            _relative(energy.electrical.total, reported.electrical.total),
-            _relative(energy.mechanical.total, reported.mechanical.total),
+            _relative_error(energy.electrical.total, reported.electrical.total),
+            _relative_error(energy.mechanical.total, reported.mechanical.total),
         ),
         balance_error=_worst(
-            *(_relative(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
+            *(_relative_error(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
         ),
-        clearance=clearance(collision_model(problem.arm), spline) if problem.arm.collisions else None,
+        clearance=proven_clearance(collision_model(arm), spline) if arm.collisions else None,
     )
 
 
-def _path_ratios(problem: Problem, model: pin.Model, data: pin.Data, q: Array, v: Array) -> dict[str, float]:
-    """The worst value / limit of where the tool points and how fast TCP and elbow move, of those that are limited."""
-    cone, elbow = problem.arm.tool_cone, problem.arm.robot.elbow
-    values: dict[str, list[float]] = {}
-    limited = [name for name in ("tool_cone", "tcp_speed", "elbow_speed") if getattr(problem.arm, name) is not None]
-    if not limited:
-        return {}
-    for q_k, v_k in zip(q, v, strict=True):
-        pin.forwardKinematics(model, data, q_k, v_k)
-        T_base_tcp = (
-            data.oMi[model.njoints - 1].homogeneous @ problem.arm.robot.T_last_flange @ problem.arm.T_flange_tcp
-        )
-        if cone is not None:
-            pointing = T_base_tcp[:3, :3] @ cone.axis
-            angle = math.atan2(float(np.linalg.norm(np.cross(pointing, cone.direction))), pointing @ cone.direction)
-            values.setdefault("tool_cone", []).append(angle / cone.half_angle)
-        if problem.arm.tcp_speed is not None:
-            speed = _speed(data, model.njoints - 1, T_base_tcp[:3, 3])
-            values.setdefault("tcp_speed", []).append(speed / problem.arm.tcp_speed)
-        if problem.arm.elbow_speed is not None and elbow is not None:
-            points = elbow.axis @ data.oMi[elbow.link].rotation.T + data.oMi[elbow.link].translation
-            speed = max(_speed(data, elbow.link, point) for point in points)
-            values.setdefault("elbow_speed", []).append(speed / problem.arm.elbow_speed)
-    return {name: float(np.max(each)) for name, each in values.items()}
+class _Replay:
+    """A motion on the grid, by Pinocchio: t (k,) [s]; q, v, a, jerk (k, nq) in rad and s; tau (k, nq) [N·m].
 
-
-def _speed(data: pin.Data, joint: int, x: Array) -> float:
-    """Speed [m/s] of a point at x (3,) in the base frame that a joint's link carries."""
-    motion = data.oMi[joint].act(data.v[joint])
-    return float(np.linalg.norm(motion.linear + np.cross(motion.angular, x)))
-
-
-def _inverse_dynamics(model: pin.Model, data: pin.Data, q: Array, v: Array, a: Array) -> Array:
-    """Rigid body and rotor torques (k, nv): Pinocchio's recursion adds armature · a."""
-    tau = np.empty_like(v)
-    rnea = pin.rnea
-    for k, (q_k, v_k, a_k) in enumerate(zip(q, v, a, strict=True)):
-        tau[k] = rnea(model, data, q_k, v_k, a_k)
-    return tau
-
-
-def _end_error(
-    problem: Problem, target: Single, named: Array, reached: Array, model: pin.Model, data: pin.Data
-) -> tuple[float, float]:
-    """(position [m], rotation [rad]) between the TCP reached and the target.
-
-    Forward kinematics cannot tell joint positions a full turn apart: the rotation is the largest joint's deviation
-    from the joints named (and from those asked for) where that is more. Where the orientation is free in part, it is
-    the angle to the nearest orientation allowed.
+    tau is the torque of rigid bodies and rotors, without friction.
     """
-    T_reached = _tcp(problem, reached, model, data)
-    if isinstance(target, ConeOrientedPose):
-        position = float(np.linalg.norm(T_reached[:3, 3] - target.position))
-        return position, _worst(excess_angle(target, T_reached[:3, :3]), float(np.abs(reached - named).max()))
-    if isinstance(target, Pose):
-        T_asked, joints = target.T, [named]
-    else:
-        T_asked, joints = _tcp(problem, target, model, data), [named, target]
-    position = float(np.linalg.norm(T_reached[:3, 3] - T_asked[:3, 3]))
-    rotation = float(np.linalg.norm(pin.log3(T_asked[:3, :3].T @ T_reached[:3, :3])))
-    return position, _worst(rotation, *(float(np.abs(reached - each).max()) for each in joints))
+
+    def __init__(self, arm: Arm, spline: Spline) -> None:
+        self.arm, self.model = arm, rigid_body_model(arm)
+        self.data = self.model.createData()
+        self._last, self._T_last_tcp, self._elbow = self.model.njoints - 1, T_last_tcp(arm), arm.robot.elbow
+        self.t, curve = grid(spline.duration), spline.curve
+        self.q, self.v, self.a, self.jerk = (
+            np.ascontiguousarray(curve(self.t, order, extrapolate=False)) for order in range(4)
+        )
+        self.tau = self.torques(self.q, self.v, self.a)
+
+    def torques(self, q: Array, v: Array, a: Array) -> Array:
+        """Rigid body and rotor torques (k, nq) [N·m]: Pinocchio's recursion adds armature · a."""
+        tau = np.empty_like(v)
+        rnea = pin.rnea
+        for k, (q_k, v_k, a_k) in enumerate(zip(q, v, a, strict=True)):
+            tau[k] = rnea(self.model, self.data, q_k, v_k, a_k)
+        return tau
+
+    @property
+    def energy(self) -> Energy:
+        """Energy of the motion by Simpson's rule, without waiting afterwards."""
+        potential, kinetic = pin.computePotentialEnergy, pin.computeKineticEnergy
+        ends = [
+            (potential(self.model, self.data, self.q[k]), kinetic(self.model, self.data, self.q[k], self.v[k]))
+            for k in (0, -1)
+        ]
+        gain_potential, gain_kinetic = (after - before for before, after in zip(*ends, strict=True))
+        weights = simpson_weights(self.t)
+        return breakdown(weights, self.v, self.tau, gain_potential, self.arm, kinetic=gain_kinetic)
+
+    @property
+    def final_holding_power(self) -> float:
+        """Power drawn [W] while the arm stands still at the end of the motion."""
+        standstill = np.zeros_like(self.q[-1:])
+        return float(holding_power(self.arm, self.torques(self.q[-1:], standstill, standstill))[0])
+
+    @property
+    def limit_ratios(self) -> dict[str, float]:
+        """The worst value / limit of position, velocity, acceleration, jerk and motor torque."""
+        tau_motor = self.tau + self.arm.friction_law.torque(self.v)
+        return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau_motor)
+
+    @property
+    def rest_error(self) -> float:
+        """The worst |v| / v_max and |a| / a_max at the two ends."""
+        limits, ends = self.arm.active_limits, [0, -1]
+        return float(np.max([np.abs(self.v[ends]) / limits.v_max, np.abs(self.a[ends]) / limits.a_max]))
+
+    @property
+    def path_ratios(self) -> dict[str, float]:
+        """The worst value / limit of the tool's angle in its cone and of the speeds of TCP and elbow, if limited."""
+        arm = self.arm
+        if arm.tool_cone is None and arm.tcp_speed is None and arm.elbow_speed is None:
+            return {}
+        ratios = [self._path_ratios_at(q, v) for q, v in zip(self.q, self.v, strict=True)]
+        return {name: float(np.max([each[name] for each in ratios])) for name in ratios[0]}
+
+    def end_error(self, target: Single, named: Array, reached: Array) -> tuple[float, float]:
+        """Error (position [m], rotation [rad]) of the TCP at `reached` (nq,) [rad] against the target.
+
+        Forward kinematics cannot tell joint positions apart that differ by full turns. The rotation is therefore at
+        least the largest deviation of a joint from the joint positions named, and from those of a joint target. For a
+        pose with an orientation tolerance it is measured from the nearest allowed orientation.
+        """
+        joint_error = float(np.abs(reached - named).max())
+        T_reached = self.tcp_pose(reached)
+        if isinstance(target, ConeOrientedPose):
+            position = float(np.linalg.norm(T_reached[:3, 3] - target.position))
+            return position, _worst(excess_angle(target, T_reached[:3, :3]), joint_error)
+        if isinstance(target, Pose):
+            T_target = target.T
+        else:
+            T_target = self.tcp_pose(target)
+            joint_error = _worst(joint_error, float(np.abs(reached - target).max()))
+        position = float(np.linalg.norm(T_reached[:3, 3] - T_target[:3, 3]))
+        rotation = float(np.linalg.norm(pin.log3(T_target[:3, :3].T @ T_reached[:3, :3])))
+        return position, _worst(rotation, joint_error)
+
+    def tcp_pose(self, q: Array) -> Array:
+        """T_base_tcp (4, 4) at q (nq,) [rad] by Pinocchio's forward kinematics."""
+        return self._tcp_pose(q, np.zeros_like(q))
+
+    def _tcp_pose(self, q: Array, v: Array) -> Array:
+        """T_base_tcp (4, 4); `data` then holds placements and velocities of all links at q [rad], v [rad/s] (nq,)."""
+        pin.forwardKinematics(self.model, self.data, q, v)
+        return np.asarray(self.data.oMi[self._last].homogeneous @ self._T_last_tcp)
+
+    def _path_ratios_at(self, q: Array, v: Array) -> dict[str, float]:
+        """Value / limit of each limited quantity of `path_ratios` at one state."""
+        arm, elbow, ratios = self.arm, self._elbow, {}
+        T_base_tcp = self._tcp_pose(q, v)
+        if arm.tool_cone is not None:
+            ratios["tool_cone"] = _tool_angle(arm.tool_cone, T_base_tcp) / arm.tool_cone.half_angle
+        if arm.tcp_speed is not None:
+            ratios["tcp_speed"] = self._speed(self._last, T_base_tcp[:3, 3]) / arm.tcp_speed
+        if arm.elbow_speed is not None and elbow is not None:
+            T_base_elbow = self.data.oMi[elbow.link]
+            ends = elbow.axis @ T_base_elbow.rotation.T + T_base_elbow.translation
+            ratios["elbow_speed"] = max(self._speed(elbow.link, x) for x in ends) / arm.elbow_speed
+        return ratios
+
+    def _speed(self, joint: int, x: Array) -> float:
+        """Speed [m/s] of the point at x (3,) [m] in the base frame that is fixed to the link of a joint.
+
+        It is that of the state of the last forward kinematics.
+        """
+        motion = self.data.oMi[joint].act(self.data.v[joint])
+        return float(np.linalg.norm(motion.linear + np.cross(motion.angular, x)))
 
 
-def _tcp(problem: Problem, q: Array, model: pin.Model, data: pin.Data) -> Array:
-    """T_base_tcp (4, 4) by forward kinematics."""
-    pin.forwardKinematics(model, data, q)
-    T_base_flange = pin.updateFramePlacement(model, data, model.getFrameId("flange"))
-    return np.asarray(T_base_flange.homogeneous @ problem.arm.T_flange_tcp)
+def _tool_angle(cone: ToolCone, T_base_tcp: Array) -> float:
+    """Angle [rad] between the tool axis and the direction of its cone."""
+    tool_axis = T_base_tcp[:3, :3] @ cone.axis
+    return math.atan2(float(np.linalg.norm(np.cross(tool_axis, cone.direction))), tool_axis @ cone.direction)
 
 
-def _change(ends: list[float]) -> float:
-    return ends[1] - ends[0]
-
-
-def _relative(value: float, reference: float) -> float:
+def _relative_error(value: float, reference: float) -> float:
     return abs(value - reference) / max(abs(reference), ENERGY_FLOOR)
 
 
 def _worst(*values: float) -> float:
-    """The largest; NaN if any is NaN, unlike `max`."""
+    """The largest value; NaN if any is NaN, unlike `max`."""
     return float(np.max(values))

@@ -179,10 +179,10 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Clearance:
-    """How far a motion keeps away from what it could hit, the margins asked for taken off [m].
+    """Clearance of a motion [m], with the margins subtracted; negative if bodies overlap.
 
-    `min_clearance` is proven for every instant; `sampled` is the least distance met, of `pair` at `time` [s]: the truth
-    lies between the two. Below zero they overlap.
+    `min_clearance` is proven for every instant. `sampled` is the least distance at sample points, of `pair` at `time`
+    [s]. The true least distance lies between the two.
     """
 
     min_clearance: float
@@ -192,9 +192,9 @@ class Clearance:
 
     @property
     def message(self) -> str:
-        """What comes too near what."""
+        """The two bodies and the missing clearance [m]."""
         first, second = self.pair
-        return f"{first} and {second} are {max(-self.sampled, 0.0):.4f} m nearer each other than they may be"
+        return f"{first} and {second}: clearance {max(-self.sampled, 0.0):.4f} m too small"
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,10 @@ from app.convert.motion_csv import FIRST_ROW, MotionCsv
 from app.convert.solution import energy_fields
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, Nearest
 from optimizer.exceptions import InvalidProblem
-from optimizer.replay.evaluate import Evaluation, IntervalEnergy, Samples
+from optimizer.replay.evaluate import Evaluation
+from optimizer.replay.interval_energy import IntervalEnergy
 from optimizer.replay.recording import Log, Waypoints, in_blocks
+from optimizer.replay.sampler import Samples
 
 
 def to_motion(request: EvaluateRequest) -> Waypoints | Log:

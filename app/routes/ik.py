@@ -35,6 +35,6 @@ def solve(request: Request, body: IKRequest) -> Response:
     robot = robot_named(body.robot)
     kinematics = required_inverse_kinematics(robot, "pose")
     solutions = kinematics.solve(to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal")
-    contacts = collision_model(to_arm(body, robot)).contacts([solution.q for solution in solutions])
+    contacts = collision_model(to_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
     content = to_ik_response(body, request.state.id, solutions, contacts)
     return Response(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), media_type="application/json")

@@ -1,4 +1,4 @@
-"""Bodies that can collide: convex cores fixed to links, tool, payload and obstacles."""
+"""Bodies that can collide: convex cores fixed to the links, to the flange (tool, payload) and to the base (scene)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from models.robot import Array
+from optimizer.collision.cores import Core, core_of
 from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Core
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 TOOL, PAYLOAD = "tool", "payload"
@@ -17,7 +17,10 @@ TOOL, PAYLOAD = "tool", "payload"
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A core fixed to a link (0: the base or the surroundings) at `T_link_core`; kept `margin` [m] away from."""
+    """A core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
+
+    Other bodies must stay at least `margin` [m] away from it.
+    """
 
     name: str
     link: int
@@ -27,37 +30,37 @@ class Body:
 
     @cached_property
     def points(self) -> Array:
-        """The core's points (m, 3) in the link frame."""
+        """The core's points (m, 3) [m] in the link frame."""
         return self.core.points @ self.T_link_core[:3, :3].T + self.T_link_core[:3, 3]
 
     @property
-    def middle(self) -> Array:
-        """Centre (3,) of a ball that holds the core, in the link frame."""
+    def ball_centre(self) -> Array:
+        """Centre (3,) [m] of a ball that encloses the core, in the link frame."""
         return np.asarray((self.points.min(axis=0) + self.points.max(axis=0)) / 2)
 
     @property
-    def reach(self) -> float:
-        """Radius of that ball, the core's own radius left out."""
-        return float(np.linalg.norm(self.points - self.middle, axis=1).max()) + self.core.ring
+    def ball_radius(self) -> float:
+        """Radius [m] of that ball; the core's own radius is not included."""
+        return float(np.linalg.norm(self.points - self.ball_centre, axis=1).max()) + self.core.disc_radius
 
     @property
     def is_segment(self) -> bool:
         """Whether the core is a point or a segment."""
         core = self.core
-        return len(core.points) <= 2 and core.ring == 0 and not core.plane
+        return len(core.points) <= 2 and core.disc_radius == 0 and not core.is_half_space
 
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
-    """The robot's capsules, then what it carries, then what surrounds it."""
+    """Bodies of an arm: the capsules of the robot, then tool and payload, then the obstacles of the scene."""
     robot, last = arm.robot, arm.robot.nq
     T_last_flange = robot.T_last_flange
     links = [
         Body(robot.link_names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
         for capsule in robot.capsules
     ]
-    carried = [Body(TOOL, last, part.shape.core, T_last_flange @ part.T_flange_shape) for part in arm.tool]
+    attached = [Body(TOOL, last, core_of(part.shape), T_last_flange @ part.T_flange_shape) for part in arm.tool]
     if arm.payload.shape is not None:
-        shape = arm.payload.shape
-        carried.append(Body(PAYLOAD, last, shape.shape.core, T_last_flange @ shape.T_flange_shape))
-    around = [Body(o.name, 0, o.shape.core, o.T_base_shape, o.margin) for o in arm.scene.obstacles]
-    return (*links, *carried, *around)
+        attachment = arm.payload.shape
+        attached.append(Body(PAYLOAD, last, core_of(attachment.shape), T_last_flange @ attachment.T_flange_shape))
+    obstacles = [Body(o.name, 0, core_of(o.shape), o.T_base_shape, o.margin) for o in arm.scene.obstacles]
+    return (*links, *attached, *obstacles)

@@ -1,22 +1,23 @@
-"""How far a motion keeps away from everything, proven over continuous time.
+"""Lower bound on the clearance of a motion, proven over continuous time.
 
-For a fixed unit normal n in the frame of a pair's first body, sep_n(t) = min n·x over the second less max n·x over the
-first is never more than the signed distance. Every point of the second body moves, seen from the first, with an
-acceleration of at most
+For a unit vector n fixed in the frame of a pair's first body, sep_n(t) = min n·x over the second body - max n·x over
+the first never exceeds the signed distance. Relative to the first body, the acceleration of a point of the second body
+is at most
 
     A = Σ_k lever_k (|a_k| + v_k² + 2 |v_k| Σ_{j<k} |v_j|)        over the joints between the two,
 
-so that n·x(t) lies above its chord over an interval of length h less A h² / 8. Hence over the interval
+where lever_k [m] bounds its distance from the axis of joint k. Over an interval of length h [s], n·x(t) is therefore at
+least its chord less A h² / 8, and
 
     distance(t) ≥ min(sep_n(begin), sep_n(end)) - A h² / 8.
 
-|v_k| and |a_k| are bounded by the Bernstein coefficients of the polynomials that they are within a knot span. n is the
-normal at either end, whichever gives more; a wrong n could only weaken the bound. Intervals whose bound is not near
-enough to the least distance sampled are halved.
+The Bernstein coefficients of the spline's polynomial in a knot span bound |v_k| and |a_k|. n is the normal at one of
+the two ends of the interval, whichever gives the higher bound. The bound holds for every n: a poor normal makes it
+weaker, not wrong. An interval whose bound is too far below the least sampled distance is halved.
 
-Before all that, pairs far apart are done with: no point of the second body passes the first faster than
-L = Σ_k lever_k |v_k|, so that a distance bounded by that of the bodies' balls at both ends of an interval is at least
-(ball(begin) + ball(end) - L h) / 2 all along it.
+Pairs that are far apart are removed first: the relative speed of a point of the second body is at most
+L = Σ_k lever_k |v_k|. If ball(t) bounds the distance from below by that of the bodies' enclosing balls, the distance is
+at least (ball(begin) + ball(end) - L h) / 2 throughout the interval.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from models.robot import Array
 from optimizer.collision.bodies import Indices
@@ -34,27 +34,30 @@ from optimizer.collision.model import CollisionModel
 from optimizer.solution import Clearance
 from optimizer.trajectories.spline import Spline
 
-# the proven bound comes this near to the least distance sampled: absolutely [m], or as a share of it
+# an interval is done if its bound is this near to the least sampled distance: absolutely [m], or relative to it
 GAP, RELATIVE_GAP = 1e-4, 0.01
 LEAST_INTERVALS = 32
-# halvings of an interval, and pairs at intervals looked at, before the proof is left where it stands
+# the proof ends with the bound reached so far after this many halvings, or checks of a pair over an interval
 MOST_LEVELS, MOST_CHECKS = 20, 400_000
 
 
 @dataclass(frozen=True)
-class _Times:
-    """Instants looked at: when (k,) [s] and where everything is."""
+class _Instants:
+    """Times t (k,) [s] and the link frames there (k, nq + 1, 4, 4)."""
 
     t: Array
     frames: Array
 
-    def with_more(self, more: _Times) -> _Times:
-        return _Times(np.concatenate([self.t, more.t]), np.concatenate([self.frames, more.frames]))
+    def with_more(self, more: _Instants) -> _Instants:
+        return _Instants(np.concatenate([self.t, more.t]), np.concatenate([self.frames, more.frames]))
 
 
 @dataclass(frozen=True)
 class _Checks:
-    """Pairs over intervals: numbers of the pair and of the instants at both ends, and the normals there (k, 3)."""
+    """Pairs over intervals (k,): indices of the pair and of the instants at both ends, and both normals (k, 3) there.
+
+    The normals are those from the first body to the second, in the base frame.
+    """
 
     pair: Indices
     begin: Indices
@@ -65,140 +68,142 @@ class _Checks:
         first, second = self.normals
         return _Checks(self.pair[chosen], self.begin[chosen], self.end[chosen], (first[chosen], second[chosen]))
 
+    def distinct_intervals(self) -> tuple[Indices, Indices]:
+        """The different intervals (m, 2), as indices of instants, and which of them each check (k,) is about."""
+        intervals, which = np.unique(np.column_stack([self.begin, self.end]), axis=0, return_inverse=True)
+        return intervals, which.ravel()
 
-def clearance(model: CollisionModel, spline: Spline) -> Clearance | None:
-    """The least distance over the motion, less the margins asked for; None where nothing is compared with anything."""
+
+def proven_clearance(model: CollisionModel, spline: Spline) -> Clearance | None:
+    """Proven and sampled clearance of a motion, margins subtracted; None if the model checks no pair."""
     return _Proof(model, spline).run() if len(model.pairs) else None
 
 
 class _Proof:
-    """One motion being proven."""
+    """The proof for one motion. `least` [m] is the least distance sampled so far, of `closest`: pair and time [s]."""
 
     def __init__(self, model: CollisionModel, spline: Spline) -> None:
-        self.model, self.spline = model, spline
-        self.curve = BSpline(spline.knots, spline.control_points, spline.degree)
-        self.levers = model.levers() * model.between
+        self.model, self.geometry, self.spline = model, model.geometry, spline
+        self.curve = spline.curve
+        self.levers = model.levers() * model.joints_between
         self.least = np.inf
-        self.where = (0, 0.0)
+        self.closest = (0, 0.0)
 
     def run(self) -> Clearance:
-        """Halves intervals until every one is proven, or the effort is spent."""
-        times, checks = self.outset()
-        proven, looked = np.inf, 0
+        """Halves intervals until all are proven, or the limits on the effort are reached."""
+        instants, checks = self.initial_intervals()
+        proven, checked = np.inf, 0
         for level in range(MOST_LEVELS):
-            looked += len(checks.pair)
-            bound = self.bounds(times, checks)
+            checked += len(checks.pair)
+            bound = self.bounds(instants, checks)
             enough = self.least - max(GAP, RELATIVE_GAP * abs(self.least))
-            if level == MOST_LEVELS - 1 or looked > MOST_CHECKS:
-                open_ = np.empty(0, dtype=np.intp)
-            else:
-                open_ = np.flatnonzero(bound < enough)
-            closed = np.ones(len(bound), dtype=bool)
-            closed[open_] = False
-            proven = min(proven, float(bound[closed].min(initial=np.inf)))
-            if not open_.size:
+            is_last = level == MOST_LEVELS - 1 or checked > MOST_CHECKS
+            is_open = np.zeros(len(bound), dtype=bool) if is_last else bound < enough
+            proven = min(proven, float(bound[~is_open].min(initial=np.inf)))
+            if not is_open.any():
                 break
-            times, checks = self.halved(times, checks[open_])
-        # never above what was sampled, where a bound is exact but for rounding
-        pair, t = self.where
+            instants, checks = self.halved(instants, checks[np.flatnonzero(is_open)])
+        # rounding may put a bound that is exact above the sample
+        pair, t = self.closest
         return Clearance(min(proven, self.least), self.least, self.model.names(pair), t)
 
-    def outset(self) -> tuple[_Times, _Checks]:
-        """Intervals that each lie within a knot span, and the pairs that may be the nearest there."""
+    def initial_intervals(self) -> tuple[_Instants, _Checks]:
+        """Intervals, each within a knot span, and the pairs that may be the closest there."""
         spans = np.unique(self.spline.knots)
-        share = self.spline.duration / LEAST_INTERVALS
-        parts = [np.linspace(a, b, math.ceil((b - a) / share), endpoint=False) for a, b in pairwise(spans)]
+        longest = self.spline.duration / LEAST_INTERVALS
+        parts = [np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False) for a, b in pairwise(spans)]
         t = np.concatenate([*parts, spans[-1:]])
-        times = self.at(t)
+        instants = self.instants(t)
         n, p = len(t), len(self.model.pairs)
-        balls = self.model.pair_distances(times.frames, within=-np.inf).distance
-        self.sampled(times, np.arange(n), balls.argmin(axis=1))
-        v, _, h = self.rates(t[:-1], t[1:])
-        passed = (v * h[:, None]) @ self.levers.T
-        open_ = (balls[:-1] + balls[1:] - passed) / 2 < self.least
-        looked_at = np.zeros((n, p), dtype=bool)
-        looked_at[:-1] |= open_
-        looked_at[1:] |= open_
-        instant, pair = np.nonzero(looked_at)
+        # those of half-spaces, which no ball encloses, are exact
+        ball_distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
+        self.sample_normals(instants, np.arange(n), ball_distances.argmin(axis=1))
+        v, _, h = self.rate_bounds(t[:-1], t[1:])
+        travel = (v * h[:, None]) @ self.levers.T
+        is_open = (ball_distances[:-1] + ball_distances[1:] - travel) / 2 < self.least
+        is_needed = np.zeros((n, p), dtype=bool)
+        is_needed[:-1] |= is_open
+        is_needed[1:] |= is_open
+        instant, pair = np.nonzero(is_needed)
         normals = np.zeros((n, p, 3))
-        normals[instant, pair] = self.sampled(times, instant, pair)
-        begin, pair = np.nonzero(open_)
-        return times, _Checks(pair, begin, begin + 1, (normals[begin, pair], normals[begin + 1, pair]))
+        normals[instant, pair] = self.sample_normals(instants, instant, pair)
+        begin, pair = np.nonzero(is_open)
+        return instants, _Checks(pair, begin, begin + 1, (normals[begin, pair], normals[begin + 1, pair]))
 
-    def halved(self, times: _Times, checks: _Checks) -> tuple[_Times, _Checks]:
-        """Both halves of every interval, with the normals in the middle."""
-        intervals, which = np.unique(np.column_stack([checks.begin, checks.end]), axis=0, return_inverse=True)
-        middles = self.at(times.t[intervals].mean(axis=1))
-        middle = which.ravel() + len(times.t)
-        times = times.with_more(middles)
-        normal = self.sampled(times, middle, checks.pair)
+    def halved(self, instants: _Instants, checks: _Checks) -> tuple[_Instants, _Checks]:
+        """Both halves of every interval, with the normals at the middle."""
+        intervals, which = checks.distinct_intervals()
+        middle = which + len(instants.t)
+        instants = instants.with_more(self.instants(instants.t[intervals].mean(axis=1)))
+        normal = self.sample_normals(instants, middle, checks.pair)
         first, second = checks.normals
-        return times, _Checks(
+        return instants, _Checks(
             np.concatenate([checks.pair, checks.pair]),
             np.concatenate([checks.begin, middle]),
             np.concatenate([middle, checks.end]),
             (np.concatenate([first, normal]), np.concatenate([normal, second])),
         )
 
-    def sampled(self, times: _Times, instant: Indices, pair: Indices) -> Array:
-        """Normals (k, 3) of pairs at instants, whose distances count as samples."""
-        found = self.model.nearest(times.frames, instant, pair)
+    def sample_normals(self, instants: _Instants, instant: Indices, pair: Indices) -> Array:
+        """Normals (k, 3) of pairs (k,) at instants (k,). Their distances update the least sampled distance."""
+        found = self.geometry.witness_points(instants.frames, instant, pair)
         if len(pair):
             k = int(found.distance.argmin())
             if found.distance[k] < self.least:
-                self.least, self.where = float(found.distance[k]), (int(pair[k]), float(times.t[instant[k]]))
+                self.least, self.closest = float(found.distance[k]), (int(pair[k]), float(instants.t[instant[k]]))
         return found.normal
 
-    def bounds(self, times: _Times, checks: _Checks) -> Array:
+    def bounds(self, instants: _Instants, checks: _Checks) -> Array:
         """Lower bounds (k,) [m] on the distances over the intervals."""
         begin, end, pair = checks.begin, checks.end, checks.pair
-        sag = self.sag(times, checks)
-        first = self.model.pairs[pair, 0]
-        link = self.model.links[first]
-        R_begin, R_end = times.frames[begin, link][:, :3, :3], times.frames[end, link][:, :3, :3]
+        link = self.geometry.links[self.model.pairs[pair, 0]]
+        R_begin, R_end = instants.frames[begin, link][:, :3, :3], instants.frames[end, link][:, :3, :3]
         best = np.full(len(pair), -np.inf)
         for normal, R_from in zip(checks.normals, (R_begin, R_end), strict=True):
-            fixed = np.einsum("kij,ki->kj", R_from, normal)
-            least = np.minimum(
-                *(
-                    self.model.separation(times.frames, at, pair, np.einsum("kij,kj->ki", R_to, fixed))
-                    for at, R_to in ((begin, R_begin), (end, R_end))
-                )
-            )
-            best = np.maximum(best, least)
-        return best - sag
+            in_link = np.einsum("kij,ki->kj", R_from, normal)
+            separations = [
+                self.geometry.separation(instants.frames, at, pair, np.einsum("kij,kj->ki", R_to, in_link))
+                for at, R_to in ((begin, R_begin), (end, R_end))
+            ]
+            best = np.maximum(best, np.minimum(*separations))
+        return best - self.chord_errors(instants, checks)
 
-    def sag(self, times: _Times, checks: _Checks) -> Array:
+    def chord_errors(self, instants: _Instants, checks: _Checks) -> Array:
         """A h² / 8 (k,) [m]."""
-        intervals, which = np.unique(np.column_stack([checks.begin, checks.end]), axis=0, return_inverse=True)
-        v, a, h = self.rates(*times.t[intervals].T)
+        intervals, which = checks.distinct_intervals()
+        v, a, h = self.rate_bounds(*instants.t[intervals].T)
         before = np.cumsum(v, axis=1) - v
-        between = self.model.between[checks.pair]
-        which = which.ravel()
-        # joints below the first body do not count: their speeds are taken out of the running sum
+        between = self.model.joints_between[checks.pair]
+        # joints below the first body move both bodies alike: their speeds are taken out of the running sum
         below = np.where(between, 0.0, v[which]).cumsum(axis=1)
         lower = before[which] - np.where(between, below, 0.0)
         v, a = v[which], a[which]
         acceleration = (self.levers[checks.pair] * (a + v**2 + 2 * v * np.maximum(lower, 0.0))).sum(axis=1)
         return np.asarray(acceleration * h[which] ** 2 / 8)
 
-    def rates(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
-        """Bounds on |v| and |a| (k, nq) over intervals from begin to end (k,) [s], and their lengths (k,) [s]."""
+    def rate_bounds(self, begin: Array, end: Array) -> tuple[Array, Array, Array]:
+        """Bounds on |v| [rad/s] and |a| [rad/s²] (k, nq) over intervals (k,) [s], and the intervals' lengths (k,) [s].
+
+        Each interval must lie within a knot span.
+        """
         h, degree = end - begin, self.spline.degree
-        # the polynomial of each interval in powers of the share of it that has passed
+        # the polynomial of each interval in powers of the elapsed fraction of it
         powers = np.stack([self.curve(begin, d) * (h**d / math.factorial(d))[:, None] for d in range(1, degree + 1)])
         orders = np.arange(1, degree + 1)[:, None, None]
         v = np.abs(_bernstein(powers * orders)).max(axis=0) / h[:, None]
         a = np.abs(_bernstein((powers * orders * (orders - 1))[1:])).max(axis=0) / h[:, None] ** 2
         return v, a, h
 
-    def at(self, t: Array) -> _Times:
-        """Where everything is at times (k,)."""
-        return _Times(t, self.model.frames(self.curve(t)))
+    def instants(self, t: Array) -> _Instants:
+        """Link frames at times (k,) [s]."""
+        return _Instants(t, self.model.frames(self.curve(t)))
 
 
 def _bernstein(powers: Array) -> Array:
-    """Bernstein coefficients (d + 1, …) on [0, 1] of polynomials given by powers (d + 1, …): their hull holds them."""
+    """Bernstein coefficients (d + 1, …) on [0, 1] of polynomials with coefficients (d + 1, …), lowest power first.
+
+    The values of a polynomial lie within the convex hull of its Bernstein coefficients.
+    """
     degree = len(powers) - 1
     matrix = np.array([[math.comb(i, k) / math.comb(degree, k) for k in range(degree + 1)] for i in range(degree + 1)])
     return np.tensordot(matrix, powers, axes=1)

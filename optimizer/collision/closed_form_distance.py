@@ -1,8 +1,10 @@
 """Signed distances between segments, and between segments and boxes, in closed form for many pairs at once.
 
-A signed distance is max over unit n of (min over x in b of n·x - max over y in a of n·y): the gap between two convex
-bodies where they are apart, less than zero by the least translation that parts them where they are not. The n that
-attains it is the unit normal, from a to b.
+The signed distance of two convex bodies a and b is the maximum over unit vectors n of min n·x over b - max n·x over a.
+If they are apart, it is their distance; if they overlap, minus the length of the shortest translation that separates
+them. The n that attains the maximum is the unit normal, from a to b.
+
+Two segments: C. Ericson, "Real-Time Collision Detection", 2005, 5.1.9.
 """
 
 from __future__ import annotations
@@ -11,18 +13,18 @@ import numpy as np
 
 from models.robot import Array
 
-# two cores nearer than this [m] touch: the direction between them is rounding
+# two cores nearer than this [m] touch: the direction from one to the other is only rounding
 TOUCHING = 1e-10
-# squared length below which a direction counts as none [m²]
+# squared length [m²] below which a vector has no direction
 NONE = 1e-24
 
 
 def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
-    """Distance (k,), normal (k, 3) from a to b, and nearest points (k, 3) of segments a, b (k, 2, 3).
+    """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of segments a, b (k, 2, 3) [m].
 
-    The nearest points of two segments are inside both, or an end is one of them: five candidates, each feasible, the
-    nearest of which is exact, parallel segments or not. Where the segments cross the distance is 0 and the normal the
-    common perpendicular.
+    Either both witness points are inside their segments, or one of them is an end: five candidates, all feasible. The
+    nearest of them is exact, also for parallel segments. If the segments cross, the distance is 0 and the normal is
+    the common perpendicular.
     """
     u, v, w = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0], a[:, 0] - b[:, 0]
     uu, vv, uv, uw, vw = (_dot(x, y) for x, y in ((u, u), (v, v), (u, v), (u, w), (v, w)))
@@ -51,38 +53,41 @@ def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
     return distance, normal, p, r
 
 
-def box_segment(half: Array, b: Array) -> tuple[Array, Array, Array]:
-    """Signed distance (k,), normal (k, 3) and a point (k, 3) of the segment on the normal through the nearest points.
+def box_segment(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Signed distance (k,) [m], normal (k, 3) from box to segment, and the witness point (k, 3) [m] of the segment.
 
-    half (k, 3): half edges of boxes about the origin; b (k, 2, 3): segments in the boxes' frames.
-    The derivative of half the squared distance along the segment is piecewise linear and rises: its root is exact.
+    half_size (k, 3) [m]: half of the edges of boxes about the origin; b (k, 2, 3) [m]: segments in the boxes' frames.
+    The derivative of half the squared distance along the segment is piecewise linear and increasing: its root is exact.
     """
     p0, u = b[:, 0], b[:, 1] - b[:, 0]
     safe = np.where(np.abs(u) > 1e-15, u, 1.0)
-    breaks = np.concatenate([(half - p0) / safe, (-half - p0) / safe], axis=1)
+    breaks = np.concatenate([(half_size - p0) / safe, (-half_size - p0) / safe], axis=1)
     breaks = np.clip(np.where(np.tile(np.abs(u) > 1e-15, 2), breaks, 0.0), 0, 1)
     s = np.sort(np.concatenate([np.zeros((len(b), 1)), breaks, np.ones((len(b), 1))], axis=1), axis=1)
     points = p0[:, None] + s[..., None] * u[:, None]
-    slope = np.einsum("kmi,ki->km", points - np.clip(points, -half[:, None], half[:, None]), u)
+    slope = np.einsum("kmi,ki->km", points - np.clip(points, -half_size[:, None], half_size[:, None]), u)
     rising = slope >= 0
     after = np.where(rising.any(axis=1), rising.argmax(axis=1), s.shape[1] - 1)
     before = np.maximum(after - 1, 0)
     rows = np.arange(len(b))
     s0, s1, g0, g1 = s[rows, before], s[rows, after], slope[rows, before], slope[rows, after]
     crossing = (g0 < 0) & (g1 > 0)
-    share = np.where(crossing, -g0 / np.where(crossing, g1 - g0, 1.0), 1.0)
-    point = p0 + (s0 + share * (s1 - s0))[:, None] * u
-    across = point - np.clip(point, -half, half)
+    fraction = np.where(crossing, -g0 / np.where(crossing, g1 - g0, 1.0), 1.0)
+    point = p0 + (s0 + fraction * (s1 - s0))[:, None] * u
+    across = point - np.clip(point, -half_size, half_size)
     distance = np.sqrt(_dot(across, across))
     touching = distance < TOUCHING
     normal = across / np.where(touching, 1.0, distance)[:, None]
     if touching.any():
-        distance[touching], normal[touching], point[touching] = _penetration(half[touching], b[touching])
+        distance[touching], normal[touching], point[touching] = _penetration(half_size[touching], b[touching])
     return distance, normal, point
 
 
-def _penetration(half: Array, b: Array) -> tuple[Array, Array, Array]:
-    """The same for segments that meet the box: the facets of the box swept along the segment are the candidates."""
+def _penetration(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
+    """The same as `box_segment` for segments that meet the box.
+
+    The candidates for the normal are those of the facets of the box swept along the segment.
+    """
     u = b[:, 1] - b[:, 0]
     faces = np.broadcast_to(np.eye(3), (len(b), 3, 3))
     edges = np.cross(u[:, None], faces)
@@ -91,18 +96,18 @@ def _penetration(half: Array, b: Array) -> tuple[Array, Array, Array]:
     directions = np.concatenate([faces, edges], axis=1)
     directions = np.concatenate([directions, -directions], axis=1)
     ends = np.einsum("kmi,kei->kme", directions, b)
-    depth = ends.min(axis=2) - np.einsum("kmi,ki->km", np.abs(directions), half)
+    depth = ends.min(axis=2) - np.einsum("kmi,ki->km", np.abs(directions), half_size)
     best, rows = depth.argmax(axis=1), np.arange(len(b))
     normal = directions[rows, best]
     point = b[rows, ends[rows, best].argmin(axis=1)]
-    # against an edge, what touches it is not an end of the segment but where the two cross, seen along the normal
+    # at an edge of the box, the witness point is where segment and edge cross, seen along the normal
     edge = best % 6 - 3
     crossed = edge >= 0
     across = np.cross(normal[crossed], np.eye(3)[edge[crossed]])
     start, along = b[crossed, 0], u[crossed]
     slope = _dot(along, across)
-    share = _dot(np.sign(normal[crossed]) * half[crossed] - start, across) / np.where(slope == 0, 1.0, slope)
-    point[crossed] = start + np.clip(share, 0, 1)[:, None] * along
+    fraction = _dot(np.sign(normal[crossed]) * half_size[crossed] - start, across) / np.where(slope == 0, 1.0, slope)
+    point[crossed] = start + np.clip(fraction, 0, 1)[:, None] * along
     return depth[rows, best], normal, point
 
 
@@ -111,7 +116,7 @@ def _dot(x: Array, y: Array) -> Array:
 
 
 def _perpendicular(u: Array, v: Array) -> Array:
-    """Unit vectors (k, 3) across u and v (k, 3), some across u where these are parallel."""
+    """Unit vectors (k, 3) perpendicular to u and v (k, 3); if these are parallel, any vector perpendicular to u."""
     across = np.cross(u, v)
     flat = _dot(across, across) < NONE
     across[flat] = np.cross(u[flat], np.eye(3)[np.argmin(np.abs(u[flat]), axis=1)])

@@ -1,4 +1,4 @@
-"""Signed distances of any two convex cores by Coal (GJK and EPA), a pair at a time."""
+"""Signed distances of any two convex cores by Coal (GJK and EPA), one pair at a time."""
 
 from __future__ import annotations
 
@@ -10,46 +10,47 @@ import numpy.typing as npt
 from scipy.spatial import ConvexHull
 
 from models.robot import Array
-from optimizer.problem.scene import Core
+from optimizer.collision.cores import Core
 
-# of the distance [m], which Coal's own default of 1e-6 would leave to the optimiser's line search to stumble over
-# Deep inside a round body its search for the depth may not end that sharply, and takes the next.
+# tolerances of the distance [m], tried in turn. Coal's default of 1e-6 is too coarse for the line search of the
+# optimiser; deep inside a round body, EPA may not converge to the finest, and the next is tried
 TOLERANCES = (1e-10, 1e-6, 1e-4)
 MOST_ITERATIONS = 500
-# a core that is a point or a segment is handed to Coal grown by this [m], since it takes nothing that thin
+# Coal needs bodies with a volume: a point or a segment is grown by this radius [m], which is added to the distance
 SKIN = 1e-2
-# a distance beyond this [m] is Coal's way to say that it found none
-BEYOND = 1e6
+# Coal reports a failure by a distance beyond this [m]
+MOST_DISTANCE = 1e6
 
 
 class ConvexPairs:
-    """Distances between cores, by their number."""
+    """Distances between cores; the shapes that Coal needs are built once per core."""
 
     def __init__(self, cores: Sequence[Core]) -> None:
         self._cores = cores
         self._shapes: dict[int, tuple[coal.CollisionGeometry, float, coal.Transform3s]] = {}
         self._requests = [_request(tolerance) for tolerance in TOLERANCES]
 
-    def nearest(
+    def witness_points(
         self, first: Iterable[int], second: Iterable[int], T_first: Array, T_second: Array
     ) -> tuple[Array, Array, Array]:
-        """Signed distance (k,), normal (k, 3) from first to second, and a point (k, 3) on the line of the two nearest.
+        """Signed distance (k,) [m], normal (k, 3) from first to second, and a point (k, 3) [m] of the second core.
 
-        `first`, `second` (k,) number cores that stand at T_first, T_second (k, 4, 4).
+        `first`, `second` (k,) are indices of cores, whose poses in the base frame are T_first, T_second (k, 4, 4). The
+        point lies on the line through the witness points. If Coal does not converge, the distance is a lower bound.
         """
         count = len(T_first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
         for k, (i, j) in enumerate(zip(first, second, strict=True)):
             (a, skin_a, local_a), (b, skin_b, local_b) = self._shape(int(i)), self._shape(int(j))
-            stand_a, stand_b = _pose(T_first[k]) * local_a, _pose(T_second[k]) * local_b
+            pose_a, pose_b = _transform(T_first[k]) * local_a, _transform(T_second[k]) * local_b
             for request in self._requests:
                 result = coal.DistanceResult()
-                found = coal.distance(a, stand_a, b, stand_b, request, result)
-                if abs(found) < BEYOND and abs(float(result.normal @ result.normal) - 1) < 1e-6:
+                found = coal.distance(a, pose_a, b, pose_b, request, result)
+                if abs(found) < MOST_DISTANCE and abs(float(result.normal @ result.normal) - 1) < 1e-6:
                     distance[k], normal[k], point[k] = found + skin_a + skin_b, result.normal, result.getNearestPoint2()
                     break
             else:
-                distance[k], normal[k], point[k] = _rough(self._cores[i], T_first[k], self._cores[j], T_second[k])
+                distance[k], normal[k], point[k] = _lower_bound(self._cores[i], T_first[k], self._cores[j], T_second[k])
         return distance, normal, point
 
     def _shape(self, number: int) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
@@ -58,24 +59,27 @@ class ConvexPairs:
         return self._shapes[number]
 
 
-def _rough(first: Core, T_first: Array, second: Core, T_second: Array) -> tuple[float, Array, Array]:
-    """The most that the line of centres or an axis of either body parts them by: never more than the distance."""
-    centres = T_second[:3, :3] @ second.points.mean(axis=0) + T_second[:3, 3]
-    centres = centres - T_first[:3, :3] @ first.points.mean(axis=0) - T_first[:3, 3]
-    line = centres / max(float(np.linalg.norm(centres)), 1e-12)
+def _lower_bound(first: Core, T_first: Array, second: Core, T_second: Array) -> tuple[float, Array, Array]:
+    """Lower bound [m] on the signed distance, with its direction and a point of the second core.
+
+    It is the largest separation along the line of centres and the axes of both cores.
+    """
+    offset = T_second[:3, :3] @ second.points.mean(axis=0) + T_second[:3, 3]
+    offset = offset - T_first[:3, :3] @ first.points.mean(axis=0) - T_first[:3, 3]
+    line = offset / max(float(np.linalg.norm(offset)), 1e-12)
     axes = np.vstack([T_first[:3, :3].T, T_second[:3, :3].T])
     directions = np.vstack([axes, -axes, line if np.linalg.norm(line) > 0.5 else axes[0]])
-    lowest, which = _lowest(second, T_second, directions)
-    gap = lowest + _lowest(first, T_first, -directions)[0]
+    lowest, which = _support(second, T_second, directions)
+    gap = lowest + _support(first, T_first, -directions)[0]
     best = int(gap.argmax())
     return float(gap[best]), directions[best], T_second[:3, :3] @ second.points[which[best]] + T_second[:3, 3]
 
 
-def _lowest(core: Core, T: Array, directions: Array) -> tuple[Array, npt.NDArray[np.intp]]:
-    """How low (k,) a core at T (4, 4) reaches along directions (k, 3), and by which of its points."""
-    turned = directions @ T[:3, :3]
-    heights = turned @ core.points.T
-    reach = core.ring * np.hypot(turned[:, 0], turned[:, 1])
+def _support(core: Core, T: Array, directions: Array) -> tuple[Array, npt.NDArray[np.intp]]:
+    """min n·x (k,) [m] over a core at T (4, 4) for directions n (k, 3), and the index (k,) of its point there."""
+    in_core = directions @ T[:3, :3]
+    heights = in_core @ core.points.T
+    reach = core.disc_radius * np.hypot(in_core[:, 0], in_core[:, 1])
     return heights.min(axis=1) - reach + directions @ T[:3, 3], heights.argmin(axis=1)
 
 
@@ -87,33 +91,36 @@ def _request(tolerance: float) -> coal.DistanceRequest:
 
 
 def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
-    """A core as Coal has it, how much thicker that is [m], and where it stands in the core's frame."""
+    """Coal's shape of a core, the radius [m] by which it is grown, and its pose in the frame of the core.
+
+    A half-space has no such shape.
+    """
     points, local = core.points, np.eye(4)
-    if core.half is not None:
-        return coal.Box(*(2 * core.half)), 0.0, _pose(local)
-    if core.ring:
-        return coal.Cylinder(core.ring, float(np.ptp(points[:, 2]))), 0.0, _pose(local)
+    if core.half_size is not None:
+        return coal.Box(*(2 * core.half_size)), 0.0, _transform(local)
+    if core.disc_radius:
+        return coal.Cylinder(core.disc_radius, float(np.ptp(points[:, 2]))), 0.0, _transform(local)
     if len(points) <= 2:
         along = points[-1] - points[0]
         length = float(np.linalg.norm(along))
         local[:3, 3] = points.mean(axis=0)
         if length == 0:
-            return coal.Sphere(SKIN), SKIN, _pose(local)
+            return coal.Sphere(SKIN), SKIN, _transform(local)
         z = along / length
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
         x /= np.linalg.norm(x)
         local[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-        return coal.Capsule(SKIN, length), SKIN, _pose(local)
+        return coal.Capsule(SKIN, length), SKIN, _transform(local)
     vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for vertex in points:
         vertices.append(vertex)
     for triangle in _outward(points):
         triangles.append(coal.Triangle(*triangle))
-    return coal.Convex(vertices, triangles), 0.0, _pose(local)
+    return coal.Convex(vertices, triangles), 0.0, _transform(local)
 
 
 def _outward(points: Array) -> list[list[int]]:
-    """Triangles of the hull, their corners counterclockwise from outside."""
+    """Triangles of the convex hull, with corners counterclockwise as seen from outside."""
     hull = ConvexHull(points)
     corners = points[hull.simplices]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -124,5 +131,5 @@ def _outward(points: Array) -> list[list[int]]:
     return result
 
 
-def _pose(T: Array) -> coal.Transform3s:
+def _transform(T: Array) -> coal.Transform3s:
     return coal.Transform3s(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]))

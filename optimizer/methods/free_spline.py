@@ -66,14 +66,14 @@ class FreeSpline(SqpMethod):
         prepared, space = self.prepared, bspline.uniform(COARSE)
         v_max, left = prepared.problem.arm.active_limits.v_max, max(self.deadline.left, 0.0)
         planning, patience = self.deadline.within(PLANNING * left), self.deadline.within(PATIENCE * left)
-        ways = prepared.planned_paths(self.q_start, self.q_goal, planning)
+        ways = prepared.surroundings.planned_paths(self.q_start, self.q_goal, planning)
         found: list[SolveResult] = []
         for way in ways:
             if patience.passed or length(way, v_max) > DETOUR * length(ways[0], v_max):
                 break
             q, t = along(way, 1.0, v_max)
             motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
-            if any(interpolation_is_free(prepared.collisions, q, motion) for motion in motions):
+            if any(interpolation_is_free(prepared.surroundings.model, q, motion) for motion in motions):
                 continue
             points = space.fit(self.coordinates.from_joints(q), t)
             outcome = self.improve(Guess(space, points, 0.0), guarded=True, deadline=patience)
@@ -95,8 +95,8 @@ class FreeSpline(SqpMethod):
         space = self.graded(duration, EXACT if fine else REFINED)
         guess = Guess(space, space.fit(self.coordinates.from_joints(q), t / duration), duration)
         # what was led around something would otherwise go back to where it is stuck
-        outcome = self.improve(guess, guarded=self.prepared.is_near_contact(q))
-        led = outcome.status == "solved" and self.prepared.has_planned_paths(self.q_start, self.q_goal)
+        outcome = self.improve(guess, guarded=self.prepared.surroundings.is_near_contact(q))
+        led = outcome.status == "solved" and self.prepared.surroundings.has_planned_paths(self.q_start, self.q_goal)
         return replace(outcome, reason=f"{outcome.reason}{FROM_PLANNED_PATH}") if led else outcome
 
     def time_optimal_guess(self) -> Guess:

@@ -77,8 +77,8 @@ class SqpMethod(Method):
         pairs: Indices = np.zeros(0, dtype=np.intp)
         if guarded:
             guessed = spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
-            pairs = self.prepared.active_pairs(guessed)
-        path = self.prepared.with_clearance(pairs) if guarded else self.prepared.path
+            pairs = self.prepared.surroundings.active_pairs(guessed)
+        path = self.prepared.surroundings.with_clearance(pairs) if guarded else self.prepared.path
         program = replace(program, path=path, path_bounds=initial_bounds(path))
         limits = self.prepared.problem.arm.active_limits.scaled(1 - MARGIN)
         free = guess.points[guess.space.free]
@@ -98,7 +98,7 @@ class SqpMethod(Method):
             if excess is not None:
                 spline = self._stretched(spline, excess)
                 excess = self._excess(spline)
-            hit = self.prepared.worst_violation(spline)
+            hit = self.prepared.surroundings.worst_violation(spline)
             if (
                 hit is not None
                 and not len(pairs)
@@ -112,7 +112,7 @@ class SqpMethod(Method):
                 limits = tightened(limits, excess)
                 program = replace(program, coordinates=self._coordinates(limits))
             # pairs are watched only once something is hit, since most motions hit nothing
-            nearby = pairs if hit is None else np.union1d(pairs, self.prepared.active_pairs(spline))
+            nearby = pairs if hit is None else np.union1d(pairs, self.prepared.surroundings.active_pairs(spline))
             program = self._watched(program, pairs, nearby, beyond, hit)
             pairs = nearby
             # the solver takes no step for positions alone: it bounds them
@@ -127,7 +127,7 @@ class SqpMethod(Method):
         """The program with the limits along its path tightened, and all of `nearby` watched instead of `pairs`."""
         room = program.path_bounds - beyond
         if len(nearby) > len(pairs):
-            path = self.prepared.with_clearance(nearby)
+            path = self.prepared.surroundings.with_clearance(nearby)
             widened = initial_bounds(path)
             widened[np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))] = room
             return replace(program, path=path, path_bounds=widened)

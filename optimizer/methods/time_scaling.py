@@ -28,7 +28,7 @@ class TimeScaling(FreeSpline):
 
     def solve(self) -> SolveResult:
         """From toppra's law on."""
-        hit = self.prepared.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
+        hit = self.prepared.surroundings.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
         if hit is not None:
             return SolveResult("infeasible", f"on the straight line, {hit.message}", hit=hit)
         law = shortest_line.time_optimal_on_line(self.prepared, self.q_start, self.q_goal)

@@ -54,7 +54,7 @@ class UniformScaling(Method):
     def solve(self) -> SolveResult:
         """The factor of least energy (or the least factor, in haste) at which limits, torque and duration hold."""
         limits, length = self.prepared.problem.arm.active_limits, self.given.duration
-        hit = self.prepared.worst_violation(self.given)
+        hit = self.prepared.surroundings.worst_violation(self.given)
         if hit is not None:
             return SolveResult("infeasible", f"the given motion hits something: {hit.message}", hit=hit)
         needed = time_scale(

@@ -92,7 +92,7 @@ class _GoalRows:
 
 @dataclass
 class _Rows:
-    """Rows A x ≤ b in the order goal, path, torque, kinematic; the last are added to. Variables and goal never relax."""
+    """Rows A x ≤ b in the order goal, path, torque, kinematic; the last are added to. Variables and goal stay hard."""
 
     goal: _GoalRows
     lower: Array

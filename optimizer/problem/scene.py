@@ -1,15 +1,10 @@
-"""Obstacles around the arm and bodies fixed to its flange: shapes, validated on construction.
-
-Every shape is a convex core grown by a radius: a point or segment, a box, the discs of a cylinder, a hull. Distances
-are computed on this form alone.
-"""
+"""Obstacles around the arm and shapes fixed to its flange, validated on construction."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -25,21 +20,6 @@ FLAT = 1e-6
 
 
 @dataclass(frozen=True)
-class Core:
-    """The hull of `points` (m, 3) [m], grown by `radius` [m].
-
-    Each point is first widened to a disc of radius `ring` [m] normal to z. `half` (3,) [m] is set for a box: half its
-    edges. With `plane` the core is the half-space below the point, z up.
-    """
-
-    points: Array
-    radius: float = 0.0
-    ring: float = 0.0
-    half: Array | None = None
-    plane: bool = False
-
-
-@dataclass(frozen=True)
 class Sphere:
     """A ball of `radius` [m] about the origin."""
 
@@ -47,11 +27,6 @@ class Sphere:
 
     def __post_init__(self) -> None:
         _size("radius", self.radius)
-
-    @property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(np.zeros((1, 3)), self.radius)
 
 
 @dataclass(frozen=True)
@@ -65,30 +40,15 @@ class _AlongZ:
         _size("radius", self.radius)
         _size("length", self.length)
 
-    @property
-    def _ends(self) -> Array:
-        """Ends (2, 3) [m] of the axis."""
-        return np.array([[0.0, 0.0, -self.length / 2], [0.0, 0.0, self.length / 2]])
-
 
 @dataclass(frozen=True)
 class Capsule(_AlongZ):
     """A segment of `length` [m] along z, centred at the origin, grown by `radius` [m]."""
 
-    @property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(self._ends, self.radius)
-
 
 @dataclass(frozen=True)
 class Cylinder(_AlongZ):
     """A cylinder of `radius` [m] and `length` [m] along z, centred at the origin."""
-
-    @property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(self._ends, ring=self.radius)
 
 
 @dataclass(frozen=True)
@@ -103,21 +63,10 @@ class Box:
             _size("size", edge)
         object.__setattr__(self, "size", size)
 
-    @property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-        return Core(signs * self.size / 2, half=self.size / 2)
-
 
 @dataclass(frozen=True)
 class HalfSpace:
     """All points below z = 0: a floor, or a wall whose z axis points into the free space."""
-
-    @property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(np.zeros((1, 3)), plane=True)
 
 
 @dataclass(frozen=True)
@@ -140,11 +89,6 @@ class Mesh:
         except QhullError:
             raise InvalidProblem("vertices", "vertices lie in a plane: give points of a body with a volume.") from None
         object.__setattr__(self, "vertices", frozen(vertices[hull.vertices], (-1, 3), "vertices"))
-
-    @cached_property
-    def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(self.vertices)
 
 
 Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh

@@ -1,4 +1,4 @@
-"""A motion that is given rather than looked for: configurations to go through, or a log of joint positions."""
+"""Given motions: waypoints with times, or a log of joint positions."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ from optimizer.problem.arrays import frozen
 Interpolation = Literal["linear", "trapezoid", "quintic", "spline"]
 
 BLOCK = 2048
-"""Rows that are worked on at a time."""
+"""Rows that are processed at a time."""
 MOST_ROWS = 1_000_000
 """Most rows of a motion."""
 MOST_SPLINE_POINTS = 10_000
-"""Most configurations that one smooth curve goes through: its equations are solved all at once."""
+"""Most configurations that one smooth curve passes through: its equations are solved all at once."""
 CLOSEST_TIMES = 1e-6
-"""Least time from row to row [s]."""
+"""Least time between rows [s]."""
 MOST_SPEED, MOST_ACCELERATION = 1e4, 1e7
-"""Beyond these a log's rates are no robot's [rad/s, rad/s²]."""
-# joint positions this many times the joint's range away from zero are no radians
+"""Greatest |v| [rad/s] and |a| [rad/s²] that a log may have: no robot exceeds them."""
+# joint positions beyond this multiple of the largest joint position allowed are not in radians
 FAR_OUT = 2.0
 
 
 @dataclass(frozen=True)
 class Waypoints:
-    """Joint positions q (n, nq) [rad] to go through, with `times` (n - 1,) [s], one for every segment between them.
+    """Joint positions q (n, nq) [rad] that a motion passes in this order, with a time for each segment between them.
 
-    `times` may be one number for all. See `optimizer.pieces` for what each interpolation does.
-    Raises InvalidProblem or InvalidTable; rows are counted from `first_row`.
+    `times` (n - 1,) [s] may be one number for all segments. `piecewise_motion` describes the interpolations. Errors
+    count rows from `first_row`. Raises InvalidProblem.
     """
 
     q: Array
@@ -59,7 +59,7 @@ class Waypoints:
         if self.interpolation == "spline" and len(self.q) > MOST_SPLINE_POINTS:
             raise InvalidProblem(
                 "interpolation",
-                f"A spline goes through at most {MOST_SPLINE_POINTS} configurations: give more as a trajectory with t.",
+                f"A spline passes at most {MOST_SPLINE_POINTS} configurations: send more as a trajectory with t.",
             )
 
     @property
@@ -68,13 +68,13 @@ class Waypoints:
         return len(self.times)
 
     def check(self, arm: Arm) -> None:
-        """Raises InvalidProblem or InvalidTable where the motion cannot be this arm's."""
+        """Raise InvalidProblem or InvalidTable if the joint positions cannot be those of the arm."""
         _check_joints(arm, self.q, self.first_row)
 
 
 @dataclass(frozen=True)
 class LogBlock:
-    """Consecutive rows of a log: t (n,) [s], q (n, nq) [rad], and v, a where they were logged."""
+    """Consecutive rows of a log: t (n,) [s], q (n, nq) [rad], and v [rad/s], a [rad/s²] if they were logged."""
 
     t: Array
     q: Array
@@ -83,25 +83,31 @@ class LogBlock:
 
     @property
     def groups(self) -> dict[str, Array | None]:
-        """The logged columns by name."""
+        """The columns by name; None if not logged."""
         return {"q": self.q, "v": self.v, "a": self.a}
 
 
 @dataclass(frozen=True)
 class Log:
-    """A logged trajectory as a stream of blocks, read once. All blocks have the same columns."""
+    """A logged trajectory as a stream of blocks, which is read once. All blocks have the same columns.
+
+    Errors count rows from `first_row`.
+    """
 
     blocks: Iterable[LogBlock]
     first_row: int = 0
 
     def checked(self, arm: Arm) -> Iterator[LogBlock]:
-        """The blocks, with times from the first row's on. Raises InvalidTable at the first row that is wrong."""
+        """The blocks, with times since the first row.
+
+        Raises InvalidTable at the first invalid row, and InvalidProblem.
+        """
         row, last, origin = self.first_row, -np.inf, None
         for block in self.blocks:
             if not len(block.t):
                 continue
             if row + len(block.t) - self.first_row > MOST_ROWS:
-                raise InvalidTable(f"A trajectory has at most {MOST_ROWS} rows: thin it out or send it in parts.")
+                raise InvalidTable(f"A trajectory has at most {MOST_ROWS} rows: send fewer rows, or send it in parts.")
             origin = float(block.t[0]) if origin is None else origin
             _check_finite(block, row)
             t = block.t - origin
@@ -122,7 +128,7 @@ class Log:
 
 
 def in_blocks(t: Array, q: Array, v: Array | None = None, a: Array | None = None) -> Iterator[LogBlock]:
-    """A log that is in memory, block by block."""
+    """The blocks of a log that is in memory: t (n,) [s], q, v, a (n, nq) in rad and s."""
     for low, high in pairwise([*range(0, len(t), BLOCK), len(t)]):
         rows = slice(low, high)
         yield LogBlock(t[rows], q[rows], None if v is None else v[rows], None if a is None else a[rows])

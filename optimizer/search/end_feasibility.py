@@ -33,11 +33,11 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
     # the later ones are graver: they do not depend on the load
     for k, contact in enumerate(
-        prepared.collisions.contacts(q, within=RESERVE) if prepared.problem.arm.collisions else ()
+        prepared.surroundings.model.closest_pairs(q, within=RESERVE) if prepared.problem.arm.collisions else ()
     ):
         if contact.distance < RESERVE:
             first, second = contact.pair
-            words = f"{first} and {second} are {RESERVE - contact.distance:.4f} m nearer each other than they may be"
+            words = f"{first} and {second}: clearance {RESERVE - contact.distance:.4f} m too small"
             result[k] = InvalidReason(words, contact)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:

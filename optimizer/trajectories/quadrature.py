@@ -7,8 +7,11 @@ from functools import cache
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from models.robot import Array
+
+Indices = npt.NDArray[np.int64]
 
 
 @cache
@@ -40,15 +43,25 @@ LOBATTO = (1 + np.array([-1.0, -_INNER[0], -_INNER[1], _INNER[1], _INNER[0], 1.0
 LOBATTO_WEIGHTS = np.array([2, 14 - math.sqrt(7), 14 + math.sqrt(7), 14 + math.sqrt(7), 14 - math.sqrt(7), 2]) / 60
 
 
+def lobatto_panels(breaks: Array, panels: Indices) -> tuple[Indices, Array, Array]:
+    """Gauss-Lobatto nodes over the intervals between breaks (m + 1,), each divided into panels (m,) equal parts.
+
+    For every node (k,): the index of its interval, its offset from the start of the interval, and its weight.
+    """
+    interval = np.repeat(np.arange(len(panels)), panels)
+    panel = np.arange(len(interval)) - np.repeat(np.cumsum(panels) - panels, panels)
+    # fractions of the interval first: the last node of an interval is then exactly its end
+    starts, ends = (np.diff(breaks)[interval] * ((panel + k) / panels[interval]) for k in (0, 1))
+    lengths = (ends - starts)[:, None]
+    offset = (starts[:, None] + lengths * LOBATTO).ravel()
+    return np.repeat(interval, len(LOBATTO)), offset, (lengths * LOBATTO_WEIGHTS).ravel()
+
+
 def lobatto_nodes(breaks: Array) -> tuple[Array, Array]:
     """Quadrature nodes and weights (k,) over [0, 1] whose panels end at every break."""
-    parts = np.maximum(np.ceil(np.diff(breaks) * PANELS), 1).astype(int)
-    edges = np.concatenate(
-        [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], parts, strict=True)]
-        + [breaks[-1:]]
-    )
-    lengths = np.diff(edges)[:, None]
-    return (edges[:-1, None] + lengths * LOBATTO).ravel(), (lengths * LOBATTO_WEIGHTS).ravel()
+    panels = np.maximum(np.ceil(np.diff(breaks) * PANELS), 1).astype(np.int64)
+    interval, offset, weights = lobatto_panels(breaks, panels)
+    return breaks[interval] + offset, weights
 
 
 GRID_PERIOD = 1e-3  # s, at most

@@ -48,7 +48,7 @@ def least_distance(request: dict[str, Any], spline: dict[str, Any]) -> float:
     model = CollisionModel(to_arm(OptimizeRequest.model_validate_json(json.dumps(request))))
     curve = BSpline(np.array(spline["knots"]), np.array(spline["control_points"]), spline["degree"])
     q = curve(np.linspace(0, spline["knots"][-1], int(spline["knots"][-1] * 1e4) + 1))
-    return min(contact.distance for contact in model.contacts(q, within=0.01))
+    return min(contact.distance for contact in model.closest_pairs(q, within=0.01))
 
 
 def test_goes_around_a_post(client: TestClient) -> None:
@@ -86,7 +86,7 @@ def test_start_and_goal_in_collision(client: TestClient) -> None:
     assert start["pair"] == goal["pair"] == ["upper_arm", "wrist_1"]
     assert start["branches"] == goal["branches"] and goal["branches"][0]["q"] == FOLDED
     arm = Arm(robot=ROBOT)
-    found = CollisionModel(arm).contacts([np.array(FOLDED)])[0].distance
+    found = CollisionModel(arm).closest_pairs([np.array(FOLDED)])[0].distance
     assert goal["depth"] == pytest.approx(RESERVE - found)
     assert answered(client, move(goal={"q": FOLDED}, collisions=False))["certificate"]["clearance"] is None
 

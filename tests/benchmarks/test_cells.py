@@ -13,7 +13,7 @@ def test_tasks_repeat_and_both_ends_are_clear(index: int) -> None:
     np.testing.assert_array_equal(task.q_goal, again.q_goal)
     np.testing.assert_array_equal(task.T_goal, again.T_goal)
     assert task.draws == again.draws
-    assert CollisionModel(task.arm).least(np.stack([task.q_start, task.q_goal]), 0.0) > 0
+    assert CollisionModel(task.arm).least_distance(np.stack([task.q_start, task.q_goal]), 0.0) > 0
 
 
 def test_an_answer_that_hits_something_is_a_miss() -> None:

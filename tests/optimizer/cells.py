@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from scipy.interpolate import BSpline
 
 from models.robot import Array
 from optimizer.problem.arm import Arm, Payload
@@ -66,15 +65,15 @@ def arm_in_cell(load: Shape = LOADS[0], scene: Scene | None = None) -> Arm:
 
 
 def wander(seed: int, duration: float = 1.5, spread: float = 0.3, points: int = 12) -> Spline:
-    """A motion at rest at both ends, bent at random on its way."""
+    """A motion at rest at both ends, with random control points in between."""
     rng = np.random.default_rng(seed)
     q_start, q_goal = rng.uniform(-2, 2, (2, 6))
-    way = np.linspace(0, 1, points - 4)[1:-1, None]
-    inner = q_start + (q_goal - q_start) * way + rng.normal(size=(len(way), 6)) * spread
+    fraction = np.linspace(0, 1, points - 4)[1:-1, None]
+    inner = q_start + (q_goal - q_start) * fraction + rng.normal(size=(len(fraction), 6)) * spread
     control = np.array([q_start] * 3 + list(inner) + [q_goal] * 3)
     knots = np.concatenate([np.zeros(5), np.linspace(0, 1, len(control) - 4), np.ones(5)])
     return Spline(5, knots * duration, control)
 
 
 def positions(spline: Spline, t: Array) -> Array:
-    return np.asarray(BSpline(spline.knots, spline.control_points, spline.degree)(t))
+    return np.asarray(spline.curve(t))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from models.registry import load_robot
-from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, clearance
+from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
 from optimizer.collision.model import CollisionModel
 from optimizer.problem.arm import Arm
 from optimizer.problem.scene import HalfSpace, Obstacle, Scene, Sphere
@@ -24,7 +24,7 @@ def replayed(model: CollisionModel, spline: Spline, within: float) -> float:
     """Least distance on a grid of 0.1 ms; what is further than `within` only counts by its bounding balls."""
     t = np.linspace(0, spline.duration, round(spline.duration / REPLAY) + 1)
     parts = np.array_split(positions(spline, t), 40)
-    return min(float(model.distances(q, within)[0].min()) for q in parts)
+    return min(float(model.signed_distances(q, within)[0].min()) for q in parts)
 
 
 def smooth_cell(seed: int) -> Scene:
@@ -37,7 +37,7 @@ def smooth_cell(seed: int) -> Scene:
 def test_proven_clearance_is_just_below_the_replay(seed: int, crowded: bool) -> None:
     arm = Arm(robot=ROBOT, scene=smooth_cell(seed)) if crowded else Arm(robot=ROBOT)
     model, spline = CollisionModel(arm), wander(seed)
-    proof = clearance(model, spline)
+    proof = proven_clearance(model, spline)
     assert proof is not None
     least = replayed(model, spline, within=max(proof.sampled, 0) + 0.01)
     assert proof.min_clearance <= least + ROUNDING
@@ -50,9 +50,9 @@ def test_proven_clearance_is_just_below_the_replay(seed: int, crowded: bool) -> 
 @pytest.mark.parametrize("seed", range(4))
 def test_named_pair_has_that_distance_at_that_time(seed: int) -> None:
     model, spline = CollisionModel(Arm(robot=ROBOT, scene=cell(seed))), wander(seed + 100)
-    proof = clearance(model, spline)
+    proof = proven_clearance(model, spline)
     assert proof is not None
-    (contact,) = model.contacts(positions(spline, np.array([proof.time])))
+    (contact,) = model.closest_pairs(positions(spline, np.array([proof.time])))
     assert contact.pair == proof.pair
     assert contact.distance == pytest.approx(proof.sampled, abs=1e-8)
 
@@ -64,7 +64,7 @@ def test_a_touch_between_samples_is_found() -> None:
     # in the middle of one of the 32 intervals that the proof starts from
     middle = positions(spline, np.array([0.4 * 16.5 / 32]))
     wrist = model.frames(middle)[0, 5, :3, 3]
-    proof = clearance(
+    proof = proven_clearance(
         CollisionModel(Arm(robot=ROBOT, scene=Scene([Obstacle("pea", Sphere(0.002), at(wrist))]))), spline
     )
     assert proof is not None
@@ -81,7 +81,7 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
     height = CollisionModel(Arm(robot=hand)).frames(q_start[None])[0, 6]
     floor = Obstacle("floor", HalfSpace(), at([0, 0, height[2, 3] - 0.2]))
     model = CollisionModel(Arm(robot=hand, scene=Scene([floor])))
-    proof = clearance(model, spline)
+    proof = proven_clearance(model, spline)
     assert proof is not None
     capsule = hand.capsules[0]
     ends = capsule.axis @ height[:3, :3].T + height[:3, 3]
@@ -93,8 +93,8 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
 def test_margin_is_taken_off() -> None:
     spline = wander(1)
     post = Obstacle("post", Sphere(0.1), at([0.3, 0.3, 0.6]))
-    near = clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([post]))), spline)
-    kept = clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([replace(post, margin=0.5)]))), spline)
+    near = proven_clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([post]))), spline)
+    kept = proven_clearance(CollisionModel(Arm(robot=ROBOT, scene=Scene([replace(post, margin=0.5)]))), spline)
     assert near is not None and kept is not None
     assert "post" in kept.pair
     assert kept.sampled < near.sampled
@@ -104,11 +104,11 @@ def test_standing_still() -> None:
     q = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
     spline = Spline(5, np.array([0.0] * 6 + [1.0] * 6), np.array([q] * 6))
     model = CollisionModel(Arm(robot=ROBOT))
-    proof, (contact,) = clearance(model, spline), model.contacts([q])
+    proof, (contact,) = proven_clearance(model, spline), model.closest_pairs([q])
     assert proof is not None
     assert proof.min_clearance == pytest.approx(contact.distance, abs=ROUNDING)
 
 
 def test_nothing_to_compare() -> None:
     robot = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[:1])
-    assert clearance(CollisionModel(Arm(robot=robot)), wander(1)) is None
+    assert proven_clearance(CollisionModel(Arm(robot=robot)), wander(1)) is None

@@ -11,7 +11,7 @@ import pytest
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer.collision.coal_distance import _rough, coal_shape
+from optimizer.collision.coal_distance import _lower_bound, coal_shape
 from optimizer.collision.model import CollisionModel
 from optimizer.problem.arm import Arm
 from optimizer.problem.scene import Cylinder, Mesh, Obstacle, Scene, Shape
@@ -40,7 +40,7 @@ def by_coal(model: CollisionModel, q: Array) -> Array:
         b = model.bodies[body]
         T = frames[n, b.link] @ b.T_link_core
         stand = coal.Transform3s(T[:3, :3].copy(), T[:3, 3].copy())
-        if b.core.plane:
+        if b.core.is_half_space:
             return coal.Halfspace(np.array([0.0, 0, 1]), 0.0), b.margin, stand
         shape, skin, local = coal_shape(b.core)
         return shape, b.core.radius + b.margin - skin, stand * local
@@ -56,8 +56,8 @@ def by_coal(model: CollisionModel, q: Array) -> Array:
 def test_distances_are_coals(load: Shape) -> None:
     model = CollisionModel(arm_in_cell(load))
     q = configurations(25)
-    ours, theirs = model.distances(q)[0], by_coal(model, q)
-    closed = model.closed_form
+    ours, theirs = model.signed_distances(q)[0], by_coal(model, q)
+    closed = model.geometry.is_closed_form
     assert closed.sum() > 100 and (~closed).sum() > 20
     assert np.abs(ours - theirs)[:, closed].max() < AGREEMENT
     # deep inside a round body Coal's search for the depth may end nowhere
@@ -70,23 +70,23 @@ def test_distances_are_coals(load: Shape) -> None:
 def test_gradients(load: Shape) -> None:
     model = CollisionModel(arm_in_cell(load))
     q = configurations(40)
-    distance, gradient = model.distances(q)
+    distance, gradient = model.signed_distances(q)
     for j in range(6):
         step = STEP * np.eye(6)[j]
-        (above, _), (below, _) = model.distances(q + step), model.distances(q - step)
+        (above, _), (below, _) = model.signed_distances(q + step), model.signed_distances(q - step)
         # across a kink, as where the nearest edge changes, the two sides differ
         smooth = np.abs(above - 2 * distance + below) < 1e-9
         error = np.abs((above - below) / (2 * STEP) - gradient[:, :, j])
-        closed = smooth & model.closed_form
+        closed = smooth & model.geometry.is_closed_form
         assert closed.mean() > 0.5
         assert error[closed].max() < GRADIENT
-        assert error[smooth & ~model.closed_form & (distance > -0.05)].max(initial=0) < ITERATED_GRADIENT
+        assert error[smooth & ~model.geometry.is_closed_form & (distance > -0.05)].max(initial=0) < ITERATED_GRADIENT
 
 
 def test_far_pairs_are_bounded_from_below() -> None:
     model = CollisionModel(arm_in_cell())
     q = configurations(50)
-    exact, (quick, _) = model.distances(q)[0], model.distances(q, within=0.1)
+    exact, (quick, _) = model.signed_distances(q)[0], model.signed_distances(q, within=0.1)
     assert (quick <= exact + AGREEMENT).all()
     near = quick <= 0.1
     assert np.abs((quick - exact)[near]).max() < 1e-12
@@ -98,28 +98,28 @@ def test_separation_never_exceeds_the_distance_and_attains_it() -> None:
     q = configurations(20)
     frames, n, p = model.frames(q), len(q), len(model.pairs)
     configuration, pair = np.divmod(np.arange(n * p), p)
-    found = model.nearest(frames, configuration, pair)
-    at_normal = model.separation(frames, configuration, pair, found.normal)
-    shallow = (found.distance > -0.1) | model.closed_form[pair]
+    found = model.geometry.witness_points(frames, configuration, pair)
+    at_normal = model.geometry.separation(frames, configuration, pair, found.normal)
+    shallow = (found.distance > -0.1) | model.geometry.is_closed_form[pair]
     assert np.abs(at_normal - found.distance)[shallow].max() < ITERATED
     normal = np.random.default_rng(2).normal(size=(n * p, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    free = ~np.array([model.bodies[i].core.plane for i in model.pairs[pair, 0]])
-    elsewhere = model.separation(frames, configuration, pair, normal)
+    free = ~np.array([model.bodies[i].core.is_half_space for i in model.pairs[pair, 0]])
+    elsewhere = model.geometry.separation(frames, configuration, pair, normal)
     assert (elsewhere <= found.distance + ITERATED)[free & shallow].all()
 
 
 def test_levers_are_never_exceeded() -> None:
     model = CollisionModel(arm_in_cell())
     frames, levers = model.frames(configurations(300)), model.levers()
-    for (_, k), lever, between in zip(model.pairs, levers, model.between, strict=True):
+    for (_, k), lever, between in zip(model.pairs, levers, model.joints_between, strict=True):
         body = model.bodies[k]
         T = frames[:, body.link]
         points = body.points @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
         for j in np.flatnonzero(between):
             away = points - frames[:, None, j + 1, :3, 3]
             across = np.linalg.norm(np.cross(away, frames[:, None, j + 1, :3, 2]), axis=2)
-            assert across.max() + body.core.ring <= lever[j] + 1e-12
+            assert across.max() + body.core.disc_radius <= lever[j] + 1e-12
 
 
 def test_what_is_compared() -> None:
@@ -133,11 +133,12 @@ def test_what_is_compared() -> None:
     assert {b for a, b in pairs if a == "floor"} == {*links[1:], "tool", "payload"}, "the base does not move"
 
 
-def test_nothing_to_compare() -> None:
-    robot = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[:1])
+@pytest.mark.parametrize("capsules", [0, 1])
+def test_nothing_to_compare(capsules: int) -> None:
+    robot = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[:capsules])
     model = CollisionModel(Arm(robot=robot))
-    assert model.distances(np.zeros((3, 6)))[0].shape == (3, 0)
-    assert model.contacts(np.zeros((2, 6))) == []
+    assert model.signed_distances(np.zeros((3, 6)))[0].shape == (3, 0)
+    assert model.closest_pairs(np.zeros((2, 6))) == []
 
 
 def test_links_that_never_meet() -> None:
@@ -148,17 +149,17 @@ def test_links_that_never_meet() -> None:
     for first, second in load_robot("ur5e").never_in_collision - {(0, 2)}:
         q = np.zeros((len(angles) ** 2, 6))
         q[:, first], q[:, first + 1] = (x.ravel() for x in np.meshgrid(angles, angles))
-        for p in np.flatnonzero((model.links[model.pairs] == [first, second]).all(axis=1)):
+        for p in np.flatnonzero((model.geometry.links[model.pairs] == [first, second]).all(axis=1)):
             at: Array = np.arange(len(q))
-            distance = model.nearest(model.frames(q), at, np.full(len(q), p)).distance
-            moved = (model.levers() * model.between)[p].sum() * np.deg2rad(1.5)
+            distance = model.geometry.witness_points(model.frames(q), at, np.full(len(q), p)).distance
+            moved = (model.levers() * model.joints_between)[p].sum() * np.deg2rad(1.5)
             assert distance.min() - moved > 0.004
 
 
 def test_a_contact_known_by_hand() -> None:
     """The elbow folded flat: forearm on upper arm."""
     folded, stretched = np.array([[0.0, -1.57, 3.1, 0.0, 0.0, 0.0], [0.0, -1.57, 0.0, -1.57, 0.5, 0.0]])
-    contact, apart = CollisionModel(Arm(robot=ROBOT)).contacts([folded, stretched])
+    contact, apart = CollisionModel(Arm(robot=ROBOT)).closest_pairs([folded, stretched])
     assert contact.distance < -0.01
     assert set(contact.pair) <= set(load_robot("ur5e").link_names)
     assert apart.distance > 0.01
@@ -178,20 +179,20 @@ def test_any_depth_has_a_distance_and_a_normal(size: float) -> None:
         model = CollisionModel(arm_in_cell(load, scene))
         q = configurations(12)
         q[0] = 0.0
-        distance, gradient = model.distances(q)
+        distance, gradient = model.signed_distances(q)
         assert np.isfinite(distance).all() and np.isfinite(gradient).all()
         assert np.abs(distance).max() < 3 * size + 3
 
 
 def test_a_rough_distance_is_no_more_than_the_distance() -> None:
     model = CollisionModel(arm_in_cell(LOADS[1]))
-    exact, frames = model.distances(configurations(20))[0], model.frames(configurations(20))
-    for p in np.flatnonzero(~model.closed_form):
+    exact, frames = model.signed_distances(configurations(20))[0], model.frames(configurations(20))
+    for p in np.flatnonzero(~model.geometry.is_closed_form):
         first, second = (model.bodies[k] for k in model.pairs[p])
         grown = first.core.radius + second.core.radius + first.margin + second.margin
         for n in range(20):
             at = frames[n, first.link] @ first.T_link_core, frames[n, second.link] @ second.T_link_core
-            rough, normal, _ = _rough(first.core, at[0], second.core, at[1])
+            rough, normal, _ = _lower_bound(first.core, at[0], second.core, at[1])
             assert np.linalg.norm(normal) == pytest.approx(1)
             if exact[n, p] > -0.1:
                 assert rough - grown <= exact[n, p] + ITERATED

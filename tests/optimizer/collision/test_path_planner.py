@@ -1,4 +1,4 @@
-"""Ways around: fast checks against the collision model, ways through scenes against dense distances."""
+"""State validity against the collision model, and planned paths against distances at dense samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from models.robot import Array
 from optimizer import optimize
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.path_planner import BOUND_MARGINS, STEP, along, interpolation_is_free, plan_paths
-from optimizer.collision.state_validity import FreeSpace
+from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.deadline import Deadline
 from optimizer.exceptions import NoTrajectory
 from optimizer.kinematics.forward import joint_placements
@@ -31,10 +31,10 @@ from tests.optimizer.moves import ROBOT, problem_with
 
 # s: ample, so that a seed and not the machine's load decides what is found
 AMPLE = 60.0
-DENSE = 0.003  # rad between the configurations at which a way is checked
+DENSE = 0.003  # rad between the configurations at which a path is checked
 DOWN = Rotation.from_euler("x", np.pi).as_matrix()
 REPLAY = 1e-4  # s
-# tasks in which the straight line leads nowhere
+# tasks that the optimiser solves only from a planned path
 STUCK = ("post", "trap")
 FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
@@ -81,7 +81,7 @@ TASKS = {
 
 
 def task(name: str) -> tuple[Arm, Array, Array]:
-    """The arm and the ends of least displacement that hit nothing."""
+    """The arm, and the collision-free start and goal configurations of least displacement."""
     scene, T_start, T_goal = TASKS[name]
     arm = Arm(
         robot=ROBOT,
@@ -93,7 +93,7 @@ def task(name: str) -> tuple[Arm, Array, Array]:
     ends = []
     for T in (T_start, T_goal):
         found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="start")
-        ends.append([s.q for s in found if model.distances(s.q[None])[0].min() > 0])
+        ends.append([s.q for s in found if model.signed_distances(s.q[None])[0].min() > 0])
     q_start, q_goal = min(
         ((a, b) for a in ends[0] for b in ends[1]), key=lambda both: float(np.abs(both[1] - both[0]).max())
     )
@@ -107,67 +107,67 @@ def between(path: Array) -> Array:
 
 
 def least(arm: Arm, q: Array) -> float:
-    return float(CollisionModel(arm).distances(q, within=0.02)[0].min())
+    return float(CollisionModel(arm).signed_distances(q, within=0.02)[0].min())
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_free_space_agrees_with_the_distances(seed: int) -> None:
+def test_state_validity_agrees_with_the_distances(seed: int) -> None:
     """Boxes, spheres, cylinders, capsules, meshes and half-spaces, margins too."""
     arm = arm_in_cell(LOADS[seed], cell(seed))
     model = CollisionModel(arm)
     limits = arm.active_limits
     q = np.random.default_rng(seed).uniform(limits.q_min, limits.q_max, (400, arm.robot.nq))
-    distance = model.distances(q)[0].min(axis=1)
+    distance = model.signed_distances(q)[0].min(axis=1)
     for reserve in (0.0, 0.005):
-        space = FreeSpace(arm, model, reserve)
-        free = np.array([space.free(x) for x in q])
+        checker = StateValidityChecker(arm, model, reserve)
+        valid = np.array([checker.is_valid(x) for x in q])
         # Coal ends its search within 1e-6 m
         clear = np.abs(distance - reserve) > 1e-5
-        assert (free == (distance > reserve))[clear].all()
-        assert 10 < free.sum() < 390
+        assert (valid == (distance > reserve))[clear].all()
+        assert 10 < valid.sum() < 390
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_ways_hit_nothing(name: str) -> None:
+def test_planned_paths_are_collision_free(name: str) -> None:
     arm, q_start, q_goal = task(name)
     limits = arm.active_limits
-    # there is something in the way
+    # the straight line collides
     assert least(arm, between(np.stack([q_start, q_goal]))) < 0
-    ways = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
-    assert ways
-    for way in ways:
-        np.testing.assert_array_equal(way[0], q_start)
-        np.testing.assert_array_equal(way[-1], q_goal)
-        assert (way >= limits.q_min).all() and (way <= limits.q_max).all()
-        assert (way >= np.minimum(q_start, q_goal) - BOUND_MARGINS[-1]).all()
-        assert (way <= np.maximum(q_start, q_goal) + BOUND_MARGINS[-1]).all()
-        assert least(arm, between(way)) > 0
-    lengths = [np.linalg.norm(np.diff(way, axis=0) / limits.v_max, axis=1).sum() for way in ways]
+    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
+    assert paths
+    for path in paths:
+        np.testing.assert_array_equal(path[0], q_start)
+        np.testing.assert_array_equal(path[-1], q_goal)
+        assert (path >= limits.q_min).all() and (path <= limits.q_max).all()
+        assert (path >= np.minimum(q_start, q_goal) - BOUND_MARGINS[-1]).all()
+        assert (path <= np.maximum(q_start, q_goal) + BOUND_MARGINS[-1]).all()
+        assert least(arm, between(path)) > 0
+    lengths = [np.linalg.norm(np.diff(path, axis=0) / limits.v_max, axis=1).sum() for path in paths]
     assert lengths == sorted(lengths)
 
 
-def test_the_same_seed_gives_the_same_ways() -> None:
+def test_the_same_seed_gives_the_same_paths() -> None:
     arm, q_start, q_goal = task("post")
     first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2, s) for s in (3, 3, 4))
-    assert [way.tolist() for way in first] == [way.tolist() for way in again]
-    assert [way.tolist() for way in first] != [way.tolist() for way in other]
+    assert [path.tolist() for path in first] == [path.tolist() for path in again]
+    assert [path.tolist() for path in first] != [path.tolist() for path in other]
 
 
-def test_two_ways_are_distinct() -> None:
+def test_two_paths_are_distinct() -> None:
     arm, q_start, q_goal = task("post")
-    ways = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2)
-    assert len(ways) == 2
+    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2)
+    assert len(paths) == 2
     v_max = arm.active_limits.v_max
-    assert np.abs(along(ways[0], 1.0, v_max)[0] - along(ways[1], 1.0, v_max)[0]).max() > 0.3
+    assert np.abs(along(paths[0], 1.0, v_max)[0] - along(paths[1], 1.0, v_max)[0]).max() > 0.3
 
 
-def test_the_straight_line_is_the_only_way_where_it_is_free() -> None:
+def test_a_free_straight_line_is_the_only_path() -> None:
     _, q_start, q_goal = task("post")
-    (way,) = plan_paths(Arm(robot=ROBOT), q_start, q_goal, Deadline.after(AMPLE))
-    np.testing.assert_array_equal(way, np.stack([q_start, q_goal]))
+    (path,) = plan_paths(Arm(robot=ROBOT), q_start, q_goal, Deadline.after(AMPLE))
+    np.testing.assert_array_equal(path, np.stack([q_start, q_goal]))
 
 
-def test_no_way_to_a_goal_that_hits_something() -> None:
+def test_no_path_to_a_goal_in_collision() -> None:
     arm, q_start, q_goal = task("post")
     through = Scene([*arm.scene.obstacles, Obstacle("plate", Box(np.array([0.2, 0.2, 0.02])), at(0.5, 0.3, 0.2))])
     blocked = Arm(robot=ROBOT, scene=through, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp)
@@ -183,11 +183,11 @@ def walled_in() -> tuple[Arm, Array, Array]:
     return replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over])), q_start, q_goal
 
 
-def test_no_way_to_a_goal_that_is_walled_in_and_an_answer_by_the_deadline() -> None:
+def test_no_path_to_a_walled_in_goal_and_an_answer_by_the_deadline() -> None:
     closed, q_start, q_goal = walled_in()
     assert least(closed, q_start[None]) > 0 and least(closed, q_goal[None]) > 0
     begin = time.perf_counter()
-    assert plan_paths(closed, q_start, q_goal, begin + 0.3) == []
+    assert plan_paths(closed, q_start, q_goal, Deadline.after(0.3)) == []
     # a run ends within a few checks of the deadline
     assert time.perf_counter() - begin < 1.0
 
@@ -198,7 +198,7 @@ def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
 
 
 @pytest.mark.parametrize("name", TASKS)
-def test_motions_get_past_what_is_in_the_way(name: str) -> None:
+def test_motions_avoid_the_obstacles(name: str) -> None:
     arm, q_start, q_goal = task(name)
     found = optimize(problem(arm, q_start, q_goal))
     q = sample(found.trajectory.spline, np.arange(0.0, found.duration, REPLAY))[0]
@@ -206,7 +206,7 @@ def test_motions_get_past_what_is_in_the_way(name: str) -> None:
     assert (found.candidates[0].reason == f"converged{FROM_PLANNED_PATH}") == (name in STUCK)
 
 
-def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
+def test_a_failed_candidate_names_the_colliding_bodies() -> None:
     with pytest.raises(NoTrajectory) as raised:
         optimize(problem(*walled_in()))
     (candidate,) = raised.value.candidates
@@ -214,11 +214,11 @@ def test_where_there_is_no_way_the_candidate_says_between_what() -> None:
     assert any(name in candidate.reason for name in ("wall", "post", "over"))
 
 
-def test_something_stands_between_ways_on_either_side_of_it() -> None:
+def test_interpolation_between_paths_on_two_sides_of_an_obstacle_collides() -> None:
     arm, q_start, q_goal = task("post")
     model, ones = CollisionModel(arm), np.ones(6)
-    (way, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
-    around = along(way, 1.0, ones)[0]
+    (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
+    around = along(path, 1.0, ones)[0]
     through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
     assert interpolation_is_free(model, around, around)
     assert not interpolation_is_free(model, around, 2 * through - around)
@@ -227,24 +227,24 @@ def test_something_stands_between_ways_on_either_side_of_it() -> None:
 def test_limits_tightened_are_kept() -> None:
     arm, q_start, q_goal = task("post")
     limits = arm.active_limits
-    room = 0.5
+    margin = 0.5
     tight = replace(
         limits,
-        q_min=np.maximum(limits.q_min, np.minimum(q_start, q_goal) - room),
-        q_max=np.minimum(limits.q_max, np.maximum(q_start, q_goal) + room),
+        q_min=np.maximum(limits.q_min, np.minimum(q_start, q_goal) - margin),
+        q_max=np.minimum(limits.q_max, np.maximum(q_start, q_goal) + margin),
     )
-    for way in plan_paths(replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)):
-        assert (way >= tight.q_min).all() and (way <= tight.q_max).all()
+    for path in plan_paths(replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)):
+        assert (path >= tight.q_min).all() and (path <= tight.q_max).all()
 
 
-def test_ways_keep_the_tool_within_its_cone() -> None:
+def test_planned_paths_keep_the_tool_within_its_cone() -> None:
     arm, q_start, q_goal = task("post")
     cone = ToolCone(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0]), 0.4)
     held = replace(arm, tool_cone=cone)
     tilt = PathConstraints(joint_placements(arm.robot.model), path_constraint_list(held))
 
-    def widest(ways: list[Array]) -> float:
-        return max(float(tilt.ratios(q := between(way), np.zeros_like(q)).max()) for way in ways)
+    def widest(paths: list[Array]) -> float:
+        return max(float(tilt.ratios(q := between(path), np.zeros_like(q)).max()) for path in paths)
 
     free, within = (plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)) for a in (arm, held))
     assert within
@@ -252,7 +252,7 @@ def test_ways_keep_the_tool_within_its_cone() -> None:
     assert widest(free) > 1.2
 
 
-def test_samples_along_a_way_rest_at_its_ends_and_round_its_corners() -> None:
+def test_samples_along_a_path_rest_at_its_ends_and_round_its_corners() -> None:
     path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]])
     q, t = along(path, 3.0, np.array([1.0, 1.0]))
     assert t[0] == 0 and t[-1] == 3

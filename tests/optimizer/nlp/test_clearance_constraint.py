@@ -56,7 +56,7 @@ def solved(*obstacles: Obstacle, **given: object) -> Solution:
 def least_distance(solution: Solution, *obstacles: Obstacle) -> float:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene(obstacles)).arm)
     q = sample(solution.trajectory.spline, np.arange(0.0, solution.duration, REPLAY))[0]
-    return model.least(q, np.inf)
+    return model.least_distance(q, np.inf)
 
 
 def test_a_post_in_the_way_is_passed() -> None:
@@ -117,7 +117,7 @@ def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
     q = np.linspace(HOME, GOAL, 25)
     shares = every_pair(model).ratios(q, np.zeros_like(q))
-    expected = 1 - (model.distances(q)[0] - RESERVE) / SCALE
+    expected = 1 - (model.signed_distances(q)[0] - RESERVE) / SCALE
     near = expected > COUNTED_SHARE
     assert 10 < near.sum() < near.size
     np.testing.assert_allclose(shares[near], expected[near])

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from optimizer.collision.cores import core_of
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.scene import (
     MOST_OBSTACLES,
@@ -102,6 +103,6 @@ def test_capsule_between_two_points() -> None:
     first, second = np.array([0.1, -0.2, 0.3]), np.array([-0.05, 0.1, 0.35])
     part = capsule_between(first, second, 0.04)
     T = part.T_flange_shape
-    ends = part.shape.core.points @ T[:3, :3].T + T[:3, 3]
+    ends = core_of(part.shape).points @ T[:3, :3].T + T[:3, 3]
     assert np.abs(ends - [first, second]).max() < ROUNDING * 10
     assert isinstance(capsule_between(first, first, 0.04).shape, Sphere)

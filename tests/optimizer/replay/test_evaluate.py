@@ -78,8 +78,8 @@ def test_agrees_with_pinocchio(interpolation: str) -> None:
 @pytest.mark.parametrize("interpolation", INTERPOLATIONS)
 def test_parts_add_up_and_segments_to_the_total(interpolation: str) -> None:
     result = evaluate(ARM, motion(interpolation))
-    for stretch in (result.total, *result.segments):
-        assert stretch.balance_error < 1e-6
+    for interval in (result.total, *result.segments):
+        assert interval.balance_error < 1e-6
     assert sum(each.energy.electrical.total for each in result.segments) == pytest.approx(total(result))
     assert [each.end for each in result.segments] == pytest.approx(np.cumsum(TIMES).tolist())
     assert result.total.mean_mechanical_power == pytest.approx(result.total.energy.mechanical.total / TIMES.sum())
@@ -115,7 +115,7 @@ def test_is_the_baselines_own_quintic() -> None:
     assert peaks["jerk"] == pytest.approx((known.peak_jerk / ROBOT.limits.j_max).max(), rel=1e-5)
 
 
-def test_a_jump_of_speed_breaks_acceleration_and_costs_nothing() -> None:
+def test_a_velocity_step_violates_acceleration_and_needs_no_energy() -> None:
     result = evaluate(ARM, motion("linear"))
     assert result.speed_jumps == 1
     reports = {report.limit: report for report in result.limits}
@@ -128,7 +128,7 @@ def test_a_jump_of_speed_breaks_acceleration_and_costs_nothing() -> None:
     assert result.segments[0].kinetic_end != pytest.approx(result.segments[1].kinetic_start, rel=1e-3)
 
 
-def test_a_trapezoid_breaks_jerk_only() -> None:
+def test_a_trapezoid_violates_jerk_only() -> None:
     result = evaluate(ARM, motion("trapezoid"))
     assert {report.limit for report in result.limits if not report.held} == {"jerk"}
     relaxed = Arm(robot=ROBOT, payload=PAYLOAD, gravity=TILTED, limits=limits(v_max=0.3))
@@ -137,7 +137,7 @@ def test_a_trapezoid_breaks_jerk_only() -> None:
     assert abs(broken["velocity"].value) == pytest.approx(0.3 * broken["velocity"].ratio)
 
 
-def test_a_log_of_a_motion_costs_what_the_motion_does() -> None:
+def test_a_log_of_a_motion_needs_the_energy_of_the_motion() -> None:
     whole = evaluate(ARM, motion("spline"), sample_period=2e-3)
     s = whole.samples
     assert s is not None
@@ -162,7 +162,7 @@ def test_blocks_do_not_show() -> None:
     for size in (50, 977, BLOCK + 3):
         parts = [LogBlock(t[k : k + size], q[k : k + size]) for k in range(0, len(t), size)]
         result = evaluate(ARM, Log(parts), sample_period=0.05)
-        # the spline through a stretch is the spline through all of it, but for rounding
+        # the spline through a block and its neighbouring rows is the spline through all rows, except for rounding
         assert total(result) == pytest.approx(total(whole), rel=1e-9)
         assert result.samples is not None and whole.samples is not None
         assert np.abs(result.samples.a - whole.samples.a).max() < 1e-7
@@ -193,7 +193,7 @@ def test_memory_does_not_grow_with_the_log() -> None:
     assert peak(24) < 1.2 * peak(4)
 
 
-def test_a_store_keeps_its_charge_from_stretch_to_stretch() -> None:
+def test_energy_storage_keeps_its_charge_from_segment_to_segment() -> None:
     bus = Bus("storage", efficiency=0.9, capacity=50.0, power=400.0, initial=5.0)
     arm = Arm(robot=ROBOT, payload=PAYLOAD, bus=bus)
     points = np.array([START, GOAL] * 6)
@@ -246,5 +246,10 @@ def test_refuses_a_log_without_a_motion(rows: int) -> None:
 
 
 def test_keeps_its_deadline() -> None:
+    def at(*instants: float) -> Any:
+        return iter(instants).__next__
+
+    # the clock is read at the start and before each block: this motion has one
+    assert evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 11.9)).segment_count == 2
     with pytest.raises(DeadlineExceeded):
-        evaluate(ARM, motion("quintic"), deadline=-1.0)
+        evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 12.1))

@@ -1,0 +1,55 @@
+"""Geometry of shapes for distances: every shape is a convex core grown by a radius.
+
+The core is a point or segment, a box, the two discs of a cylinder, or the hull of a mesh; the half-space is a case of
+its own. Signed distances are computed between cores, and the radii are subtracted at the end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import assert_never
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.problem.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
+
+
+@dataclass(frozen=True)
+class Core:
+    """The convex hull of `points` (m, 3) [m] in the frame of the shape, each point widened to a disc about z.
+
+    `radius` [m] grows the hull, `disc_radius` [m] is that of the discs (0: points). `half_size` (3,) [m] is set for a
+    box: half of its edges. If `is_half_space`, the core is instead all that lies below its one point, z up.
+    """
+
+    points: Array
+    radius: float = 0.0
+    disc_radius: float = 0.0
+    half_size: Array | None = None
+    is_half_space: bool = False
+
+
+def core_of(shape: Shape) -> Core:
+    """Core of a shape, in the frame of the shape."""
+    match shape:
+        case Sphere():
+            return Core(np.zeros((1, 3)), shape.radius)
+        case Capsule():
+            return Core(_on_z_axis(shape.length), shape.radius)
+        case Cylinder():
+            return Core(_on_z_axis(shape.length), disc_radius=shape.radius)
+        case Box():
+            signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
+            return Core(signs * shape.size / 2, half_size=shape.size / 2)
+        case HalfSpace():
+            return Core(np.zeros((1, 3)), is_half_space=True)
+        case Mesh():
+            return Core(shape.vertices)
+        case _:
+            assert_never(shape)
+
+
+def _on_z_axis(length: float) -> Array:
+    """Ends (2, 3) of a segment along z whose middle is the origin."""
+    return np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]])

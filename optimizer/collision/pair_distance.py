@@ -1,0 +1,185 @@
+"""Signed distances and witness points of pairs of bodies: closed forms where they exist, Coal for the other pairs.
+
+Bodies are held as arrays, so that one call computes many pairs at many configurations. Index arrays (k,) select the
+computed cases: `configuration` is a row of `frames` (n, nq + 1, 4, 4), the T_base_link [m] of every link, and `pair` is
+a row of the pairs. All distances have the radii and the margins of both bodies subtracted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.collision.bodies import Body, Indices
+from optimizer.collision.closed_form_distance import box_segment, segment_segment
+from optimizer.collision.coal_distance import ConvexPairs
+
+
+class PairKind(IntEnum):
+    """What computes the distance of a pair, by the cores of its first and second body."""
+
+    SEGMENT_SEGMENT = 0
+    BOX_SEGMENT = 1
+    SEGMENT_BOX = 2
+    HALF_SPACE = 3
+    CONVEX = 4
+
+
+@dataclass(frozen=True)
+class WitnessPoints:
+    """Nearest points of k pairs: signed distance (k,) [m], unit normal (k, 3) from first to second body, and a point.
+
+    `point` (k, 3) [m] lies on the line through the two nearest points, in the base frame like `normal`.
+    """
+
+    distance: Array
+    normal: Array
+    point: Array
+
+
+class PairGeometry:
+    """Cores of bodies, and the `pairs` (p, 2) of them whose distances are computed.
+
+    The first body of a pair is on the link nearer to the base. A half-space may only be first, and on link 0.
+    """
+
+    def __init__(self, bodies: Sequence[Body], pairs: Indices) -> None:
+        self.pairs = pairs
+        cores = [body.core for body in bodies]
+        most = max((len(body.points) for body in bodies), default=0)
+        # cores with fewer points repeat their last point
+        self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
+        self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
+        self._disc_radii = np.array([core.disc_radius for core in cores])
+        self._ball_centres = np.array([body.ball_centre for body in bodies]).reshape(-1, 3)
+        self._ball_radii = np.array([body.ball_radius for body in bodies])
+        self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
+        self._half_sizes = np.array([np.zeros(3) if core.half_size is None else core.half_size for core in cores])
+        self._T_link_core = np.array([body.T_link_core for body in bodies])
+        growth = np.array([body.core.radius + body.margin for body in bodies])
+        self._growth = growth[pairs].sum(axis=1)
+        self._half_space_first = np.array([core.is_half_space for core in cores], dtype=bool)[pairs][:, 0]
+        segment = np.array([body.is_segment for body in bodies], dtype=bool)[pairs]
+        box = np.array([core.half_size is not None for core in cores], dtype=bool)[pairs]
+        kinds = np.select(
+            [self._half_space_first, segment.all(axis=1), box[:, 0] & segment[:, 1], segment[:, 0] & box[:, 1]],
+            [PairKind.HALF_SPACE, PairKind.SEGMENT_SEGMENT, PairKind.BOX_SEGMENT, PairKind.SEGMENT_BOX],
+            PairKind.CONVEX,
+        )
+        self._kinds = kinds
+        # pairs (p,) whose distance is exact, not iterated
+        self.is_closed_form = kinds != PairKind.CONVEX
+        self._convex = ConvexPairs(cores)
+
+    def ball_distances(self, frames: Array, pairs: Indices) -> Array:
+        """Signed distances (n, p) [m] of the balls that enclose the bodies of `pairs` (p,): lower bounds.
+
+        A ball cannot enclose a half-space: its pairs get -inf.
+        """
+        first, second = self.pairs[pairs].T
+        T = frames[:, self.links]
+        centres = (T[..., :3, :3] @ self._ball_centres[:, :, None])[..., 0] + T[..., :3, 3]
+        offset = centres[:, second] - centres[:, first]
+        distance = np.sqrt(np.einsum("npi,npi->np", offset, offset))
+        distance -= self._ball_radii[first] + self._ball_radii[second] + self._growth[pairs]
+        distance[:, self._half_space_first[pairs]] = -np.inf
+        return np.asarray(distance)
+
+    def witness_points(self, frames: Array, configuration: Indices, pair: Indices) -> WitnessPoints:
+        """Witness points of pairs (k,) at configurations (k,)."""
+        first, second = self.pairs[pair].T
+        k = len(pair)
+        result = WitnessPoints(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
+        kinds = self._kinds[pair]
+        # in the order of PairKind
+        solvers = (self._segment_segment, self._box_segment, self._segment_box, self._half_space, self._by_coal)
+        # plain integers: comparing an array with a member of an enumeration takes five times as long
+        for kind, solver in enumerate(solvers):
+            chosen = np.flatnonzero(kinds == kind)
+            if chosen.size:
+                found = solver(frames, configuration[chosen], first[chosen], second[chosen])
+                result.distance[chosen], result.normal[chosen], result.point[chosen] = found
+        result.distance[:] -= self._growth[pair]
+        return result
+
+    def separation(self, frames: Array, configuration: Indices, pair: Indices, normal: Array) -> Array:
+        """min n·x over the second body - max n·x over the first (k,) [m], for unit vectors n (k, 3) in the base frame.
+
+        It never exceeds the signed distance, whatever n is. For a half-space, n must be its outward normal.
+        """
+        first, second = self.pairs[pair].T
+        gap = self._support(frames, configuration, second, normal) + self._support(
+            frames, configuration, first, -normal
+        )
+        return np.asarray(gap - self._growth[pair])
+
+    def _support(self, frames: Array, configuration: Indices, body: Indices, normal: Array) -> Array:
+        """min n·x (k,) [m] over the cores of bodies (k,)."""
+        T = frames[configuration, self.links[body]]
+        normal_in_link = np.einsum("kij,ki->kj", T[:, :3, :3], normal)
+        least = np.einsum("kmj,kj->km", self._points[body], normal_in_link).min(axis=1)
+        if self._disc_radii.any():
+            cosine = np.einsum("kj,kj->k", self._axes[body], normal_in_link)
+            least -= self._disc_radii[body] * np.sqrt(np.maximum(1 - cosine**2, 0))
+        return np.asarray(least + np.einsum("ki,ki->k", T[:, :3, 3], normal))
+
+    def _segment_ends(self, frames: Array, configuration: Indices, body: Indices) -> Array:
+        """Ends (k, 2, 3) [m] of segments in the base frame."""
+        if len(body) > len(frames) * len(self.links):
+            # each body is in many pairs: placed once per configuration, not once per pair
+            T = frames[:, self.links]
+            placed = self._points[:, :2] @ T[..., :3, :3].swapaxes(-1, -2) + T[..., None, :3, 3]
+            return np.asarray(placed[configuration, body])
+        T = frames[configuration, self.links[body]]
+        return np.asarray(self._points[body, :2] @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3])
+
+    def _segment_segment(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        distance, normal, _, point = segment_segment(
+            self._segment_ends(frames, configuration, first), self._segment_ends(frames, configuration, second)
+        )
+        return distance, normal, point
+
+    def _box_segment(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        T = frames[configuration, self.links[first]] @ self._T_link_core[first]
+        R, ends = T[:, :3, :3], self._segment_ends(frames, configuration, second)
+        distance, normal, point = box_segment(self._half_sizes[first], (ends - T[:, None, :3, 3]) @ R)
+        return distance, np.einsum("kij,kj->ki", R, normal), np.einsum("kij,kj->ki", R, point) + T[:, :3, 3]
+
+    def _segment_box(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        distance, normal, point = self._box_segment(frames, configuration, second, first)
+        return distance, -normal, point
+
+    def _half_space(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        normal, origin = self._axes[first], self._points[first, 0]
+        T = frames[configuration, self.links[second]]
+        points = self._points[second] @ T[:, :3, :3].swapaxes(1, 2) + T[:, None, :3, 3]
+        axis = np.einsum("kij,kj->ki", T[:, :3, :3], self._axes[second])
+        cosine = np.einsum("ki,ki->k", axis, normal)
+        # the part of the normal in the plane of the disc: the lowest point of the disc lies against it
+        in_disc = normal - cosine[:, None] * axis
+        sine = np.linalg.norm(in_disc, axis=1)
+        height = np.einsum("kmi,ki->km", points - origin[:, None], normal)
+        lowest = height.argmin(axis=1)
+        rows = np.arange(len(lowest))
+        radius = self._disc_radii[second]
+        point = points[rows, lowest] - (radius / np.maximum(sine, 1e-12))[:, None] * in_disc
+        return height[rows, lowest] - radius * sine, normal, point
+
+    def _by_coal(
+        self, frames: Array, configuration: Indices, first: Indices, second: Indices
+    ) -> tuple[Array, Array, Array]:
+        T_first = frames[configuration, self.links[first]] @ self._T_link_core[first]
+        T_second = frames[configuration, self.links[second]] @ self._T_link_core[second]
+        return self._convex.witness_points(first.tolist(), second.tolist(), T_first, T_second)

@@ -1,0 +1,75 @@
+"""Energy of an interval of a given motion, and the sum over consecutive intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import reduce
+from typing import TypeVar
+
+from optimizer.certificate import ENERGY_FLOOR
+from optimizer.solution import Energy, StorageUse
+
+Sum = TypeVar("Sum")
+
+
+@dataclass(frozen=True)
+class IntervalEnergy:
+    """Energy of a segment, or of the whole motion, from `start` to `end` [s] after the start of the motion.
+
+    `kinetic_start`, `kinetic_end` [J]: kinetic energy, rotors included, just after `start` and just before `end`.
+    """
+
+    start: float
+    end: float
+    energy: Energy
+    kinetic_start: float
+    kinetic_end: float
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+        return self.end - self.start
+
+    @property
+    def mean_mechanical_power(self) -> float:
+        """Mean of Σ_j |tau_j v_j| [W]: Eq. 3 of the paper divided by the duration."""
+        return self.energy.mechanical.total / self.duration
+
+    @property
+    def balance_error(self) -> float:
+        """|sum of the electrical parts - total| / total: quadrature error, and how badly logged v and a fit q."""
+        electrical = self.energy.electrical
+        return abs(electrical.parts_sum - electrical.total) / max(abs(electrical.total), ENERGY_FLOOR)
+
+
+def joined(parts: Sequence[IntervalEnergy]) -> IntervalEnergy:
+    """Consecutive intervals as one."""
+    first, last = parts[0], parts[-1]
+    duration = last.end - first.start
+    energies = [part.energy for part in parts]
+    energy = replace(
+        reduce(_sum, [replace(energy, storage=None) for energy in energies]),
+        peak_power=max(energy.peak_power for energy in energies),
+        mean_power=sum(part.energy.mean_power * part.duration for part in parts) / duration,
+        storage=_storage_use([energy.storage for energy in energies if energy.storage is not None]),
+    )
+    return IntervalEnergy(first.start, last.end, energy, first.kinetic_start, last.kinetic_end)
+
+
+def _storage_use(uses: Sequence[StorageUse]) -> StorageUse | None:
+    """Use of the energy storage over consecutive intervals; None without energy storage."""
+    if not uses:
+        return None
+    charged, discharged = (sum(getattr(use, name) for use in uses) for name in ("charged", "discharged"))
+    return StorageUse(uses[0].initial, uses[-1].final, charged, discharged)
+
+
+def _sum(one: Sum, other: Sum) -> Sum:
+    """Sum of two numbers or arrays, or of two dataclasses of them, field by field; None plus None is None."""
+    if one is None:
+        return one
+    if is_dataclass(one) and not isinstance(one, type):
+        sums = {each.name: _sum(getattr(one, each.name), getattr(other, each.name)) for each in fields(one)}
+        return type(one)(**sums)
+    return one + other  # type: ignore[no-any-return, operator]

@@ -1,0 +1,107 @@
+"""Collisions of an arm with itself and its scene: clearance of motions, clearance constraints, collision-free paths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.collision.bodies import Indices
+from optimizer.collision.clearance_proof import proven_clearance
+from optimizer.collision.model import CollisionModel, collision_model
+from optimizer.collision.path_planner import plan_paths
+from optimizer.deadline import Deadline
+from optimizer.kinematics.forward import joint_placements
+from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
+from optimizer.nlp.clearance_constraint import ClearanceConstraint
+from optimizer.problem.arm import Arm
+from optimizer.solution import Clearance
+from optimizer.trajectories.spline import Spline
+
+# samples of a motion at which distances are computed, and the distance [m] there that makes a proof unnecessary until
+# the certificate
+CONTACT_SAMPLES, CLEAR = 96, 0.02
+# pairs that stay farther apart than this [m] throughout a motion get no clearance constraint
+ACTIVE = 0.15
+# clearance [m] beyond the margins below which an obstacle is likely to limit the optimum
+NEAR_CONTACT = 5e-3
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """The collision side of a problem's arm, shared by all candidates. If `arm.collisions` is false, nothing collides.
+
+    All distances [m] have the margins of the obstacles subtracted.
+    """
+
+    arm: Arm
+
+    @cached_property
+    def model(self) -> CollisionModel:
+        """Bodies, checked pairs and distances."""
+        return collision_model(self.arm)
+
+    def worst_violation(self, spline: Spline) -> Clearance | None:
+        """Clearance of a motion whose margins are violated or not proven: distance, pair and time.
+
+        None if all samples are at least CLEAR away, if the margins are proven, or if collisions are not checked.
+        """
+        if not self.arm.collisions:
+            return None
+        distance = self._sampled_distances(spline, CLEAR)
+        least = float(distance.min(initial=np.inf))
+        if least >= CLEAR:
+            return None
+        if least < 0:
+            k, pair = np.unravel_index(int(distance.argmin()), distance.shape)
+            time = spline.duration * float(k) / (CONTACT_SAMPLES - 1)
+            return Clearance(least, least, self.model.names(int(pair)), time)
+        found = proven_clearance(self.model, spline)
+        return found if found is not None and found.min_clearance < 0 else None
+
+    def is_collision_free(self, q: Array) -> bool:
+        """Whether samples q (k, nq) [rad] of a motion keep all margins. About CONTACT_SAMPLES of them are checked."""
+        if not self.arm.collisions:
+            return True
+        return self.model.least_distance(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0) >= 0
+
+    def is_near_contact(self, q: Array) -> bool:
+        """Whether any of q (k, nq) [rad] has a clearance below NEAR_CONTACT.
+
+        An obstacle is then likely to limit the optimum.
+        """
+        return self.arm.collisions and self.model.least_distance(q, NEAR_CONTACT) < NEAR_CONTACT
+
+    def active_pairs(self, spline: Spline) -> Indices:
+        """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a sample of the motion."""
+        return np.flatnonzero(self._sampled_distances(spline, ACTIVE).min(axis=0) < ACTIVE)
+
+    def with_clearance(self, pairs: Indices) -> PathConstraints:
+        """The path constraints of the arm, and the clearance of `pairs` (k,) of the collision model."""
+        constraints = [*path_constraint_list(self.arm), ClearanceConstraint(self.model, pairs)]
+        return PathConstraints(joint_placements(self.arm.robot.model), constraints)
+
+    def planned_paths(self, q_start: Array, q_goal: Array, deadline: Deadline) -> list[Array]:
+        """Collision-free joint paths (k, nq) [rad] from q_start to q_goal (nq,); see `plan_paths`.
+
+        They are planned once, before `deadline`; later calls with the same ends return the same paths.
+        """
+        ends = q_start.tobytes() + q_goal.tobytes()
+        if ends not in self._paths:
+            self._paths[ends] = plan_paths(self.arm, q_start, q_goal, deadline, model=self.model)
+        return self._paths[ends]
+
+    def has_planned_paths(self, q_start: Array, q_goal: Array) -> bool:
+        """Whether paths from q_start to q_goal (nq,) have been planned and found."""
+        return bool(self._paths.get(q_start.tobytes() + q_goal.tobytes()))
+
+    @cached_property
+    def _paths(self) -> dict[bytes, list[Array]]:
+        return {}
+
+    def _sampled_distances(self, spline: Spline, within: float) -> Array:
+        """Signed distances (CONTACT_SAMPLES, pairs) [m] at equal steps of a motion, exact up to `within`."""
+        q = spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES))
+        return self.model.pair_distances(self.model.frames(q), within=within).distance

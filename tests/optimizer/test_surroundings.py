@@ -1,0 +1,98 @@
+"""Surroundings: clearance of motions, constrained pairs and planned paths of an arm among obstacles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.robot import Array
+from optimizer.collision.clearance_proof import GAP, proven_clearance
+from optimizer.deadline import Deadline
+from optimizer.problem.arm import Arm
+from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
+from optimizer.surroundings import ACTIVE, CLEAR, Surroundings
+from optimizer.trajectories.spline import sample
+from optimizer.trajectories.time_scalings import quintic_spline
+from tests.optimizer.cells import at
+from tests.optimizer.moves import ROBOT
+
+START = np.array([-0.8, -1.4, 1.6, -1.7, -1.57, 0.0])
+GOAL = START + np.array([1.6, 0.0, 0.0, 0.0, 0.0, 0.0])
+MOTION = quintic_spline(START, GOAL, 1.0)
+AMPLE = 60.0  # s: the seed and not the load of the machine determines the result
+
+
+def wrist(q: Array) -> Array:
+    """Position (3,) [m] of the third wrist joint."""
+    return np.asarray(Surroundings(Arm(robot=ROBOT)).model.frames(q[None])[0, 6, :3, 3])
+
+
+def with_post(offset: float) -> Surroundings:
+    """A ball of 1 cm on the radius of the wrist half way through MOTION, `offset` [m] above it."""
+    middle = wrist((START + GOAL) / 2) + np.array([0.0, 0.0, offset])
+    return Surroundings(Arm(robot=ROBOT, scene=Scene([Obstacle("post", Sphere(0.01), at(middle))])))
+
+
+def test_a_motion_that_stays_clear_violates_nothing() -> None:
+    alone = Surroundings(Arm(robot=ROBOT))
+    assert alone.model.least_distance(sample(MOTION, np.linspace(0, 1, 500))[0], CLEAR) > 0
+    assert alone.worst_violation(MOTION) is None
+    assert alone.is_collision_free(sample(MOTION, np.linspace(0, 1, 500))[0])
+
+
+def test_a_collision_is_named_with_its_time() -> None:
+    found = with_post(0.0).worst_violation(MOTION)
+    assert found is not None
+    assert found.min_clearance == found.sampled < -0.01
+    assert found.pair[0] == "post" and found.pair[1].startswith("wrist")
+    # the post is where the motion is half way; samples are 1/95 s apart
+    assert found.time == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_motion_that_passes_closely_needs_its_proof() -> None:
+    """All samples keep the margin; whether the motion is accepted depends on the proof alone."""
+    near = with_post(0.19)
+    proof = proven_clearance(near.model, MOTION)
+    assert proof is not None and 0 < proof.min_clearance < proof.sampled < CLEAR
+    assert near.worst_violation(MOTION) is None
+    (post,) = near.arm.scene.obstacles
+    # the proof ends when its bound is at most GAP below the least sample: here that leaves it below zero
+    margin = proof.sampled - GAP / 4
+    closer = Surroundings(replace(near.arm, scene=Scene([replace(post, margin=margin)])))
+    assert closer.is_collision_free(sample(MOTION, np.linspace(0, 1, 500))[0])
+    found = closer.worst_violation(MOTION)
+    assert found is not None and found.min_clearance < 0 < found.sampled
+    assert "post" in found.pair
+
+
+def test_nothing_collides_if_collisions_are_not_checked() -> None:
+    unchecked = Surroundings(replace(with_post(0.0).arm, collisions=False))
+    q = sample(MOTION, np.linspace(0, 1, 500))[0]
+    assert not with_post(0.0).is_collision_free(q) and with_post(0.0).is_near_contact(q)
+    assert unchecked.worst_violation(MOTION) is None
+    assert unchecked.is_collision_free(q) and not unchecked.is_near_contact(q)
+
+
+def test_active_pairs_are_those_that_come_near() -> None:
+    surroundings = with_post(0.0)
+    active = surroundings.active_pairs(MOTION)
+    q = sample(MOTION, np.linspace(0, 1, 500))[0]
+    least = surroundings.model.signed_distances(q)[0].min(axis=0)
+    # between two of the samples a joint at 1.9 rad/s moves a point 1 m away by less than 2 cm
+    assert set(np.flatnonzero(least < ACTIVE - 0.02)) <= set(active.tolist()) <= set(np.flatnonzero(least < ACTIVE))
+    constraints = surroundings.with_clearance(active)
+    assert len(constraints.names) == len(active)
+
+
+def test_paths_are_planned_once() -> None:
+    wall = Obstacle("wall", Box(np.array([0.4, 0.02, 1.0])), at([0.6, 0.0, 0.3]))
+    surroundings = Surroundings(Arm(robot=ROBOT, scene=Scene([wall])))
+    assert not surroundings.has_planned_paths(START, GOAL)
+    paths = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
+    assert paths and surroundings.has_planned_paths(START, GOAL)
+    assert not surroundings.has_planned_paths(GOAL, START)
+    # a deadline that has passed leaves no time to plan
+    assert surroundings.planned_paths(START, GOAL, Deadline.after(-1.0)) is paths
+    assert surroundings.planned_paths(GOAL, START, Deadline.after(-1.0)) == []
