@@ -16,7 +16,7 @@ from models.registry import load_robot
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.tcp import turned_poses
 from tests.app.requests import HOME, NEAR, move
-from tests.app.test_studies import ABSENT, SECRET, added, begin
+from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
 
 SAME = 1e-9
 """Relative: the optimiser computes the same from the same request; clocks only tell it when to stop."""
