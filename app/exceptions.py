@@ -20,130 +20,120 @@ from __future__ import annotations
 
 import copyreg
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 
 class ServiceError(Exception):
     """Base of the service's own errors; the message is one sentence that says what to do."""
 
+    MESSAGE: ClassVar[str]
+
+    def __init__(self) -> None:
+        super().__init__(self.MESSAGE)
+
     def __reduce__(self) -> tuple[Any, ...]:
-        # the default calls the constructor with the message, but the subclasses' constructors take data or nothing
+        # the default calls the constructor with the message, but the constructors take data or nothing
         return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
 
 
 class InvalidRequest(ServiceError):
     """The request does not fit the schema; `errors` has one entry {loc, msg} per fault."""
 
+    MESSAGE = "Correct the fields listed under `errors`."
+
     def __init__(self, errors: Sequence[Mapping[str, Any]]) -> None:
-        super().__init__("Correct the fields listed under `errors`.")
+        super().__init__()
         self.errors = list(errors)
 
 
 class Busy(ServiceError):
     """The queue is full."""
 
-    def __init__(self) -> None:
-        super().__init__("All workers are busy and the queue is full: try again after a few seconds.")
+    MESSAGE = "All workers are busy and the queue is full: try again after a few seconds."
 
 
 class NotReady(ServiceError):
     """No worker is warm."""
 
-    def __init__(self) -> None:
-        super().__init__("The workers are warming up: try again after a few seconds.")
+    MESSAGE = "The workers are warming up: try again after a few seconds."
 
 
 class ShuttingDown(ServiceError):
     """The service stops before the request is done."""
 
-    def __init__(self) -> None:
-        super().__init__("The service is stopping: send the request again.")
+    MESSAGE = "The service is stopping: send the request again."
 
 
 class WorkerDied(ServiceError):
     """The worker process ended during the task."""
 
-    def __init__(self) -> None:
-        super().__init__("The process that worked on this request died: report it with the id in `instance`.")
+    MESSAGE = "The process that worked on this request died: report it with the id in `instance`."
 
 
 class TaskFailed(ServiceError):
     """The task raised an unforeseen exception; the worker's log has it with the request's id."""
 
-    def __init__(self) -> None:
-        super().__init__("This is a defect of the service: report it with the id in `instance`.")
+    MESSAGE = "This is a defect of the service: report it with the id in `instance`."
 
 
 class StoreUnavailable(ServiceError):
     """The database cannot be reached, read or written; the log has the cause."""
 
-    def __init__(self) -> None:
-        super().__init__("The database does not answer: try again later, or ask the operator of the service.")
+    MESSAGE = "The database does not answer: try again later, or ask the operator of the service."
 
 
 class UnknownAnswer(ServiceError):
     """No stored answer has that id."""
 
-    def __init__(self) -> None:
-        super().__init__("No stored answer has this id: send the request that produced the answer again.")
+    MESSAGE = "No stored answer has this id: send the request that produced the answer again."
 
 
 class UnknownStudy(ServiceError):
     """No study has that id."""
 
-    def __init__(self, detail: str = "No study has this id: GET /studies lists all studies.") -> None:
-        super().__init__(detail)
+    MESSAGE = "No study has this id: GET /studies lists all studies."
 
 
 class UnknownIteration(UnknownStudy):
     """The study has no iteration of that number."""
 
-    def __init__(self) -> None:
-        super().__init__("The study has no iteration of this number: GET /studies/{id} lists its iterations.")
+    MESSAGE = "The study has no iteration of this number: GET /studies/{id} lists its iterations."
 
 
 class EmptyStudy(ServiceError):
     """The study has no iteration that suggestions could start from."""
 
-    def __init__(self) -> None:
-        super().__init__("The study has no iteration yet: add a first iteration, then ask for suggestions.")
+    MESSAGE = "The study has no iteration yet: add a first iteration, then ask for suggestions."
 
 
 class KeyReused(ServiceError):
     """The Idempotency-Key was used for a different request."""
 
-    def __init__(self) -> None:
-        super().__init__(
-            "This Idempotency-Key was already used for a different request: use a new key for each new request."
-        )
+    MESSAGE = "This Idempotency-Key was already used for a different request: use a new key for each new request."
 
 
 class NotFound(ServiceError):
     """The path does not exist."""
 
-    def __init__(self) -> None:
-        super().__init__("This path does not exist: GET /openapi.json lists all paths.")
+    MESSAGE = "This path does not exist: GET /openapi.json lists all paths."
 
 
 class MethodNotAllowed(ServiceError):
     """The path does not accept the HTTP method."""
 
-    def __init__(self) -> None:
-        super().__init__("This path does not accept this HTTP method: use one from the Allow header.")
+    MESSAGE = "This path does not accept this HTTP method: use one from the Allow header."
 
 
 class BodyTooLarge(ServiceError):
     """The body is larger than the limit."""
 
-    def __init__(self) -> None:
-        super().__init__("The body is larger than the service accepts: send a smaller body.")
+    MESSAGE = "The body is larger than the service accepts: send a smaller body."
 
 
 class UnsupportedMediaType(ServiceError):
     """The path does not accept the media type of the body."""
 
-    def __init__(self) -> None:
-        super().__init__("This path takes JSON or CSV: declare the body as application/json or text/csv.")
+    MESSAGE = "This path takes JSON or CSV: declare the body as application/json or text/csv."
 
 
 class ClientDisconnected(Exception):

@@ -15,7 +15,9 @@ import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import partial
 from multiprocessing.connection import Connection, wait
+from typing import TypeVar
 
 from app.engine.forkserver import CONTEXT
 from app.engine.result import TaskResult
@@ -25,6 +27,8 @@ from app.logs import configure_logging
 from optimizer.exceptions import JoulepathError
 
 logger = logging.getLogger(__name__)
+
+T = TypeVar("T")
 
 
 class Worker:
@@ -51,37 +55,32 @@ class Worker:
 
     async def start(self) -> None:
         """Starts the process and waits until it is warm. Raises WorkerDied."""
-        loop = asyncio.get_running_loop()
-        try:
-            await loop.run_in_executor(self._threads, self._start)
-        except (EOFError, OSError):
-            self.kill()
-            raise WorkerDied from None
-        except asyncio.CancelledError:
-            self.kill()
-            raise
-        loop.add_reader(self._process.sentinel, self._has_ended)
+        await self._in_thread(self._start)
+        asyncio.get_running_loop().add_reader(self._process.sentinel, self._has_ended)
 
     async def ask(self, task: Task, deadline: float) -> TaskResult:
         """The task's result. If cancelled, it kills the worker, because nothing else stops a computation.
 
         Raises what the task raises (see `Task.run`), or WorkerDied.
         """
-        loop = asyncio.get_running_loop()
-        try:
-            return await loop.run_in_executor(self._threads, self._exchange, task, deadline)
-        except (EOFError, OSError):
-            self.kill()
-            raise WorkerDied from None
-        except asyncio.CancelledError:
-            self.kill()
-            raise
+        return await self._in_thread(partial(self._exchange, task, deadline))
 
     def kill(self) -> None:
         """Ends the process at once. Does nothing if it has ended."""
         self._killed = True
         if self._process.pid is not None:
             self._process.kill()
+
+    async def _in_thread(self, call: Callable[[], T]) -> T:
+        """The result of a call that waits for the process. If cancelled, kills the worker. Raises WorkerDied."""
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._threads, call)
+        except (EOFError, OSError):
+            self.kill()
+            raise WorkerDied from None
+        except asyncio.CancelledError:
+            self.kill()
+            raise
 
     def _start(self) -> None:
         self._process.start()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -28,6 +29,28 @@ ANSWER = 120.0
 
 
 @dataclass(frozen=True)
+class OpenRequest:
+    """A request that was sent. Leaving the context closes its connection."""
+
+    connection: socket.socket
+
+    @property
+    def answered(self) -> bool:
+        """Whether the answer has begun to arrive."""
+        return bool(select.select([self.connection], [], [], 0)[0])
+
+    def status(self) -> int:
+        """HTTP status of the answer, which must have begun to arrive."""
+        return int(self.connection.recv(len(b"HTTP/1.1 200")).split()[1])
+
+    def __enter__(self) -> OpenRequest:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.connection.close()
+
+
+@dataclass(frozen=True)
 class Server:
     """A running service."""
 
@@ -40,6 +63,16 @@ class Server:
 
     def post(self, path: str, body: Any, **options: Any) -> httpx2.Response:
         return httpx2.post(self.url + path, json=body, timeout=ANSWER, **options)
+
+    def open(self, path: str, body: Any, **headers: str) -> OpenRequest:
+        """A POST whose answer nobody waits for, over a connection of its own."""
+        host, port = self.url.removeprefix("http://").split(":")
+        content = json.dumps(body).encode()
+        head = {"Host": host, "Content-Type": "application/json", "Content-Length": str(len(content)), **headers}
+        lines = [f"POST {path} HTTP/1.1", *(f"{name}: {value}" for name, value in head.items()), "", ""]
+        connection = socket.create_connection((host, int(port)), timeout=ANSWER)
+        connection.sendall("\r\n".join(lines).encode() + content)
+        return OpenRequest(connection)
 
     def logged(self) -> list[dict[str, Any]]:
         """Every line logged so far: each must be JSON. A line that is still being written is left for the next time."""
@@ -101,6 +134,12 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
         finally:
             process.kill()
             process.wait()
+
+
+def processor_time(pid: int) -> float:
+    """Processor time that a process has used [s]: a worker without a task uses none."""
+    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
 
 
 def alive(pid: int) -> bool:

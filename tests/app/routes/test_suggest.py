@@ -9,9 +9,11 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.convert.pose import to_matrix
+from app.main import create_app
 from app.schemas import errors as problems
 from app.schemas.common import QuaternionPose
 from app.schemas.suggestions import Suggestions
+from app.settings import Settings
 from models.registry import load_robot
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.tcp import turned_poses
@@ -208,6 +210,17 @@ def test_what_cannot_be_is_listed(client: TestClient) -> None:
     assert [(entry["step"], entry["problem"]) for entry in content["not_computed"]] == [
         ("duration", "duration-too-short")
     ]
+
+
+def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
+    path = begin(client)
+    added(client, path, {"optimize": move()})
+    with TestClient(create_app(Settings(workers=1)), raise_server_exceptions=False) as stopping:
+        assert stopping.portal is not None
+        stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
+        answer = stopping.get(f"{path}/suggest")
+    assert answer.status_code == 503
+    problems.ShuttingDown.model_validate_json(answer.content)
 
 
 def test_an_empty_study_has_no_next_step(client: TestClient) -> None:
