@@ -1,6 +1,6 @@
 """`python -m app`: the service under uvicorn."""
 
-# Worker processes import this module again: what they have no use for is imported inside `main`.
+# Worker processes import this module too, so that everything that they do not need is imported inside `main`.
 from __future__ import annotations
 
 import signal
@@ -10,7 +10,7 @@ from types import FrameType
 
 def main() -> None:
     """Serves until SIGTERM or Ctrl-C, then exits with 0."""
-    # for before uvicorn handles signals itself, and after: it raises the one it got again when it is done
+    # for the time before uvicorn handles signals, and after: when it is done, it raises the signal again
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
 

@@ -1,167 +1,140 @@
-"""From exceptions to problems: one table, and the bytes that go out. Used by the service and by its workers alike.
+"""The service's own errors. How each looks over HTTP is in `app.http.problem_details`.
 
 ServiceError
-├── InvalidRequest      does not fit the schema
+├── InvalidRequest      the request does not fit the schema
 ├── Busy                the queue is full
 ├── NotReady            no worker is warm
-├── ShuttingDown        given up because the service stops
-├── WorkerDied          its worker process ended under it
+├── ShuttingDown        the service stops before the request is done
+├── WorkerDied          the worker process ended during the task
+├── TaskFailed          the task raised an unforeseen exception
 ├── StoreUnavailable    the database cannot be reached
-├── UnknownAnswer       no answer is kept under that id
+├── UnknownAnswer       no stored answer has that id
 ├── UnknownStudy        no study has that id
 │   └── UnknownIteration
 ├── EmptyStudy          the study has no iteration yet
-├── KeyReused           the Idempotency-Key came with another request before
+├── KeyReused           the Idempotency-Key was used for a different request
 └── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType
 """
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Mapping, Sequence
-from functools import cache
-from typing import Any
-
-from app.schemas.common import KEY_HEADER
-from app.schemas.common import Request as RequestModel
-
-MOST_ERRORS = 20
-"""A body can be wrong in thousands of places; the first few tell enough."""
+from typing import Any, ClassVar
 
 
 class ServiceError(Exception):
     """Base of the service's own errors; the message is one sentence that says what to do."""
 
+    MESSAGE: ClassVar[str]
+
+    def __init__(self) -> None:
+        super().__init__(self.MESSAGE)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # the default calls the constructor with the message, but the constructors take data or nothing
+        return copyreg.__newobj__, (type(self), *self.args), vars(self)  # type: ignore[attr-defined]
+
 
 class InvalidRequest(ServiceError):
-    """The request does not fit the schema; `errors` holds {loc, msg} each."""
+    """The request does not fit the schema; `errors` has one entry {loc, msg} per fault."""
+
+    MESSAGE = "Correct the fields listed under `errors`."
 
     def __init__(self, errors: Sequence[Mapping[str, Any]]) -> None:
-        super().__init__("Correct the fields listed under `errors`.")
+        super().__init__()
         self.errors = list(errors)
-
-    @classmethod
-    def by_pydantic(cls, errors: Sequence[Any], *where: str) -> InvalidRequest:
-        """From pydantic's errors; `where` goes before their locations.
-
-        Location and message only: pydantic's `input` repeats what was sent, and so may a location that is no field.
-        """
-        known = _field_names()
-        return cls(
-            [
-                {
-                    "loc": [*where, *(part for part in error["loc"] if isinstance(part, int) or part in known)],
-                    "msg": error["msg"],
-                }
-                for error in errors[:MOST_ERRORS]
-            ]
-        )
-
-
-@cache
-def _field_names() -> set[str]:
-    def names(model: type[RequestModel]) -> set[str]:
-        return set(model.model_fields).union(*(names(child) for child in model.__subclasses__()))
-
-    return names(RequestModel) | {"body", "path", "query", "header", KEY_HEADER}
 
 
 class Busy(ServiceError):
     """The queue is full."""
 
-    def __init__(self) -> None:
-        super().__init__("Every worker is taken and the queue is full: try again after a few seconds.")
+    MESSAGE = "All workers are busy and the queue is full: try again after a few seconds."
 
 
 class NotReady(ServiceError):
     """No worker is warm."""
 
-    def __init__(self) -> None:
-        super().__init__("The workers are warming up: try again after a few seconds.")
+    MESSAGE = "The workers are warming up: try again after a few seconds."
 
 
 class ShuttingDown(ServiceError):
     """The service stops before the request is done."""
 
-    def __init__(self) -> None:
-        super().__init__("The service is stopping: send the request again.")
+    MESSAGE = "The service is stopping: send the request again."
 
 
 class WorkerDied(ServiceError):
-    """A worker process ended while it worked on the request."""
+    """The worker process ended during the task."""
 
-    def __init__(self) -> None:
-        super().__init__("The process that worked on this request died: report it with the id in `instance`.")
+    MESSAGE = "The process that worked on this request died: report it with the id in `instance`."
+
+
+class TaskFailed(ServiceError):
+    """The task raised an unforeseen exception; the worker's log has it with the request's id."""
+
+    MESSAGE = "This is a defect of the service: report it with the id in `instance`."
 
 
 class StoreUnavailable(ServiceError):
-    """The database cannot be reached, read or written; the log says why."""
+    """The database cannot be reached, read or written; the log has the cause."""
 
-    def __init__(self) -> None:
-        super().__init__("The database does not answer: try again later, or ask whoever runs the service.")
+    MESSAGE = "The database does not answer: try again later, or ask the operator of the service."
 
 
 class UnknownAnswer(ServiceError):
-    """No answer is kept under that id."""
+    """No stored answer has that id."""
 
-    def __init__(self) -> None:
-        super().__init__("No answer is kept under this id: send the request that gave it again.")
+    MESSAGE = "No stored answer has this id: send the request that produced the answer again."
 
 
 class UnknownStudy(ServiceError):
     """No study has that id."""
 
-    def __init__(self, detail: str = "No study has this id: see GET /studies for those there are.") -> None:
-        super().__init__(detail)
+    MESSAGE = "No study has this id: GET /studies lists all studies."
 
 
 class UnknownIteration(UnknownStudy):
     """The study has no iteration of that number."""
 
-    def __init__(self) -> None:
-        super().__init__("The study has no iteration of this number: see its history for those there are.")
+    MESSAGE = "The study has no iteration of this number: GET /studies/{id} lists its iterations."
 
 
 class EmptyStudy(ServiceError):
-    """The study has no iteration that a next one could start from."""
+    """The study has no iteration that suggestions could start from."""
 
-    def __init__(self) -> None:
-        super().__init__("The study has no iteration yet: add a first one, then ask for the next.")
+    MESSAGE = "The study has no iteration yet: add a first iteration, then ask for suggestions."
 
 
 class KeyReused(ServiceError):
-    """The Idempotency-Key came with another request before."""
+    """The Idempotency-Key was used for a different request."""
 
-    def __init__(self) -> None:
-        super().__init__("This Idempotency-Key came with another request before: take a new key for a new request.")
+    MESSAGE = "This Idempotency-Key was already used for a different request: use a new key for each new request."
 
 
 class NotFound(ServiceError):
-    """Nothing is at that path."""
+    """The path does not exist."""
 
-    def __init__(self) -> None:
-        super().__init__("Nothing is at this path: see /openapi.json for what there is.")
+    MESSAGE = "This path does not exist: GET /openapi.json lists all paths."
 
 
 class MethodNotAllowed(ServiceError):
-    """The path does not take that method."""
+    """The path does not accept the HTTP method."""
 
-    def __init__(self) -> None:
-        super().__init__("This path does not take that method: use one from the Allow header.")
+    MESSAGE = "This path does not accept this HTTP method: use one from the Allow header."
 
 
 class BodyTooLarge(ServiceError):
-    """The body is over the limit."""
+    """The body is larger than the limit."""
 
-    def __init__(self) -> None:
-        super().__init__("The body is larger than the service accepts: send a smaller one.")
+    MESSAGE = "The body is larger than the service accepts: send a smaller body."
 
 
 class UnsupportedMediaType(ServiceError):
-    """The body is of a kind that the path does not take."""
+    """The path does not accept the media type of the body."""
 
-    def __init__(self) -> None:
-        super().__init__("This path takes JSON or CSV: declare the body as application/json or text/csv.")
+    MESSAGE = "This path takes JSON or CSV: declare the body as application/json or text/csv."
 
 
 class ClientDisconnected(Exception):
-    """The caller hung up: nobody is left to answer."""
+    """The client closed the connection: nobody is left to answer."""

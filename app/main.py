@@ -36,23 +36,29 @@ from app.routes import (
 from app.settings import Settings
 from app.store.store import Store
 
+ROUTES = (
+    optimize,
+    compare,
+    pareto,
+    whatif,
+    evaluate,
+    ik,
+    ik_path,
+    studies,
+    iterations,
+    suggest,
+    answers,
+    robots,
+    health,
+    problems,
+    docs,
+)
+"""Modules of routes, in the order of the documentation pages."""
+
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """The service, for any ASGI server. Its workers start and end with the server's lifespan."""
+    """The service as an ASGI application. Its workers start and end with the server's lifespan."""
     settings = settings or Settings()
-
-    @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.engine = engine = Engine(settings, warm)
-        app.state.store = store = Store(settings.database_url)
-        engine.start()
-        # aside: a database that does not answer holds nobody up who needs none
-        opening = asyncio.create_task(store.open())
-        yield
-        await engine.stop()
-        await opening
-        await store.close()
-
     app = FastAPI(
         title="joulepath",
         summary="The robot-arm motion of least energy, with its energy breakdown and a certificate.",
@@ -63,34 +69,37 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         docs_url=None,
         redoc_url=None,
         redirect_slashes=False,
-        lifespan=lifespan,
+        lifespan=_lifespan,
     )
     app.state.settings = settings
+    _add_middleware(app, settings)
+    install_handlers(app)
+    install_openapi(app, settings)
+    for module in ROUTES:
+        app.include_router(module.router)
+    return app
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    settings: Settings = app.state.settings
+    app.state.engine = engine = Engine(settings, warm)
+    app.state.store = store = Store(settings.database_url)
+    engine.start()
+    # in the background: requests that need no database do not wait for it
+    opening = asyncio.create_task(store.open())
+    yield
+    await engine.stop()
+    await opening
+    await store.close()
+
+
+def _add_middleware(app: FastAPI, settings: Settings) -> None:
+    """Adds the middleware, the innermost first."""
     uploads = {
         "/evaluate": settings.max_upload_bytes,
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
-    app.add_middleware(RequestContext)  # added last: the outermost
-    install_handlers(app)
-    install_openapi(app, settings)
-    for routes in (
-        optimize,
-        compare,
-        pareto,
-        whatif,
-        evaluate,
-        ik,
-        ik_path,
-        studies,
-        iterations,
-        suggest,
-        answers,
-        robots,
-        health,
-        problems,
-        docs,
-    ):
-        app.include_router(routes.router)
-    return app
+    app.add_middleware(RequestContext)

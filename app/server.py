@@ -1,4 +1,4 @@
-"""uvicorn, told what this service needs."""
+"""uvicorn with the settings of this service."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from app.main import create_app
 from app.settings import Settings
 
 _REFUSING_TIME = 0.25
-"""Time [s] in which new requests are still taken, to be refused, while whoever sends them learns of the end."""
+"""Time [s] in which new requests still get a response (`shutting-down`), until load balancers know of the shutdown."""
 _SETTLING_TIME = 0.05
-"""Time [s] in which what has arrived on open connections is read before the idle ones are closed."""
+"""Time [s] to read requests that have arrived on open connections, before idle connections are closed."""
 
 
 class _Server(uvicorn.Server):
-    """Tells the engine when a shutdown begins: the lifespan's end comes only after the last answer."""
+    """Drains the engine when a shutdown begins: the lifespan ends only after the last response."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
         super().__init__(config)
         self._app = app
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Lets the requests in flight finish, or be refused."""
+        """Lets the requests in flight finish; those that take too long are `shutting-down`."""
         engine: Engine = self._app.state.engine
         engine.drain()
         await asyncio.sleep(_REFUSING_TIME)
@@ -38,7 +38,7 @@ class _Server(uvicorn.Server):
 
 
 def serve(settings: Settings) -> None:
-    """Serves in this process until a signal comes."""
+    """Serves in this process until a signal arrives."""
     app = create_app(settings)
     config = uvicorn.Config(
         app,
@@ -50,7 +50,7 @@ def serve(settings: Settings) -> None:
         log_config=None,
         access_log=False,
         server_header=False,
-        # requests in flight are refused by the engine before this
+        # the engine ends the requests in flight before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )
     _Server(config, app).run()

@@ -1,4 +1,4 @@
-"""What an operator may set, by environment variable."""
+"""Settings of the service, from environment variables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
 def _default_database() -> str:
-    """A file where the user's programs keep what they remember (XDG base directory specification)."""
+    """URL of an SQLite file in the user's state folder (XDG base directory specification)."""
     state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
     return f"sqlite:///{state / 'joulepath' / 'joulepath.db'}"
 
@@ -25,41 +25,49 @@ class Settings(BaseSettings):
     port: int = Field(
         default=8000, ge=0, le=65535, validation_alias=AliasChoices("JOULEPATH_PORT", "PORT"), description="TCP port."
     )
-    log_level: Literal["debug", "info", "warning", "error"] = Field(default="info", description="Least level logged.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        default="info", description="Lowest level that is logged."
+    )
     workers: int = Field(
         default_factory=lambda: len(os.sched_getaffinity(0)),
         ge=1,
-        description="Worker processes, each solving one request at a time. Default: the CPUs this process may use.",
+        description="Worker processes; each solves one request at a time. Default: the CPUs that this process may use.",
     )
-    queue_size: int = Field(default=16, ge=0, description="Requests that may wait for a worker; more are refused.")
+    queue_size: int = Field(
+        default=16, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
+    )
     max_body_bytes: int = Field(default=4_194_304, ge=1024, description="Largest request body [byte].")
     max_upload_bytes: int = Field(
-        default=67_108_864, ge=1024, description="Largest body of `POST /evaluate`, which goes to a file [byte]."
+        default=67_108_864, ge=1024, description="Largest body of `POST /evaluate` [byte]; it goes to a file."
     )
     max_iteration_bytes: int = Field(
         default=1 << 20,
         ge=1024,
-        description="Largest body of a study's iteration or of `POST /whatif`, which may hold a motion [byte].",
+        description="Largest body of `POST /studies/{id}/iterations` and of `POST /whatif` [byte].",
     )
-    max_deadline: float = Field(default=120.0, gt=0, le=600, description="Longest deadline a caller may ask for [s].")
+    max_deadline: float = Field(
+        default=120.0, gt=0, le=600, description="Longest deadline that a request may have [s]."
+    )
     deadline_grace: float = Field(
-        default=5.0, gt=0, description="Time past the deadline after which a worker is killed [s]."
+        default=5.0, gt=0, description="Time after the deadline [s] at which a worker that has not answered is killed."
     )
     shutdown_grace: float = Field(
         default=8.0,
         gt=0,
-        description="Time that requests in flight have to finish on shutdown [s]; container engines allow 10 s in all.",
+        description="Time [s] for the requests in progress at a shutdown; container engines allow 10 s in total.",
     )
     database_url: str = Field(
         default_factory=_default_database,
-        description="Where studies and answers are kept: `sqlite:///<file>` or `postgresql://user:password@host/name`. "
+        description="Database of studies and stored answers: `sqlite:///<file>` or "
+        "`postgresql://user:password@host/name`. "
         "Default: an SQLite file in `$XDG_STATE_HOME/joulepath`, that is `~/.local/state/joulepath`.",
     )
     answers_max_bytes: int = Field(
         default=1 << 29,
         ge=0,
-        description="Most that the answers of no study may take in the database, compressed [byte]; the oldest go.",
+        description="Largest total size [byte], compressed, of stored answers that belong to no study; the oldest are "
+        "deleted.",
     )
     answers_max_age: float = Field(
-        default=30.0, gt=0, le=36500, description="Age at which an answer of no study is dropped [days]."
+        default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."
     )

@@ -1,6 +1,6 @@
-"""The process that workers are forked from. It imports the libraries once, so that a replacement starts at once.
+"""The process that workers are forked from. It imports the libraries once, so that a new worker starts at once.
 
-Imports nothing of the service: whoever wants to can start it before all else, and let both import side by side.
+This module imports nothing of the service: `python -m app` starts the process first, and both then import in parallel.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ CONTEXT = multiprocessing.get_context("forkserver")
 
 
 def start_forkserver() -> None:
-    """Starts it, unless it runs."""
-    # one solve, one core: a thread pool of a linear algebra library in each worker would only fight the other workers
+    """Starts the process, unless it runs."""
+    # each worker uses one core: thread pools of linear algebra libraries would compete with the other workers
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     CONTEXT.set_forkserver_preload(["app.tasks.preload"])

@@ -1,4 +1,4 @@
-"""Where CPU work runs: warmed worker processes behind a bounded queue, each task with a deadline."""
+"""The engine: warm worker processes behind a bounded queue, each task with a deadline."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from app.engine.forkserver import start_forkserver
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.engine.worker import Worker
 from app.exceptions import Busy, ShuttingDown, WorkerDied
@@ -42,7 +42,7 @@ class Engine:
 
     @property
     def warm_workers(self) -> int:
-        """Workers that are at a task or could take one."""
+        """Number of workers that run a task or could run one."""
         return sum(worker.alive for worker in self._workers)
 
     @property
@@ -74,7 +74,7 @@ class Engine:
         atexit.unregister(self._kill_all)
 
     def drain(self) -> None:
-        """Refuses new tasks from now on, and gives those in flight `settings.shutdown_grace` seconds to finish."""
+        """Refuses new tasks. Those in flight get `settings.shutdown_grace` seconds to finish."""
         if self._draining.is_set():
             return
         self._draining.set()
@@ -82,10 +82,11 @@ class Engine:
         for limit in self._in_flight:
             limit.reschedule(min(limit.when() or self._latest_end, self._latest_end))
 
-    async def run(self, task: Task, deadline: float) -> Reply:
-        """The task's reply, within `deadline` seconds and a little grace; the time spent waiting counts.
+    async def run(self, task: Task, deadline: float) -> TaskResult:
+        """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the queue counts.
 
-        Cancelled, it leaves the queue or kills the worker. Raises Busy, ShuttingDown, DeadlineExceeded, WorkerDied.
+        If cancelled, the task leaves the queue, or its worker is killed. Raises what the task raises (see `Task.run`),
+        Busy, ShuttingDown, DeadlineExceeded or WorkerDied.
         """
         if self._draining.is_set():
             raise ShuttingDown
@@ -102,11 +103,11 @@ class Engine:
         except TimeoutError:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
-    async def _run_in_worker(self, task: Task, end: float, limit: asyncio.Timeout) -> Reply:
+    async def _run_in_worker(self, task: Task, end: float, limit: asyncio.Timeout) -> TaskResult:
         worker = await self._idle.get()
         while not worker.alive:
             worker = await self._idle.get()
-        # the optimiser keeps the deadline itself and hands back what it has; the grace is for that
+        # the optimiser watches the deadline and returns its best motion: the grace is for that
         limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
         try:
             left = end - asyncio.get_running_loop().time()
@@ -120,7 +121,7 @@ class Engine:
     async def _keep(self, first: bool) -> None:
         """Keeps one worker alive: starts it, waits for its end, starts the next."""
         if not first:
-            # the first one compiles what the others then find in the cache
+            # the first worker compiles the kernels, which the others then find in the cache
             await self._first_warm.wait()
         delay = _FIRST_RESTART_DELAY
         while True:

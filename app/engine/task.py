@@ -1,14 +1,22 @@
-"""Something to do in a worker."""
+"""What the engine runs."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 
 
 class Task(Protocol):
-    """Something picklable to do in a worker; `deadline` [s] is the time left for it."""
+    """A picklable piece of work for a worker process."""
 
-    def run(self, deadline: float) -> Reply:
-        """Does it. An exception is a defect and ends the worker."""
+    @property
+    def request_id(self) -> str:
+        """Id of the request that the task belongs to; the worker's log names it."""
+
+    def run(self, deadline: float) -> TaskResult:
+        """The result, within about `deadline` seconds.
+
+        A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other exception is a defect:
+        the worker logs it, and the caller gets TaskFailed.
+        """

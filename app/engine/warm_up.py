@@ -1,4 +1,4 @@
-"""What a worker loads before its first task."""
+"""Warm-up of a worker, before its first task."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from optimizer.optimize import warm_up
 
 
 def warm() -> None:
-    """Loads all that a first request would otherwise wait for."""
+    """Loads robots and kernels, so that the first request need not wait for them."""
     for name in robot_names():
         warm_up(name)

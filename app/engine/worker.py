@@ -1,7 +1,7 @@
-"""One worker process: started, warmed, asked one task at a time, and killed when it is to stop.
+"""One worker process: it is started, warms up, runs one task at a time, and is killed to stop it.
 
-Each worker has a pipe of its own and shares no lock with the others, so it can be killed at any moment, and its end,
-whatever the cause, shows as the end of its pipe.
+Each worker has a pipe of its own and shares no lock with the others. It can therefore be killed at any moment, and its
+end, whatever the cause, shows as the end of its pipe.
 """
 
 from __future__ import annotations
@@ -15,15 +15,20 @@ import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import Executor
+from functools import partial
 from multiprocessing.connection import Connection, wait
+from typing import TypeVar
 
 from app.engine.forkserver import CONTEXT
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 from app.engine.task import Task
-from app.exceptions import WorkerDied
+from app.exceptions import ServiceError, TaskFailed, WorkerDied
 from app.logs import configure_logging
+from optimizer.exceptions import JoulepathError
 
 logger = logging.getLogger(__name__)
+
+T = TypeVar("T")
 
 
 class Worker:
@@ -45,33 +50,20 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """Whether it can be asked."""
+        """Whether it can run a task."""
         return not (self._killed or self.ended.is_set())
 
     async def start(self) -> None:
         """Starts the process and waits until it is warm. Raises WorkerDied."""
-        loop = asyncio.get_running_loop()
-        try:
-            await loop.run_in_executor(self._threads, self._start)
-        except (EOFError, OSError):
-            self.kill()
-            raise WorkerDied from None
-        except asyncio.CancelledError:
-            self.kill()
-            raise
-        loop.add_reader(self._process.sentinel, self._has_ended)
+        await self._in_thread(self._start)
+        asyncio.get_running_loop().add_reader(self._process.sentinel, self._has_ended)
 
-    async def ask(self, task: Task, deadline: float) -> Reply:
-        """The task's reply. Cancelled, it kills the worker: nothing else stops a computation. Raises WorkerDied."""
-        loop = asyncio.get_running_loop()
-        try:
-            return await loop.run_in_executor(self._threads, self._exchange, task, deadline)
-        except (EOFError, OSError):
-            self.kill()
-            raise WorkerDied from None
-        except asyncio.CancelledError:
-            self.kill()
-            raise
+    async def ask(self, task: Task, deadline: float) -> TaskResult:
+        """The task's result. If cancelled, it kills the worker, because nothing else stops a computation.
+
+        Raises what the task raises (see `Task.run`), or WorkerDied.
+        """
+        return await self._in_thread(partial(self._exchange, task, deadline))
 
     def kill(self) -> None:
         """Ends the process at once. Does nothing if it has ended."""
@@ -79,17 +71,30 @@ class Worker:
         if self._process.pid is not None:
             self._process.kill()
 
+    async def _in_thread(self, call: Callable[[], T]) -> T:
+        """The result of a call that waits for the process. If cancelled, kills the worker. Raises WorkerDied."""
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._threads, call)
+        except (EOFError, OSError):
+            self.kill()
+            raise WorkerDied from None
+        except asyncio.CancelledError:
+            self.kill()
+            raise
+
     def _start(self) -> None:
         self._process.start()
-        if self._killed:  # while this thread was starting it, so that `kill` found no process
+        if self._killed:  # during the start, when `kill` found no process yet
             self._process.kill()
         self._child_pipe.close()
         self._pipe.recv()
 
-    def _exchange(self, task: Task, deadline: float) -> Reply:
+    def _exchange(self, task: Task, deadline: float) -> TaskResult:
         self._pipe.send((task, deadline))
-        reply: Reply = self._pipe.recv()
-        return reply
+        received: TaskResult | JoulepathError | ServiceError = self._pipe.recv()
+        if isinstance(received, Exception):
+            raise received
+        return received
 
     def _has_ended(self) -> None:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)
@@ -101,8 +106,8 @@ class Worker:
 
 def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
     """The worker process."""
-    # a terminal's Ctrl-C and a service manager's SIGTERM reach the whole group: the parent alone decides what to do,
-    # lets requests in flight finish, and then kills
+    # Ctrl-C in a terminal and SIGTERM from a service manager reach the whole process group. Only the parent acts on
+    # them: it lets requests in flight finish, and then kills its workers
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     configure_logging(log_level)
@@ -118,7 +123,18 @@ def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
             task, deadline = pipe.recv()
         except EOFError:
             return
-        pipe.send(task.run(deadline))
+        pipe.send(outcome(task, deadline))
+
+
+def outcome(task: Task, deadline: float) -> TaskResult | JoulepathError | ServiceError:
+    """The task's result, or the error that its caller gets."""
+    try:
+        return task.run(deadline)
+    except (JoulepathError, ServiceError) as error:
+        return error
+    except Exception:
+        logger.exception("unforeseen error", extra={"request_id": task.request_id})
+        return TaskFailed()
 
 
 def _end_with_parent() -> None:

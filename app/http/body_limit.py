@@ -1,6 +1,6 @@
-"""Refuses bodies over a size, declared or not.
+"""Rejects bodies above a size, declared or not.
 
-Starlette's own middleware for this answers in plain text, and puts that in the place of any other answer.
+Starlette's own middleware for this answers in plain text, also in place of another response.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 
 class BodyLimit:
-    """ASGI middleware: reading a body of more than `most` bytes, or what `uploads` says of its path, raises a 413.
+    """ASGI middleware: reading a body of more than `most` bytes raises HTTPException(413).
 
-    A path there is a regular expression.
+    `uploads` has other limits [byte] for some paths; each path is a regular expression.
     """
 
     def __init__(self, app: ASGIApp, most: int, uploads: Mapping[str, int]) -> None:
@@ -25,7 +25,7 @@ class BodyLimit:
         self._uploads = uploads
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes the request on, counting its bytes."""
+        """Passes the request on and counts the bytes of its body."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -35,7 +35,7 @@ class BodyLimit:
 
         async def limited() -> Message:
             nonlocal size
-            if size > most:  # as declared: there is no need to read it
+            if size > most:  # as declared: it need not be read
                 raise HTTPException(413)
             message = await receive()
             if not declared:

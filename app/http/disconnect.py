@@ -1,20 +1,22 @@
-"""Work that nobody waits for any more is cancelled."""
+"""Cancels the work for a client that closed its connection."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Coroutine
+from typing import Any, TypeVar
 
 from fastapi import Request
 
-from app.engine.reply import Reply
 from app.exceptions import ClientDisconnected
 
+T = TypeVar("T")
 
-async def unless_disconnected(request: Request, work: Coroutine[None, None, Reply]) -> Reply:
-    """The work's result; the work is cancelled when the caller hangs up. Raises ClientDisconnected.
 
-    The request's body must have been read.
+async def unless_disconnected(request: Request, work: Coroutine[Any, Any, T]) -> T:
+    """The work's result. If the client closes the connection, cancels the work and raises ClientDisconnected.
+
+    The body of the request must have been read.
     """
     working, listening = asyncio.create_task(work), asyncio.create_task(_disconnected(request))
     try:
@@ -29,6 +31,6 @@ async def unless_disconnected(request: Request, work: Coroutine[None, None, Repl
 
 
 async def _disconnected(request: Request) -> None:
-    # the body has been read: nothing else comes
+    # the body has been read: the next message is the end of the connection
     while (await request.receive())["type"] != "http.disconnect":
         pass

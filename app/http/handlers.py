@@ -1,51 +1,53 @@
-"""The one exception handler."""
+"""Responses: results of tasks, and exceptions as problems."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import asyncio
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
-from app.engine.reply import Reply
+from app.engine.result import TaskResult, json_document
 from app.exceptions import BodyTooLarge, InvalidRequest, MethodNotAllowed, NotFound, ServiceError
-from app.http.problem_details import problem_reply
+from app.http.problem_details import invalid_request, problem_content, problem_type
 from optimizer.exceptions import JoulepathError
+
+PROBLEM_MEDIA_TYPE = "application/problem+json"
 
 
 def install_handlers(app: FastAPI) -> None:
-    """Answers every exception of the routes as a problem; `RequestContext` passes on what no route caught."""
-
-    async def handle(request: Request, error: Exception) -> Response:
-        if isinstance(error, RequestValidationError):
-            return respond(request, InvalidRequest.by_pydantic(error.errors()))
-        return respond(request, error)
-
+    """Answers every exception of the routes with a problem. `RequestContext` handles those that no route expects."""
     for kind in (JoulepathError, ServiceError, RequestValidationError, HTTPException):
-        app.add_exception_handler(kind, handle)
+        app.add_exception_handler(kind, problem_response)
 
 
-def respond(request: Request, error: Exception) -> Response:
-    """The answer to a request that failed."""
-    headers: Mapping[str, str] = {}
-    if isinstance(error, HTTPException):
-        headers = error.headers or {}
+async def problem_response(request: Request, error: Exception) -> Response:
+    """The response to a request that failed with `error`: a problem (RFC 9457)."""
+    headers: dict[str, str] = {}
+    if isinstance(error, RequestValidationError):
+        error = invalid_request(error.errors())
+    elif isinstance(error, HTTPException):
+        headers |= error.headers or {}
         if error.status_code == 405:
-            headers = {**headers, "Allow": ", ".join(_allowed(request))}
+            headers["Allow"] = ", ".join(_allowed(request))
         error = _from_framework(error)
-    reply = problem_reply(error, request.state.id)
-    return to_http(Reply(reply.status, reply.body, {**headers, **reply.headers}))
+    problem = problem_type(error)
+    if problem.retry_after is not None:
+        headers["Retry-After"] = str(problem.retry_after)
+    # a problem can list thousands of candidates: a thread encodes it, so that the event loop serves others meanwhile
+    body = await asyncio.to_thread(lambda: json_document(problem_content(error, request.state.id)))
+    return Response(body, problem.model_fields["status"].default, headers, PROBLEM_MEDIA_TYPE)
 
 
-def to_http(reply: Reply) -> Response:
-    """A reply as an HTTP response."""
-    return Response(reply.body, reply.status, reply.headers, reply.media_type)
+def result_response(result: TaskResult) -> Response:
+    """The response with a task's result."""
+    return Response(result.document, media_type=result.media_type)
 
 
 def _allowed(request: Request) -> list[str]:
-    """Every method that the path takes: Starlette names those of the first route that has the path alone."""
+    """Every method that the path accepts. Starlette's own list is that of the first route with this path only."""
     return [
         method
         for method in ("GET", "POST", "PUT", "PATCH", "DELETE")
@@ -54,9 +56,9 @@ def _allowed(request: Request) -> list[str]:
 
 
 def _from_framework(error: HTTPException) -> Exception:
-    """The framework's own refusals."""
+    """The service's error for one of the framework."""
     if error.status_code == 400:  # the body could not be read: not UTF-8, nested too deep, ...
-        return InvalidRequest([{"loc": ["body"], "msg": "The body is no JSON that can be read"}])
-    refusals: dict[int, type[ServiceError]] = {404: NotFound, 405: MethodNotAllowed, 413: BodyTooLarge}
-    refusal = refusals.get(error.status_code)
-    return error if refusal is None else refusal()
+        return InvalidRequest([{"loc": ["body"], "msg": "The body cannot be read as JSON"}])
+    errors: dict[int, type[ServiceError]] = {404: NotFound, 405: MethodNotAllowed, 413: BodyTooLarge}
+    kind = errors.get(error.status_code)
+    return error if kind is None else kind()

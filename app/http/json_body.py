@@ -1,7 +1,4 @@
-"""Takes the body of `curl -d @file` for what it is: JSON.
-
-curl declares every `-d` body a form, and no route here takes forms.
-"""
+"""Treats the body of `curl -d @file` as JSON. curl declares it as a form, but no route takes forms."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ FORM = "application/x-www-form-urlencoded"
 
 
 class JsonBody:
-    """ASGI middleware: a body declared a form, or not declared at all, is declared JSON."""
+    """ASGI middleware: declares a body as JSON if it is declared as a form or not at all."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

@@ -1,8 +1,9 @@
-"""What the OpenAPI document says beyond what FastAPI derives from the routes: problems, and the settings' bounds."""
+"""Additions to FastAPI's OpenAPI document: problems, and the longest deadline of the settings."""
 
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from typing import Any
 
 from fastapi import FastAPI
@@ -17,7 +18,7 @@ _REF = "#/components/schemas/{model}"
 
 
 def problem_responses(*problems: type[Problem]) -> dict[int | str, dict[str, Any]]:
-    """A route's `responses` for the problems that it may answer with; a 500 is always among them."""
+    """The `responses` of a route for its problems; `internal` (500) is always among them."""
     by_status: defaultdict[int | str, list[type[Problem]]] = defaultdict(list)
     every: tuple[type[Problem], ...] = (*problems, Internal)
     for problem in every:
@@ -40,7 +41,10 @@ def _response(same_status: list[type[Problem]]) -> dict[str, Any]:
     }
     if any(problem.retry_after for problem in same_status):
         response["headers"] = {
-            "Retry-After": {"description": "When to try again [s].", "schema": {"type": "integer", "minimum": 0}}
+            "Retry-After": {
+                "description": "Time after which to try again [s].",
+                "schema": {"type": "integer", "minimum": 0},
+            }
         }
     return response
 
@@ -70,7 +74,7 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
     schemas = document["components"]["schemas"]
     _, others = models_json_schema(
         [(problem, "serialization") for problem in PROBLEMS]
-        # a body that its route does not let FastAPI read
+        # the route reads this body itself, so that FastAPI does not know its schemas
         + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings)],
         ref_template=_REF,
     )
@@ -81,7 +85,19 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
     for operation in (operation for path in document["paths"].values() for operation in path.values()):
         if "HTTPValidationError" in str(operation["responses"].get("422", "")):
             del operation["responses"]["422"]
-    for name in ("OptimizeRequest", "CompareRequest", "ParetoRequest", "WhatifRequest"):
-        deadline = schemas[name]["properties"]["deadline"]
-        deadline |= {"maximum": settings.max_deadline, "default": min(deadline["default"], settings.max_deadline)}
+    for deadline in _deadlines(document):
+        deadline["maximum"] = settings.max_deadline
+        if "default" in deadline:
+            deadline["default"] = min(deadline["default"], settings.max_deadline)
     return document
+
+
+def _deadlines(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The number schema of every `deadline` that a request may have, in bodies and queries."""
+    fields = [schema.get("properties", {}).get("deadline") for schema in document["components"]["schemas"].values()]
+    for path in document["paths"].values():
+        for operation in path.values():
+            parameters = operation.get("parameters", ())
+            fields += [parameter["schema"] for parameter in parameters if parameter["name"] == "deadline"]
+    for field in filter(None, fields):
+        yield from (option for option in field.get("anyOf", [field]) if option.get("type") == "number")

@@ -1,13 +1,12 @@
-"""From exceptions to problem details (RFC 9457): one table."""
+"""Problem details (RFC 9457) of exceptions: one table."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
-import orjson
-
 from app.convert.fields import candidate_fields, fields, unreachable_fields
-from app.engine.reply import Reply
 from app.exceptions import (
     BodyTooLarge,
     Busy,
@@ -20,12 +19,15 @@ from app.exceptions import (
     ServiceError,
     ShuttingDown,
     StoreUnavailable,
+    TaskFailed,
     UnknownAnswer,
     UnknownStudy,
     UnsupportedMediaType,
     WorkerDied,
 )
 from app.schemas import errors as problems
+from app.schemas.common import KEY_HEADER
+from app.schemas.common import Request as RequestModel
 from optimizer import exceptions as optimizer_errors
 
 TABLE: dict[type[Exception], type[problems.Problem]] = {
@@ -57,25 +59,52 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
     BodyTooLarge: problems.BodyTooLarge,
     UnsupportedMediaType: problems.UnsupportedMediaType,
     WorkerDied: problems.Internal,
+    TaskFailed: problems.Internal,
 }
+
+MOST_ERRORS = 20
+"""Errors that a `validation` problem lists at most: a body can have thousands, and the first ones suffice."""
 
 
 def problem_type(error: Exception) -> type[problems.Problem]:
-    """The type of problem that an exception is; what is not in the table is a defect."""
+    """The problem type of an exception. An exception that is not in the table is a defect of the service."""
     return next((TABLE[cls] for cls in type(error).__mro__ if cls in TABLE), problems.Internal)
 
 
-def problem_reply(error: Exception, instance: str) -> Reply:
-    """The answer to the request `instance` that failed with `error`."""
+def problem_content(error: Exception, instance: str) -> dict[str, Any]:
+    """The problem's fields: the request `instance` failed with `error`."""
     problem = problem_type(error)
     known = isinstance(error, (ServiceError, optimizer_errors.JoulepathError))
-    # an unforeseen exception's message is for the log, not for the caller
-    detail = str(error) if known else "This is a defect of the service: report it with the id in `instance`."
     content = {name: problem.model_fields[name].default for name in ("type", "title", "status")}
-    content |= {"detail": detail, "instance": instance}
-    content |= {name: _own_field(error, name) for name in problem.own_fields()}
-    headers = {} if problem.retry_after is None else {"Retry-After": str(problem.retry_after)}
-    return Reply(content["status"], orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), headers)
+    # an unforeseen exception's message is for the log, not for the client
+    content |= {"detail": str(error if known else TaskFailed()), "instance": instance}
+    return content | {name: _own_field(error, name) for name in problem.own_fields()}
+
+
+def invalid_request(errors: Sequence[Any], *where: str) -> InvalidRequest:
+    """The InvalidRequest for pydantic's errors; their locations start with `where`.
+
+    Locations keep only names that the contract knows, and pydantic's `input` is left out: both may repeat what the
+    client sent.
+    """
+    known = _field_names()
+    return InvalidRequest(
+        [
+            {
+                "loc": [*where, *(part for part in error["loc"] if isinstance(part, int) or part in known)],
+                "msg": error["msg"],
+            }
+            for error in errors[:MOST_ERRORS]
+        ]
+    )
+
+
+@cache
+def _field_names() -> set[str]:
+    def names(model: type[RequestModel]) -> set[str]:
+        return set(model.model_fields).union(*(names(child) for child in model.__subclasses__()))
+
+    return names(RequestModel) | {"body", "path", "query", "header", KEY_HEADER}
 
 
 def _own_field(error: Exception, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""The outermost layer: gives each request an id, logs it, and lets no exception out unanswered."""
+"""The outermost layer: gives each request an id, logs it, and answers every exception."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.exceptions import ClientDisconnected
-from app.http.handlers import respond
+from app.http.handlers import problem_response
 
 logger = logging.getLogger("app.request")
 
@@ -20,17 +20,17 @@ REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _PROBES = ("/healthz", "/readyz")
 _CLIENT_CLOSED_REQUEST = 499
-"""Status that is logged, never sent, for a request whose caller hung up: nginx's convention."""
+"""Status in the log, never sent, of a request whose client closed the connection: nginx's convention."""
 
 
 class RequestContext:
-    """ASGI middleware: the id goes to `request.state.id`, the answer's header and the log."""
+    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answers the request, whatever happens inside."""
+        """Answers the request, also if an exception comes from inside."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -56,11 +56,12 @@ class RequestContext:
         except Exception as error:
             logger.exception("unforeseen error", extra={"request_id": request_id})
             if status:
-                raise  # the server breaks the connection, so that half an answer is not taken for a whole one
-            await respond(Request(scope), error)(scope, receive, send_with_id)
+                raise  # the server closes the connection, so that the client sees that the response is incomplete
+            response = await problem_response(Request(scope), error)
+            await response(scope, receive, send_with_id)
         finally:
             logger.log(
-                # probes come every second or so and say nothing new
+                # probes come every second or so
                 logging.DEBUG if scope["path"] in _PROBES else logging.INFO,
                 "request",
                 extra=asked | {"status": status, "duration": round(time.perf_counter() - began, 6)},

@@ -6,28 +6,29 @@ from functools import partial
 from typing import Annotated
 
 import orjson
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Response
 
+from app.engine.result import TaskResult
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceStore
 from app.schemas import errors as problems
 from app.schemas.answers import KeptAnswer
 from app.store import answers
-from app.store.store import Store
 
 router = APIRouter(prefix="/answers", tags=["answers"])
 
 
 @router.get(
     "/{id}",
-    summary="An answer kept by reference",
+    summary="A stored answer",
     response_model=KeptAnswer,
     responses=problem_responses(problems.UnknownAnswer, problems.StoreUnavailable),
 )
 async def show(
-    request: Request, id: Annotated[str, Path(description="The answer's id.", examples=[KeptAnswer.EXAMPLE_ID])]
+    id: Annotated[str, Path(description="The answer's id.", examples=[KeptAnswer.EXAMPLE_ID])], store: ServiceStore
 ) -> Response:
-    """The whole answer that another answer refers to by its id."""
-    store: Store = request.app.state.store
+    """The complete answer that another answer refers to."""
     answer, body = await store.read(partial(answers.get, answer_id=id))
     content = {"id": answer.id, "kind": answer.kind, "created": answer.created, "answer": orjson.Fragment(body)}
-    return Response(orjson.dumps(content), media_type="application/json")
+    return result_response(TaskResult.of_json(content))

@@ -6,15 +6,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.parameters import allowed_deadline
-from app.schemas import errors as problems
+from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.parameters import deadline_of
+from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas.compare import CompareRequest, CompareResponse
 from app.schemas.examples import COMPARE_EXAMPLES
-from app.settings import Settings
 from app.tasks.compare import CompareTask
 
 router = APIRouter(tags=["motion"])
@@ -24,32 +23,16 @@ router = APIRouter(tags=["motion"])
     "/compare",
     summary="The same motion by several methods",
     response_model=CompareResponse,
-    responses=problem_responses(
-        problems.Validation,
-        problems.UnreachablePose,
-        problems.SingularPose,
-        problems.UnreachableTargets,
-        problems.OutsideLimits,
-        problems.StartInCollision,
-        problems.GoalInCollision,
-        problems.DurationTooShort,
-        problems.TorqueInfeasible,
-        problems.NoTrajectory,
-        problems.NoCollisionFreeTrajectory,
-        problems.UnknownRobot,
-        problems.BodyTooLarge,
-        problems.Busy,
-        problems.ShuttingDown,
-        problems.DeadlineExceeded,
-    ),
+    responses=problem_responses(*MOTION_PROBLEMS),
 )
 async def compare(
-    request: Request, body: Annotated[CompareRequest, Body(openapi_examples=COMPARE_EXAMPLES)]
+    request: Request,
+    body: Annotated[CompareRequest, Body(openapi_examples=COMPARE_EXAMPLES)],
+    settings: ServiceSettings,
+    engine: ServiceEngine,
 ) -> Response:
-    """Solves one request by several methods, one after another, and answers a table of their energies, durations and
-    solve times, each motion certified. A method that finds nothing has its problem in its row; where none finds a
-    motion, the answer is the problem of the first one asked for."""
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
-    work = engine.run(CompareTask(body, request.state.id), allowed_deadline(body, settings.max_deadline))
-    return to_http(await unless_disconnected(request, work))
+    """Solves one request with several methods, one after another. The answer is a table of their energies, durations
+    and solve times; each motion is certified. A method that finds no motion has its problem in its row. If no method
+    finds a motion, the answer is the problem of the first method in the request."""
+    work = engine.run(CompareTask(body, request.state.id), deadline_of(body, settings.max_deadline))
+    return result_response(await unless_disconnected(request, work))

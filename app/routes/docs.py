@@ -1,4 +1,4 @@
-"""GET /docs and GET /redoc, which need no internet: their scripts come from a package."""
+"""GET /docs and GET /redoc. They work without internet: their scripts come from a package."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _ASSETS = {
     "swagger-ui.css": "text/css",
     "redoc.standalone.js": "text/javascript",
 }
-# the one picture that Redoc would fetch from its maker
+# a picture that Redoc would fetch from the internet
 _REDOC_LOGO = b"https://cdn.redoc.ly/redoc/logo-mini.svg"
 _NO_PICTURE = "data:,"
-# whatever a later version of the scripts would like to fetch from elsewhere, the browser will refuse
+# the browser blocks anything else that a later version of the scripts would fetch from elsewhere
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self'; script-src 'self' 'unsafe-inline'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data:; worker-src 'self' blob:"
@@ -38,7 +38,7 @@ async def swagger(request: Request) -> HTMLResponse:
         swagger_js_url=f"{root}/docs/swagger-ui-bundle.js",
         swagger_css_url=f"{root}/docs/swagger-ui.css",
         swagger_favicon_url=_NO_PICTURE,
-        # without this it asks validator.swagger.io for a badge
+        # without this it fetches a badge from validator.swagger.io
         swagger_ui_parameters={"validatorUrl": None},
     )
     page.headers.update(_HEADERS)

@@ -7,15 +7,16 @@ from typing import Any, Literal
 
 from fastapi import APIRouter, Request, Response
 
-from app.engine.pool import Engine
 from app.exceptions import UnsupportedMediaType
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.parameters import WantedFormat
+from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
 from app.schemas.evaluate_examples import CSV_EXAMPLES, CSV_TABLE, EVALUATE_EXAMPLES
-from app.settings import Settings
 from app.tasks.evaluate import EvaluateTask
 
 router = APIRouter(tags=["motion"])
@@ -25,7 +26,7 @@ _REF = "#/components/schemas/{model}"
 
 
 def _openapi() -> dict[str, Any]:
-    """What FastAPI cannot know, since the body goes to a file unread: the bodies and a CSV's settings."""
+    """The bodies, and the settings of a CSV. FastAPI does not know them, because the body goes to a file unread."""
     schema = EvaluateCsvSettings.model_json_schema(ref_template=_REF)
     parameters = [
         {
@@ -58,32 +59,22 @@ def _openapi() -> dict[str, Any]:
     response_model=EvaluateResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": CSV_TABLE}}},
-        **problem_responses(
-            problems.Validation,
-            problems.InvalidTable,
-            problems.UnknownRobot,
-            problems.BodyTooLarge,
-            problems.UnsupportedMediaType,
-            problems.Busy,
-            problems.ShuttingDown,
-            problems.DeadlineExceeded,
-        ),
+        **problem_responses(*WORKER_PROBLEMS, problems.InvalidTable, problems.UnsupportedMediaType),
     },
     openapi_extra=_openapi(),
 )
-async def evaluate(request: Request) -> Response:
-    """What a given motion costs, segment by segment and in total, and which limits it holds or breaks, and where. The
-    motion is a list of configurations with times between them, or a log; as JSON, or as CSV with the settings as query
-    parameters. `Accept: text/csv` gives the table of energies as CSV."""
+async def evaluate(
+    request: Request, wanted: WantedFormat, settings: ServiceSettings, engine: ServiceEngine
+) -> Response:
+    """The energy of a given motion, per segment and in total, and the limits that it violates. The motion is a list of
+    configurations with the times between them, or a log. It is sent as JSON, or as CSV with the settings as query
+    parameters. `Accept: text/csv` returns the table of energies as CSV."""
     kind = _KINDS.get(request.headers.get("content-type", "").partition(";")[0].strip().lower())
     if kind is None:
         raise UnsupportedMediaType
-    wanted: Literal["json", "csv"] = "csv" if "text/csv" in request.headers.get("accept", "").lower() else "json"
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
     with NamedTemporaryFile(prefix="joulepath-", suffix=f".{kind}") as file:
         async for chunk in request.stream():
             file.write(chunk)
         file.flush()
         task = EvaluateTask(file.name, kind, dict(request.query_params), wanted, request.state.id)
-        return to_http(await unless_disconnected(request, engine.run(task, settings.max_deadline)))
+        return result_response(await unless_disconnected(request, engine.run(task, settings.max_deadline)))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter
 
-from app.engine.pool import Engine
 from app.exceptions import NotReady
 from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceEngine
 from app.schemas import errors as problems
 from app.schemas.health import Alive, Ready
 
@@ -15,7 +15,7 @@ router = APIRouter(tags=["health"])
 
 @router.get("/healthz", summary="Is the process alive?", response_model=Alive, responses=problem_responses())
 async def healthz() -> Alive:
-    """Answers at once, whatever the workers are at."""
+    """Answers at once, also while the workers are busy."""
     return Alive(status="alive")
 
 
@@ -25,9 +25,8 @@ async def healthz() -> Alive:
     response_model=Ready,
     responses=problem_responses(problems.NotReady),
 )
-async def readyz(request: Request) -> Ready:
-    """200 once every worker has warmed up, and until the service stops."""
-    engine: Engine = request.app.state.engine
+async def readyz(engine: ServiceEngine) -> Ready:
+    """200 from the time when all workers are warm until the service stops."""
     if not engine.ready:
         raise NotReady
     return Ready(status="ready", workers=engine.warm_workers)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import orjson
 from fastapi import APIRouter, Request, Response
 
 from app.convert.arm import robot_named
 from app.convert.ik import to_arm, to_ik_response
 from app.convert.pose import to_matrix
+from app.engine.result import TaskResult
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.schemas import errors as problems
 from app.schemas.ik import IKRequest, IKResponse
@@ -31,10 +32,9 @@ router = APIRouter(tags=["motion"])
 )
 def solve(request: Request, body: IKRequest) -> Response:
     """Every solution within the joint range, with its branch, its distance to the limits and its smallest singular
-    value, and what the arm hits there, or is nearest to: itself, or what surrounds it."""
+    value. Also the nearest or colliding pair of bodies in each: links, tool, payload and obstacles."""
     robot = robot_named(body.robot)
     kinematics = required_inverse_kinematics(robot, "pose")
     solutions = kinematics.solve(to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal")
     contacts = collision_model(to_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
-    content = to_ik_response(body, request.state.id, solutions, contacts)
-    return Response(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), media_type="application/json")
+    return result_response(TaskResult.of_json(to_ik_response(body, request.state.id, solutions, contacts)))

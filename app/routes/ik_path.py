@@ -6,13 +6,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathRequest, IKPathResponse
-from app.settings import Settings
 from app.tasks.ik_path import IKPathTask
 
 router = APIRouter(tags=["motion"])
@@ -22,21 +22,16 @@ router = APIRouter(tags=["motion"])
     "/ik/path",
     summary="Configurations along a path of the TCP",
     response_model=IKPathResponse,
-    responses=problem_responses(
-        problems.Validation,
-        problems.OutsideLimits,
-        problems.UnknownRobot,
-        problems.BodyTooLarge,
-        problems.Busy,
-        problems.ShuttingDown,
-        problems.DeadlineExceeded,
-    ),
+    responses=problem_responses(*WORKER_PROBLEMS, problems.OutsideLimits),
 )
-async def follow(request: Request, body: Annotated[IKPathRequest, Body(openapi_examples=IK_PATH_EXAMPLES)]) -> Response:
+async def follow(
+    request: Request,
+    body: Annotated[IKPathRequest, Body(openapi_examples=IK_PATH_EXAMPLES)],
+    settings: ServiceSettings,
+    engine: ServiceEngine,
+) -> Response:
     """Follows positions or poses of the TCP from a guess, each from the configuration before (Levenberg-Marquardt).
-    What is out of reach, nearly singular or beyond a joint's range is listed and left out of `trajectory`, which
-    `POST /evaluate` takes as it is."""
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
+    Points that are out of reach, nearly singular or beyond the range of a joint are listed, but left out of
+    `trajectory`. `POST /evaluate` takes `trajectory` unchanged."""
     work = engine.run(IKPathTask(body, request.state.id), settings.max_deadline)
-    return to_http(await unless_disconnected(request, work))
+    return result_response(await unless_disconnected(request, work))

@@ -6,16 +6,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.parameters import allowed_deadline
-from app.schemas import errors as problems
+from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.parameters import deadline_of
+from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas.examples import OPTIMIZE_EXAMPLES
 from app.schemas.request import OptimizeRequest
 from app.schemas.response import OptimizeResponse
-from app.settings import Settings
 from app.tasks.optimize import OptimizeTask
 
 router = APIRouter(tags=["motion"])
@@ -25,32 +24,15 @@ router = APIRouter(tags=["motion"])
     "/optimize",
     summary="The motion of least energy",
     response_model=OptimizeResponse,
-    responses=problem_responses(
-        problems.Validation,
-        problems.UnreachablePose,
-        problems.SingularPose,
-        problems.UnreachableTargets,
-        problems.OutsideLimits,
-        problems.StartInCollision,
-        problems.GoalInCollision,
-        problems.DurationTooShort,
-        problems.TorqueInfeasible,
-        problems.NoTrajectory,
-        problems.NoCollisionFreeTrajectory,
-        problems.UnknownRobot,
-        problems.BodyTooLarge,
-        problems.Busy,
-        problems.ShuttingDown,
-        problems.DeadlineExceeded,
-    ),
+    responses=problem_responses(*MOTION_PROBLEMS),
 )
 async def optimize(
-    request: Request, body: Annotated[OptimizeRequest, Body(openapi_examples=OPTIMIZE_EXAMPLES)]
+    request: Request,
+    body: Annotated[OptimizeRequest, Body(openapi_examples=OPTIMIZE_EXAMPLES)],
+    settings: ServiceSettings,
+    engine: ServiceEngine,
 ) -> Response:
-    """Finds the motion of least energy from rest at `start` to rest at `goal`, over every arm configuration, and
-    returns it with its energy breakdown and a certificate that it holds every limit."""
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
-    task = OptimizeTask(body, request.state.id)
-    work = engine.run(task, allowed_deadline(body, settings.max_deadline))
-    return to_http(await unless_disconnected(request, work))
+    """Finds the motion of least energy from standstill at `start` to standstill at `goal`, over all arm configurations.
+    The answer has its energy breakdown, and a certificate that the motion is within all limits."""
+    work = engine.run(OptimizeTask(body, request.state.id), deadline_of(body, settings.max_deadline))
+    return result_response(await unless_disconnected(request, work))

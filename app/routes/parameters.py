@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from fastapi import Header, Path, Request, Response
+from fastapi import Depends, Header, Path, Request, Response
 
 from app.schemas.common import KEY_HEADER
 from app.schemas.request import MotionRequest
@@ -13,35 +13,50 @@ from app.schemas.whatif import WhatifRequest
 from optimizer.exceptions import InvalidProblem
 
 
-def allowed_deadline(body: MotionRequest | WhatifRequest, most: float) -> float:
-    """The request's deadline [s]. Raises InvalidProblem when the caller asks for too much."""
-    if "deadline" not in body.model_fields_set:
-        return min(body.deadline, most)
-    if body.deadline > most:
-        raise InvalidProblem("deadline", f"deadline must be at most {most:g} s.")
-    return body.deadline
+def deadline_of(body: MotionRequest | WhatifRequest, longest: float) -> float:
+    """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises InvalidProblem."""
+    given = body.deadline if "deadline" in body.model_fields_set else None
+    return allowed_deadline(given, body.deadline, longest)
 
 
+def allowed_deadline(given: float | None, default: float, longest: float) -> float:
+    """`given` [s], or if it is None, the default, but at most `longest`. Raises InvalidProblem above it."""
+    if given is None:
+        return min(default, longest)
+    if given > longest:
+        raise InvalidProblem("deadline", f"deadline must be at most {longest:g} s.")
+    return given
+
+
+async def _wanted_format(request: Request) -> Literal["json", "csv"]:
+    return "csv" if "text/csv" in request.headers.get("accept", "").lower() else "json"
+
+
+WantedFormat = Annotated[Literal["json", "csv"], Depends(_wanted_format)]
+"""Format of the answer, by the header `Accept`."""
 StudyId = Annotated[str, Path(description="The study's id.", examples=[StudySummary.EXAMPLE_ID])]
 Key = Annotated[
     IdempotencyKey | None,
     Header(
         alias=KEY_HEADER,
-        description="Any text that names this request and no other: sent again under the same key, after a lost "
-        "connection for one, it is answered from what it made the first time.",
+        description="A text of your own that identifies this request. If you send the same request again with the same "
+        "key, for example after a lost connection, nothing new is created.",
         examples=["2f6f3d0c-try-1"],
     ),
 ]
 REPLAYED = "Idempotency-Replayed"
-"""Header of an answer to a request that was sent before."""
+"""Header of a response to a request that was sent before."""
 CREATED_HEADERS = {
-    "Location": {"description": "Path of what was made.", "schema": {"type": "string"}},
-    REPLAYED: {"description": "`true` if it was made before, under the same key.", "schema": {"type": "string"}},
+    "Location": {"description": "Path of the created resource.", "schema": {"type": "string"}},
+    REPLAYED: {
+        "description": "`true` if an earlier request with the same key created it.",
+        "schema": {"type": "string"},
+    },
 }
 
 
 def set_location(request: Request, response: Response, path: str, again: bool) -> None:
-    """Headers of an answer that says what was made, now or under the same key before."""
+    """Sets the headers of a response about a created resource; `again`: an earlier request with this key created it."""
     response.headers["Location"] = f"{request.scope.get('root_path', '')}/studies/{path}"
     if again:
         response.headers[REPLAYED] = "true"

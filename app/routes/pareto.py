@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.parameters import allowed_deadline
+from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.parameters import WantedFormat, deadline_of
+from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.pareto import PARETO_EXAMPLES, ParetoRequest, ParetoResponse
-from app.settings import Settings
-from app.store.keep import keep
+from app.store.store_answers import store_answers
 from app.tasks.pareto import ParetoTask
 
 router = APIRouter(tags=["motion"])
@@ -26,34 +26,19 @@ router = APIRouter(tags=["motion"])
     response_model=ParetoResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}}},
-        **problem_responses(
-            problems.Validation,
-            problems.UnreachablePose,
-            problems.SingularPose,
-            problems.UnreachableTargets,
-            problems.OutsideLimits,
-            problems.StartInCollision,
-            problems.GoalInCollision,
-            problems.DurationTooShort,
-            problems.TorqueInfeasible,
-            problems.NoTrajectory,
-            problems.NoCollisionFreeTrajectory,
-            problems.UnknownRobot,
-            problems.BodyTooLarge,
-            problems.Busy,
-            problems.ShuttingDown,
-            problems.StoreUnavailable,
-            problems.DeadlineExceeded,
-        ),
+        **problem_responses(*MOTION_PROBLEMS, problems.StoreUnavailable),
     },
 )
-async def pareto(request: Request, body: Annotated[ParetoRequest, Body(openapi_examples=PARETO_EXAMPLES)]) -> Response:
-    """Finds the motions of which none beats another in both duration and energy, from the fastest to the one of least
-    energy, over every arm configuration. Each point refers to its whole answer, certificate included.
-    `Accept: text/csv` gives the points as CSV."""
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
-    wanted: Literal["json", "csv"] = "csv" if "text/csv" in request.headers.get("accept", "").lower() else "json"
+async def pareto(
+    request: Request,
+    body: Annotated[ParetoRequest, Body(openapi_examples=PARETO_EXAMPLES)],
+    wanted: WantedFormat,
+    settings: ServiceSettings,
+    engine: ServiceEngine,
+    store: ServiceStore,
+) -> Response:
+    """Finds the Pareto front of duration and energy over all arm configurations, from the fastest motion to the motion
+    of least energy. Each point refers to its complete answer. `Accept: text/csv` returns the points as CSV."""
     task = ParetoTask(body, request.state.id, wanted)
-    reply = await unless_disconnected(request, engine.run(task, allowed_deadline(body, settings.max_deadline)))
-    return to_http(await keep(request.app.state.store, settings, "optimize", reply))
+    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
+    return result_response(await store_answers(store, settings, "optimize", result))

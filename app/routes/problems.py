@@ -1,4 +1,4 @@
-"""GET /problems/{type}: what a problem's `type` points to."""
+"""GET /problems/{type}: the page that the `type` of a problem points to."""
 
 from __future__ import annotations
 
@@ -50,5 +50,5 @@ def _page(problem: type[Problem]) -> str:
 
 
 def _text(markdown: str) -> str:
-    """Escaped, with what stands between backquotes as code."""
+    """Escaped HTML; text between backquotes becomes code."""
     return re.sub("`(.+?)`", r"<code>\1</code>", escape(markdown))

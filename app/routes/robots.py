@@ -19,28 +19,28 @@ router = APIRouter(prefix="/robots", tags=["robots"])
 TRUST = {
     "A": "maker's own file or data packet",
     "B": "fitted to measured data",
-    "C": "figure from a paper, seen second-hand",
+    "C": "value from a paper, quoted second-hand",
     "T": "transferred from a sister robot",
     "E": "engineering default, no source",
 }
 _SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion")
 
 
-@router.get("", summary="Every robot", response_model=RobotList, responses=problem_responses())
+@router.get("", summary="All robots", response_model=RobotList, responses=problem_responses())
 def list_robots() -> RobotList:
-    """The robots that requests can name."""
+    """Names, titles and joints of all robots."""
     return RobotList(robots=[RobotSummary(**_summary(load_robot(name))) for name in robot_names()])
 
 
 @router.get(
     "/{name}",
-    summary="All that is known of a robot",
+    summary="All parameters of a robot",
     response_model=RobotDetail,
     responses=problem_responses(problems.UnknownRobot),
 )
 def show_robot(name: str) -> RobotDetail:
-    """Kinematics, inertials, limits, drives and electronics, each figure with its source and how far to trust it, and
-    the friction laws with their coefficients."""
+    """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
+    friction laws with their coefficients."""
     return _detail(robot_named(name).name)
 
 

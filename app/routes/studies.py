@@ -10,12 +10,12 @@ from sqlalchemy.exc import IntegrityError
 
 from app.convert.arm import robot_named
 from app.http.openapi import problem_responses
-from app.routes.parameters import CREATED_HEADERS, Key, StudyId, set_location
+from app.routes.dependencies import ServiceStore
+from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from app.schemas import errors as problems
 from app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from app.schemas.study_examples import STUDY_CSV, STUDY_EXAMPLES
 from app.store import studies
-from app.store.store import Store
 from app.studies.answers import as_csv, full, summary
 
 router = APIRouter(prefix="/studies", tags=["studies"])
@@ -41,15 +41,15 @@ async def create(
     request: Request,
     response: Response,
     body: Annotated[StudyRequest, Body(openapi_examples=STUDY_EXAMPLES)],
+    store: ServiceStore,
     key: Key = None,
 ) -> StudySummary:
-    """Begins a study: a motion to be improved step by step until its energy is at most `threshold`."""
+    """Begins a study: a motion that is improved step by step until its energy is at most `threshold`."""
     robot_named(body.robot)
-    store: Store = request.app.state.store
     study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key)
     try:
         made, again = await store.write(partial(studies.create, study=study))
-    except IntegrityError:  # the same request, elsewhere at the same time, was first
+    except IntegrityError:  # another process has just created the study of this key
         made, again = await store.write(partial(studies.create, study=study))
     set_location(request, response, made.id, again)
     return StudySummary(**summary(await store.read(partial(studies.history, study_id=made.id))))
@@ -61,9 +61,8 @@ async def create(
     response_model=StudyList,
     responses=problem_responses(problems.Validation, problems.StoreUnavailable),
 )
-async def list_studies(request: Request, page: Annotated[StudyPage, Query()]) -> StudyList:
-    """Studies and how far each has come, newest first, page by page."""
-    store: Store = request.app.state.store
+async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore) -> StudyList:
+    """All studies with their state, newest first, page by page."""
     found, following = await store.read(partial(studies.page, limit=page.limit, after=page.after))
     return StudyList(studies=[StudySummary(**summary(history)) for history in found], next=following)
 
@@ -77,12 +76,11 @@ async def list_studies(request: Request, page: Annotated[StudyPage, Query()]) ->
         **problem_responses(problems.UnknownStudy, problems.StoreUnavailable),
     },
 )
-async def show(request: Request, id: StudyId) -> Response:
-    """Its iterations, each against the one before and the best, and whether the threshold is met. `Accept: text/csv`
-    gives the history as a table."""
-    store: Store = request.app.state.store
+async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Response:
+    """The study with its iterations: energy, change from the previous and from the best iteration, and whether the
+    threshold is met. `Accept: text/csv` returns the history as a table."""
     history = await store.read(partial(studies.history, study_id=id))
-    if "text/csv" in request.headers.get("accept", "").lower():
+    if wanted == "csv":
         return Response(as_csv(history), media_type="text/csv")
     return Response(Study(**full(history)).model_dump_json(), media_type="application/json")
 
@@ -93,7 +91,6 @@ async def show(request: Request, id: StudyId) -> Response:
     status_code=204,
     responses=problem_responses(problems.UnknownStudy, problems.StoreUnavailable),
 )
-async def delete(request: Request, id: StudyId) -> None:
-    """Deletes it with its iterations and their answers."""
-    store: Store = request.app.state.store
+async def delete(id: StudyId, store: ServiceStore) -> None:
+    """Deletes the study with its iterations and their answers."""
     await store.write(partial(studies.delete, study_id=id))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any
 
@@ -10,24 +11,23 @@ import orjson
 from fastapi import APIRouter, Query, Request, Response
 
 from app.engine.pool import Engine
-from app.engine.reply import Reply
-from app.exceptions import Busy, EmptyStudy, WorkerDied
+from app.engine.result import TaskResult
+from app.exceptions import Busy, EmptyStudy, TaskFailed, WorkerDied
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.http.problem_details import problem_type
-from app.routes.parameters import StudyId
+from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.parameters import StudyId, allowed_deadline
 from app.schemas import errors as problems
-from app.schemas.errors import PREFIX
 from app.schemas.request import OptimizeRequest
 from app.schemas.suggestions import Suggestions, SuggestQuery
-from app.settings import Settings
 from app.store import answers, studies
 from app.store.store import Store
 from app.studies.progress import best_of
 from app.studies.suggestions import Proposal, base_of, proposals
 from app.tasks.optimize import OptimizeTask
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -36,7 +36,7 @@ Outcome = dict[str, Any]
 
 @router.get(
     "/{id}/suggest",
-    summary="What to try next",
+    summary="Suggestions for the next iteration",
     response_model=Suggestions,
     responses=problem_responses(
         problems.Validation,
@@ -46,72 +46,85 @@ Outcome = dict[str, Any]
         problems.StoreUnavailable,
     ),
 )
-async def suggest(request: Request, id: StudyId, query: Annotated[SuggestQuery, Query()]) -> Response:
-    """Steps that differ from the best iteration (or the last) in one thing each: the optimiser computes every one of
-    them, and they come ranked by what they save, each with the body for the next `POST /studies/{id}/iterations`."""
-    settings: Settings = request.app.state.settings
-    if query.deadline is not None and query.deadline > settings.max_deadline:
-        raise InvalidProblem("deadline", f"deadline must be at most {settings.max_deadline:g} s.")
-    deadline = min(SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline) if query.deadline is None else query.deadline
-    return to_http(await unless_disconnected(request, _suggest(request, id, query.base, deadline)))
-
-
-async def _suggest(request: Request, id: str, which: str, deadline: float) -> Reply:
+async def suggest(
+    request: Request,
+    id: StudyId,
+    query: Annotated[SuggestQuery, Query()],
+    settings: ServiceSettings,
+    engine: ServiceEngine,
+    store: ServiceStore,
+) -> Response:
+    """Suggestions for the next iteration: each differs from the best iteration (or the last) in one respect. The
+    optimiser computes every suggestion. They are in order of the energy that they save, each with its body for
+    `POST /studies/{id}/iterations`."""
+    deadline = allowed_deadline(query.deadline, SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline)
     end = asyncio.get_running_loop().time() + deadline
-    store: Store = request.app.state.store
-    history = await store.read(partial(studies.history, study_id=id))
+    # if there are several workers, one stays free for other clients
+    computing = _Computing(engine, asyncio.Semaphore(max(1, settings.workers - 1)), request.state.id, end)
+    content = await unless_disconnected(request, _suggestions(store, id, query.base, computing))
+    return result_response(TaskResult.of_json(content))
+
+
+async def _suggestions(store: Store, study_id: str, which: str, computing: _Computing) -> dict[str, Any]:
+    history = await store.read(partial(studies.history, study_id=study_id))
     energies, study = history.energies, history.study
     index = best_of(energies) if which == "best" else len(energies) - 1 if energies else None
     if index is None:
         raise EmptyStudy
     iteration = history.iterations[index]
-    asked = (await store.read(partial(studies.up_to, study_id=id, number=iteration.number))).iterations[-1].request
+    up_to_base = await store.read(partial(studies.up_to, study_id=study_id, number=iteration.number))
     _, body = await store.read(partial(answers.get, answer_id=iteration.answer_id))
-    base = base_of(iteration.kind, asked, orjson.loads(body), study.objective)
+    base = base_of(iteration.kind, up_to_base.iterations[-1].request, orjson.loads(body), study.objective)
     found = [] if base is None else proposals(base)
-    outcomes = await _computed(request, found, study.objective, end)
+    outcomes = await computing.outcomes(found, study.objective)
     computed = []
     for outcome in outcomes:
         if "energy" in outcome:
             energy = outcome["energy"]
             computed.append(outcome | {"gain": energies[index] - energy, "threshold_met": energy <= study.threshold})
-    content = {
+    return {
         "study": study.id,
         "base": {"number": iteration.number, "energy": energies[index]},
         "suggestions": sorted(computed, key=lambda entry: entry["gain"], reverse=True),
         "not_computed": [outcome for outcome in outcomes if "problem" in outcome],
     }
-    return Reply(200, orjson.dumps(content))
 
 
-async def _computed(request: Request, found: list[Proposal], objective: str, end: float) -> list[Outcome]:
-    """What becomes of each proposal by the time `end` of the loop's clock."""
-    engine: Engine = request.app.state.engine
-    settings: Settings = request.app.state.settings
-    # a worker stays free for whoever asks meanwhile, where there is more than one
-    turn = asyncio.Semaphore(max(1, settings.workers - 1))
+@dataclass(frozen=True)
+class _Computing:
+    """Computes proposals until `end` [s] of the event loop's clock; `turn` limits how many run at the same time."""
 
-    async def compute(proposal: Proposal) -> Outcome:
-        asked = OptimizeRequest.model_validate(proposal.request)
-        told: Outcome = {
+    engine: Engine
+    turn: asyncio.Semaphore
+    request_id: str
+    end: float
+
+    async def outcomes(self, found: list[Proposal], objective: str) -> list[Outcome]:
+        """The outcome of each proposal. Raises ShuttingDown."""
+        try:
+            async with asyncio.TaskGroup() as group:
+                running = [group.create_task(self._outcome(proposal, objective)) for proposal in found]
+        except ExceptionGroup as errors:
+            # the first cancelled the other proposals
+            raise errors.exceptions[0] from None
+        return [task.result() for task in running]
+
+    async def _outcome(self, proposal: Proposal, objective: str) -> Outcome:
+        """The proposal with its energy, or with the type of its problem."""
+        outcome: Outcome = {
             "step": proposal.step,
             "summary": proposal.summary,
             "request": {"optimize": proposal.request},
         }
-        async with turn:
-            left = min(end - asyncio.get_running_loop().time(), asked.deadline)
+        asked = OptimizeRequest.model_validate(proposal.request)
+        async with self.turn:
+            left = min(self.end - asyncio.get_running_loop().time(), asked.deadline)
             try:
                 if left <= 0:
                     raise DeadlineExceeded([])
-                reply = await engine.run(OptimizeTask(asked, request.state.id), left)
-            except (Busy, DeadlineExceeded, WorkerDied) as error:
-                return told | {"problem": problem_type(error).slug()}
-        answer = orjson.loads(reply.body)
-        if reply.status != 200:
-            return told | {"problem": answer["type"].removeprefix(PREFIX)}
+                result = await self.engine.run(OptimizeTask(asked, self.request_id), left)
+            except (JoulepathError, Busy, WorkerDied, TaskFailed) as error:
+                return outcome | {"problem": problem_type(error).slug()}
+        answer = orjson.loads(result.document)
         energy = answer["energy"][objective]["total"]
-        return told | {"energy": energy, "duration": answer["duration"], "status": answer["status"]}
-
-    async with asyncio.TaskGroup() as group:
-        running = [group.create_task(compute(proposal)) for proposal in found]
-    return [task.result() for task in running]
+        return outcome | {"energy": energy, "duration": answer["duration"], "status": answer["status"]}

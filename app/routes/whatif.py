@@ -6,16 +6,16 @@ from typing import Annotated
 
 from fastapi import APIRouter, Body, Request, Response
 
-from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
-from app.http.handlers import to_http
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.parameters import allowed_deadline
+from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.parameters import deadline_of
+from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.whatif import WhatifRequest, WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
-from app.settings import Settings
-from app.store.keep import keep
+from app.store.store_answers import store_answers
 from app.tasks.whatif import WhatifTask
 
 router = APIRouter(tags=["motion"])
@@ -23,36 +23,21 @@ router = APIRouter(tags=["motion"])
 
 @router.post(
     "/whatif",
-    summary="What a motion would cost on a changed arm",
+    summary="The energy of a motion on a changed arm",
     response_model=WhatifResponse,
-    responses=problem_responses(
-        problems.Validation,
-        problems.InvalidTable,
-        problems.UnreachablePose,
-        problems.SingularPose,
-        problems.UnreachableTargets,
-        problems.OutsideLimits,
-        problems.StartInCollision,
-        problems.GoalInCollision,
-        problems.DurationTooShort,
-        problems.TorqueInfeasible,
-        problems.NoTrajectory,
-        problems.NoCollisionFreeTrajectory,
-        problems.UnknownRobot,
-        problems.BodyTooLarge,
-        problems.Busy,
-        problems.ShuttingDown,
-        problems.StoreUnavailable,
-        problems.DeadlineExceeded,
-    ),
+    responses=problem_responses(*MOTION_PROBLEMS, problems.InvalidTable, problems.StoreUnavailable),
 )
-async def whatif(request: Request, body: Annotated[WhatifRequest, Body(openapi_examples=WHATIF_EXAMPLES)]) -> Response:
-    """Asks one motion of an arm as it is and of changed ones: lighter links, another payload, other drives or limits.
-    Each change is answered twice, as a difference from the base, part by part: for the base's own motion on the changed
-    arm, and for the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""
-    settings: Settings = request.app.state.settings
-    engine: Engine = request.app.state.engine
+async def whatif(
+    request: Request,
+    body: Annotated[WhatifRequest, Body(openapi_examples=WHATIF_EXAMPLES)],
+    settings: ServiceSettings,
+    engine: ServiceEngine,
+    store: ServiceStore,
+) -> Response:
+    """Compares one motion on the arm as it is with the same task on changed arms: lighter links, another payload, other
+    drives or limits. Each change has two results, as differences from the base: the base's motion on the changed arm,
+    and the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""
     task = WhatifTask(body, request.state.id)
-    reply = await unless_disconnected(request, engine.run(task, allowed_deadline(body, settings.max_deadline)))
+    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
     kind = "evaluate" if body.optimize is None else "optimize"
-    return to_http(await keep(request.app.state.store, settings, kind, reply))
+    return result_response(await store_answers(store, settings, kind, result))

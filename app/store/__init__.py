@@ -1,1 +1,1 @@
-"""What the service remembers: studies, their iterations, and answers kept by reference, in an SQL database."""
+"""The SQL database: studies, their iterations, and stored answers."""

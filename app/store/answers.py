@@ -1,4 +1,4 @@
-"""Whole answers, kept by reference. Each function works on a session: `await store.write(partial(put, …))`."""
+"""Stored answers. Each function works on a session: `await store.write(partial(put, …))`."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from app.store.tables import Answer, is_id, new_id, now
 
 
 def put(session: Session, kind: str, body: bytes, study_id: str | None = None) -> str:
-    """Keeps an answer, the JSON that the endpoint called `kind` gave, and returns its id.
+    """Stores an answer, the JSON document of the endpoint `kind`, and returns its id.
 
-    That of a study is kept as long as the study is; any other until `prune` drops it.
+    The answer of a study stays until the study is deleted; any other until `prune` deletes it.
     """
     compressed = zlib.compress(body)
     answer_id = new_id()
@@ -26,7 +26,7 @@ def put(session: Session, kind: str, body: bytes, study_id: str | None = None) -
 
 
 def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
-    """A kept answer, and its JSON. Raises UnknownAnswer."""
+    """A stored answer and its JSON document. Raises UnknownAnswer."""
     answer = session.get(Answer, answer_id) if is_id(answer_id) else None
     if answer is None:
         raise UnknownAnswer
@@ -34,7 +34,7 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
 
 
 def prune(session: Session, max_bytes: int, max_age: timedelta) -> None:
-    """Drops the answers of no study that are older than `max_age`, then the oldest until the rest fit `max_bytes`."""
+    """Deletes answers of no study: those older than `max_age`, then the oldest until the rest fit `max_bytes`."""
     session.flush()
     free = Answer.study_id.is_(None)
     session.execute(delete(Answer).where(free, Answer.created < now() - max_age))

@@ -15,24 +15,24 @@ logger = logging.getLogger(__name__)
 
 _MIGRATIONS = Path(__file__).parent / "migrations"
 _LOCK_TIMEOUT = 10.0
-"""How long a statement waits for another process's transaction, and a connection for its server [s]."""
+"""Longest wait [s] of a statement for another process's transaction, and of a connection for its server."""
 _MIGRATION_LOCK = 0x6A6F756C65
-"""Any number that no other user of a PostgreSQL database takes for its advisory lock."""
+"""Key of the advisory lock in PostgreSQL: any number that no other program uses in this database."""
 
 
 def create_database_engine(url: str) -> Engine:
     """SQLAlchemy's engine for `sqlite:///file` or `postgresql://user:password@host/name`. It does not connect yet.
 
-    Raises ArgumentError for what is no such URL.
+    Raises ArgumentError for any other text.
     """
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":
         return _sqlite(parsed)
-    # pg8000 has a licence that lets anyone ship it, and needs no C library
+    # pg8000: its licence permits redistribution, and it needs no C library
     return create_engine(
         parsed.set(drivername="postgresql+pg8000"),
         connect_args={"timeout": _LOCK_TIMEOUT},
-        # a server that was restarted has dropped the pool's connections
+        # after a restart of the server, the connections of the pool are closed
         pool_pre_ping=True,
         pool_timeout=_LOCK_TIMEOUT,
     )
@@ -43,14 +43,14 @@ def _sqlite(url: URL) -> Engine:
 
     @event.listens_for(engine, "connect")
     def configure(connection: sqlite3.Connection, _: Any) -> None:
-        connection.isolation_level = None  # `begin` below says when a transaction starts, also around DDL
-        # FULL: what has been committed survives a killed process and a power cut alike
+        connection.isolation_level = None  # `begin` below starts each transaction, also around DDL
+        # FULL: a committed transaction survives a killed process and a power failure
         for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
             connection.execute(f"PRAGMA {pragma}")
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        # one that reads first and writes later would be refused, not made to wait, if another wrote in between
+        # without IMMEDIATE, a transaction that reads and then writes fails if another one writes in between
         writes = connection.get_execution_options().get("writes", False)
         connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
@@ -58,9 +58,9 @@ def _sqlite(url: URL) -> Engine:
 
 
 def migrate(engine: Engine) -> None:
-    """Brings the tables up to date. Safe when several processes do it at once: one works, the others wait.
+    """Migrates the tables to this version. Several processes may call it at the same time: one works, the others wait.
 
-    Raises CommandError when the database was made by a later version of the service.
+    Raises CommandError if a later version of the service created the database.
     """
     if engine.url.get_backend_name() == "sqlite" and engine.url.database:
         Path(engine.url.database).parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The store as routes use it: work on a session, done in a thread, its failures told as one error."""
+"""The database as routes use it: work on a session, in a thread, with one error for all failures."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _THREADS = 4
-"""A statement takes milliseconds: a few at a time are plenty, and never more than the pool has connections."""
+"""A statement takes milliseconds, so a few threads suffice; the connection pool has more connections than this."""
 _UNAVAILABLE = (DBAPIError, PoolTimeout, OSError, CommandError)
 
 
 class Store:
-    """A database, migrated when it is first reached."""
+    """A database, migrated on first contact."""
 
     def __init__(self, url: str) -> None:
         self._engine = create_database_engine(url)
@@ -36,23 +36,27 @@ class Store:
         self._migrated = False
 
     async def open(self) -> None:
-        """Tries to reach the database. Where it cannot be reached, says so in the log: later work tries again."""
+        """Tries to reach the database. If that fails, logs an error; later work tries again."""
         try:
             await self.read(lambda session: None)
         except StoreUnavailable:
-            logger.error("studies and kept answers are not available; all else is", extra={"database": str(self)})
+            logger.error(
+                "the database cannot be reached: requests that need studies or stored answers return 503 until it "
+                "answers; all other requests work",
+                extra={"database": str(self)},
+            )
 
     async def close(self) -> None:
-        """Waits for the work in flight, and closes the connections."""
+        """Waits for the work in progress, then closes the connections."""
         await asyncio.to_thread(self._threads.shutdown, cancel_futures=True)
         self._engine.dispose()
 
     async def read(self, work: Callable[[Session], T]) -> T:
-        """What `work` finds. Raises StoreUnavailable."""
+        """The result of `work` on a session. Raises StoreUnavailable."""
         return await asyncio.get_running_loop().run_in_executor(self._threads, self._do, work, False)
 
     async def write(self, work: Callable[[Session], T]) -> T:
-        """What `work` returns, once all that it changed is on the disk; if it raises, nothing is changed.
+        """The result of `work`, after its changes are on the disk. If `work` raises, nothing changes.
 
         Raises StoreUnavailable.
         """
@@ -68,9 +72,9 @@ class Store:
             with Session(engine, expire_on_commit=False) as session, session.begin():
                 return work(session)
         except IntegrityError:
-            raise  # the work's own matter
+            raise  # the work handles it
         except _UNAVAILABLE as error:
-            # the statement and its parameters are the caller's own business, and no help
+            # without the statement and its parameters: they hold data of the client
             reason = str(error.orig) if isinstance(error, DBAPIError) else str(error)
             logger.error("database unavailable", extra={"database": str(self), "reason": reason})
             raise StoreUnavailable from None

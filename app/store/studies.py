@@ -21,7 +21,7 @@ _MICROSECOND = timedelta(microseconds=1)
 
 @dataclass(frozen=True)
 class Step:
-    """An iteration to be: the endpoint `kind` was sent `request` and answered `answer`, a motion of these figures."""
+    """An iteration to add: a `request` to the endpoint `kind`, its `answer`, duration [s] and energies [J]."""
 
     kind: str
     request: dict[str, Any]
@@ -33,21 +33,21 @@ class Step:
 
 @dataclass(frozen=True)
 class History:
-    """A study and its iterations, by number, without their requests where they are many."""
+    """A study and its iterations in order of their numbers. Their requests are loaded for one iteration only."""
 
     study: Study
     iterations: list[Iteration]
 
     @property
     def energies(self) -> list[float]:
-        """Of each iteration, in the study's objective [J]."""
+        """Energy of each iteration, of the study's objective [J]."""
         return [getattr(iteration, self.study.objective) for iteration in self.iterations]
 
 
 def create(session: Session, study: Study) -> tuple[Study, bool]:
-    """Adds a study, unless its key says that it was added before; that one then, and True.
+    """Adds a study and returns it with False; if its key is known, the study of that key with True.
 
-    Raises KeyReused where the key came with another study.
+    Raises KeyReused if that study differs.
     """
     if study.idempotency_key is not None:
         known = session.scalar(select(Study).where(Study.idempotency_key == study.idempotency_key))
@@ -67,7 +67,7 @@ def history(session: Session, study_id: str) -> History:
 
 
 def page(session: Session, limit: int, after: str | None) -> tuple[list[History], str | None]:
-    """Up to `limit` studies, newest first, and the place to go on `after`; None at the end."""
+    """Up to `limit` studies, newest first, and the `after` of the next page; None on the last page."""
     query = select(Study).order_by(Study.created.desc(), Study.id.desc()).limit(limit + 1)
     if after is not None:
         microseconds, study_id = after.split("_")
@@ -87,9 +87,9 @@ def delete(session: Session, study_id: str) -> None:
 
 
 def known_step(session: Session, study_id: str, kind: str, request: dict[str, Any], key: str | None) -> int | None:
-    """Number of the iteration that was added under this key; None if there is none.
+    """Number of the iteration with this key; None if there is none.
 
-    Raises UnknownStudy, or KeyReused where the key came with another request.
+    Raises UnknownStudy, or KeyReused if that iteration has another request.
     """
     _study(session, study_id)
     if key is None:
@@ -103,11 +103,11 @@ def known_step(session: Session, study_id: str, kind: str, request: dict[str, An
 
 
 def add(session: Session, study_id: str, step: Step, key: str | None) -> tuple[int, bool]:
-    """Adds an iteration, unless its key says that it was added before, and returns its number; whether it was.
+    """Adds an iteration and returns its number with False; if its key is known, the number of that key with True.
 
     Raises UnknownStudy or KeyReused.
     """
-    # PostgreSQL: one at a time per study, so that numbers are counted without gaps; SQLite has one writer anyway
+    # locks the study (PostgreSQL), so that numbers have no gaps; SQLite has one writer at a time anyway
     if session.scalar(select(Study.id).where(Study.id == study_id).with_for_update()) is None:
         raise UnknownStudy
     known = known_step(session, study_id, step.kind, step.request, key)
@@ -137,7 +137,7 @@ def add(session: Session, study_id: str, step: Step, key: str | None) -> tuple[i
 
 
 def up_to(session: Session, study_id: str, number: int) -> History:
-    """A study with its iterations up to that number, the last with its request.
+    """A study with its iterations up to `number`; the last one has its request.
 
     Raises UnknownStudy or UnknownIteration.
     """
@@ -149,7 +149,7 @@ def up_to(session: Session, study_id: str, number: int) -> History:
 
 
 def new_study(name: str, robot: str, objective: str, threshold: float, key: str | None) -> Study:
-    """A study that is not in the database yet."""
+    """A new study, not yet in the database."""
     return Study(
         id=new_id(),
         name=name,

@@ -1,4 +1,4 @@
-"""The tables, as SQLAlchemy maps them. `migrations/` makes them; a test holds the two together."""
+"""The tables, as SQLAlchemy maps them. `migrations/` creates them; a test compares the two."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ _NAMES = {
 
 
 def now() -> datetime:
-    """The time, in UTC."""
+    """The present time in UTC."""
     return datetime.now(UTC)
 
 
 def new_id() -> str:
-    """A name for a row that no other has."""
+    """A unique id for a row."""
     return str(uuid.uuid4())
 
 
 def is_id(text: str) -> bool:
-    """Whether `new_id` could have made this. PostgreSQL cannot be asked for just any text."""
+    """Whether `text` has the form of an id. PostgreSQL rejects some other texts with an error."""
     return re.fullmatch(r"[0-9a-f-]{36}", text) is not None
 
 
 class Instant(TypeDecorator[datetime]):
-    """A time in UTC. The database keeps it without its zone, which SQLite would lose anyway."""
+    """A time in UTC. The column has no time zone, because SQLite does not store one."""
 
     impl = DateTime
     cache_ok = True
@@ -73,11 +73,11 @@ class Study(Table):
 
 
 class Answer(Table):
-    """An endpoint's whole answer: JSON, compressed. One that belongs to a study goes when its study goes; any other
-    when it is too old, or the oldest of too many."""
+    """A complete answer of an endpoint: JSON, compressed. An answer of a study is deleted with its study, any other by
+    age and total size."""
 
     __tablename__ = "answers"
-    # to sum and drop the oldest without reading the bodies
+    # for the sum of sizes from the newest on, without reading the bodies
     __table_args__ = (Index(None, "created", "size"), Index(None, "study_id"))
 
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
@@ -85,21 +85,21 @@ class Answer(Table):
     created: Mapped[datetime] = mapped_column(Instant)
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
     size: Mapped[int]
-    """Of the compressed body [byte]."""
+    """Size of the compressed body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
 class Iteration(Table):
-    """One step of a study: what was asked and what it came to. The whole answer is in `answers`."""
+    """One step of a study: the request and the energies [J] of its motion. The complete answer is in `answers`."""
 
     __tablename__ = "iterations"
     __table_args__ = (Index(None, "study_id", "idempotency_key", unique=True),)
 
     study_id: Mapped[str] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True)
     number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
-    """1 for the study's first, then counted on without gaps."""
+    """1, 2, 3, … within the study, without gaps."""
     kind: Mapped[str] = mapped_column(String(32))
-    """The endpoint that answered: `optimize` or `evaluate`."""
+    """Endpoint of the request: `optimize` or `evaluate`."""
     created: Mapped[datetime] = mapped_column(Instant)
     request: Mapped[dict[str, Any]] = mapped_column(JSON)
     answer_id: Mapped[str] = mapped_column(ForeignKey("answers.id"), unique=True)

@@ -1,4 +1,4 @@
-"""From the store's rows to what the routes under `/studies` answer."""
+"""The answers of the routes under `/studies`, from the rows of the database."""
 
 from __future__ import annotations
 
@@ -50,13 +50,13 @@ def entries(history: History) -> list[dict[str, Any]]:
     """Fields of an Iteration, for each."""
     steps = progress(history.energies, history.study.threshold)
     return [
-        {**_figures(iteration), "energy": energy, **asdict(step)}
+        {**_columns_of(iteration), "energy": energy, **asdict(step)}
         for iteration, energy, step in zip(history.iterations, history.energies, steps, strict=True)
     ]
 
 
 def detail(history: History) -> schemas.IterationDetail:
-    """The last iteration of a history that brings its request."""
+    """The last iteration of a history. That iteration must have its request loaded."""
     last, so_far = history.iterations[-1], summary(history)
     return schemas.IterationDetail(
         **entries(history)[-1],
@@ -66,7 +66,7 @@ def detail(history: History) -> schemas.IterationDetail:
 
 
 def as_csv(history: History) -> str:
-    """The history as a table, one line per iteration; what is null is empty."""
+    """The history as CSV, one line per iteration; a null value is an empty cell."""
     text = StringIO()
     writer = csv.DictWriter(text, _COLUMNS.values(), lineterminator="\n")
     writer.writeheader()
@@ -79,7 +79,7 @@ def as_csv(history: History) -> str:
     return text.getvalue()
 
 
-def _figures(iteration: Iteration) -> dict[str, Any]:
+def _columns_of(iteration: Iteration) -> dict[str, Any]:
     names = ("number", "kind", "created", "electrical", "mechanical", "duration")
     return {name: getattr(iteration, name) for name in names} | {"answer": iteration.answer_id}
 

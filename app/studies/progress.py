@@ -1,4 +1,4 @@
-"""How a study comes along: each step's energy against the one before, the best so far and the threshold."""
+"""Progress of a study: each energy compared with the previous one, the best so far, and the threshold."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Progress:
-    """One step. Changes are in J, below zero where energy was saved; None at the first step."""
+    """One step. Changes [J] are negative if energy was saved; None at the first step."""
 
     change_from_last: float | None
     change_from_best: float | None
@@ -16,7 +16,7 @@ class Progress:
 
 
 def progress(energies: Sequence[float], threshold: float) -> list[Progress]:
-    """Of each energy [J] against those before it."""
+    """The progress of each step, from the energies [J] of all steps."""
     steps, best = [], None
     for k, energy in enumerate(energies):
         steps.append(
@@ -31,10 +31,10 @@ def progress(energies: Sequence[float], threshold: float) -> list[Progress]:
 
 
 def best_of(energies: Sequence[float]) -> int | None:
-    """Index of the least energy, the first of several; None if there is none."""
+    """Index of the least energy, the first of equals; None for an empty sequence."""
     return min(range(len(energies)), key=energies.__getitem__, default=None)
 
 
 def first_met(energies: Sequence[float], threshold: float) -> int | None:
-    """Index of the first energy that meets the threshold; None if none does."""
+    """Index of the first energy of at most `threshold` [J]; None if there is none."""
     return next((k for k, energy in enumerate(energies) if energy <= threshold), None)

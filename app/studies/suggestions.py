@@ -1,6 +1,6 @@
-"""What a study could try next: requests that differ from its best iteration in one thing each.
+"""Suggestions for the next iteration: requests that differ from an iteration of the study in one respect each.
 
-Only the requests are made here. What each saves is what the optimiser then computes for it.
+This module makes the requests only. The optimiser computes their energies.
 """
 
 from __future__ import annotations
@@ -21,16 +21,20 @@ Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]
 
 _TOOL_AXIS = [0.0, 0.0, 1.0]
-"""In the TCP frame."""
+"""Axis of the tool in the TCP frame."""
 _TILT = radians(10.0)
+"""Tilt of the tool [rad]."""
 _LONGER = 1.25
+"""Factor of a longer duration."""
 _NEARER = 0.5
+"""Factor of the distance between flange and centre of mass."""
 _OTHER_BRANCHES = 2
+"""Most other branches that are suggested."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """A step to try: `request` is a body for `POST /optimize`."""
+    """A suggestion that is not computed yet; `request` is a body of `POST /optimize`."""
 
     step: Step
     summary: str
@@ -39,8 +43,11 @@ class Proposal:
 
 @dataclass(frozen=True)
 class Base:
-    """What the steps start from: a request for `POST /optimize`, the goal configuration q [rad] that was reached, the
-    duration [s], and the candidates that were looked at."""
+    """The iteration that the suggestions start from.
+
+    `request` is a body of `POST /optimize`, `q_goal` the goal configuration of its motion [rad], `duration` [s] that of
+    the motion. `candidates` are those of its answer; empty if the motion was not optimised.
+    """
 
     request: Fields
     q_goal: list[float]
@@ -50,8 +57,11 @@ class Base:
 
 
 def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base | None:
-    """From an iteration's request and answer. None where the motion given to `evaluate` has no two ends to optimise
-    between: it goes through configurations on its way, or ends where it starts."""
+    """The base from the request and the answer of an iteration.
+
+    None if an evaluated motion has no two ends to optimise between: it passes configurations between its ends, or ends
+    where it starts.
+    """
     if kind == "optimize":
         return Base(request, answer["branch"]["goal"]["q"], answer["duration"], True, answer["candidates"])
     given = request.get("trajectory") or {}
@@ -66,7 +76,7 @@ def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base 
 
 
 def proposals(base: Base) -> list[Proposal]:
-    """Every step that makes sense from there, those first that usually save most."""
+    """All suggestions for the base, in the order in which they are computed: usually those first that save most."""
     return [*_method(base), *_duration(base), *_branch(base), *_orientation(base), *_payload(base)]
 
 
@@ -82,10 +92,10 @@ def _method(base: Base) -> Iterator[Proposal]:
 
 def _duration(base: Base) -> Iterator[Proposal]:
     if base.request.get("duration") is not None and base.request["objective"] == "electrical":
-        yield Proposal("duration", "Leave the duration to the optimiser.", _timed(base, None))
+        yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
     for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
         duration = min(base.duration * factor, MAX_DURATION)
-        yield Proposal("duration", f"Take {abs(factor - 1):.0%} {word}.", _timed(base, duration))
+        yield Proposal("duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration))
 
 
 def _branch(base: Base) -> Iterator[Proposal]:
@@ -93,10 +103,12 @@ def _branch(base: Base) -> Iterator[Proposal]:
     if fixed:
         pose = _poses(base, [np.zeros(3)])[0]
         request = _without(base.request, "branch", "windings") | {"goal": pose}
-        yield Proposal("branch", "Reach the same pose in whichever arm configuration is best.", request)
+        yield Proposal("branch", "Reach the same pose in the best arm configuration.", request)
     elif any(name in base.request for name in ("branch", "windings")):
         yield Proposal(
-            "branch", "Allow every arm configuration and winding.", _without(base.request, "branch", "windings")
+            "branch",
+            "Allow all arm configurations and full-turn alternatives.",
+            _without(base.request, "branch", "windings"),
         )
     seen = {_branch_name(candidate["goal"]) for candidate in base.candidates if candidate["q_goal"] == base.q_goal}
     known = [candidate for candidate in base.candidates if candidate["status"] in ("solved", "pruned", "unvisited")]
@@ -106,7 +118,7 @@ def _branch(base: Base) -> Iterator[Proposal]:
         if name not in seen and len(seen) <= _OTHER_BRANCHES:
             seen.add(name)
             request = _without(base.request, "branch") | {"goal": {"q": candidate["q_goal"]}}
-            yield Proposal("branch", f"Reach the goal as {name}.", request)
+            yield Proposal("branch", f"Reach the goal in the branch {name}.", request)
 
 
 def _orientation(base: Base) -> Iterator[Proposal]:
@@ -114,13 +126,14 @@ def _orientation(base: Base) -> Iterator[Proposal]:
     orientation = {"free_about": _TOOL_AXIS, "quaternion": here["pose"]["quaternion"]}
     yield Proposal(
         "orientation",
-        "Let the tool turn freely about its axis at the goal.",
+        "Let the tool rotate freely about its z axis at the goal.",
         base.request | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
     )
     tilts = [sign * _TILT * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
     yield Proposal(
         "orientation",
-        "Tilt the tool at the goal by 10 degrees: the best of four ways.",
+        "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that needs the least energy "
+        "(four directions compared).",
         base.request | {"goal": {"any_of": _poses(base, tilts)}},
     )
 
@@ -131,7 +144,7 @@ def _payload(base: Base) -> Iterator[Proposal]:
         nearer = payload | {"com": [_NEARER * part for part in payload["com"]]}
         yield Proposal(
             "payload",
-            "Grip the payload lower: its centre of mass at half the distance from the flange.",
+            "Grip the payload so that its centre of mass is at half its present distance from the flange.",
             base.request | {"payload": nearer},
         )
 
@@ -151,7 +164,7 @@ def _poses(base: Base, rotvecs: list[Any]) -> list[Fields]:
 
 
 def _branch_name(label: str) -> str:
-    """shoulder/elbow/wrist, without the windings."""
+    """shoulder/elbow/wrist, without the full turns."""
     return "/".join(label.split("/")[:3])
 
 

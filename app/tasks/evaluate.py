@@ -1,10 +1,11 @@
-"""POST /evaluate in a worker: reads the motion from the file that was received, evaluates it, writes the answer."""
+"""POST /evaluate in a worker: reads the motion from the file of the received body, evaluates it, encodes the answer."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import orjson
 from pydantic import ValidationError
@@ -12,11 +13,13 @@ from pydantic import ValidationError
 from app.convert.arm import to_arm
 from app.convert.evaluation import _motion_of_csv, table_of, to_evaluate_response, to_motion
 from app.convert.motion_csv import MotionCsv
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
+from app.http.problem_details import invalid_request
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
-from app.tasks.task import answer, json_reply
-from optimizer.replay.evaluate import evaluate
+from optimizer.replay.evaluate import Evaluation, evaluate
+
+M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 
 
 @dataclass(frozen=True)
@@ -29,36 +32,27 @@ class EvaluateTask:
     wanted: Literal["json", "csv"]
     request_id: str
 
-    def run(self, deadline: float) -> Reply:
-        """The answer, or the problem, within about `deadline` seconds."""
-        return answer(self.request_id, lambda: self._evaluate(deadline))
-
-    def _evaluate(self, deadline: float) -> Reply:
-        if self.kind == "csv":
-            settings = csv_settings(self.query)
-            arm = to_arm(settings)
-            with Path(self.file).open("rb") as file:
-                table = MotionCsv.of(file, arm.robot.nq, settings.units)
-                result = evaluate(arm, _motion_of_csv(settings, table), settings.sample_period, deadline)
-            robot = settings.robot
-        else:
-            if self.query:
-                raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
-            request = _parsed(Path(self.file).read_bytes())
-            arm = to_arm(request)
-            result = evaluate(arm, to_motion(request), request.sample_period, deadline)
-            robot = request.robot
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
+        robot, result = self._evaluate_csv(deadline) if self.kind == "csv" else self._evaluate_json(deadline)
         if self.wanted == "csv":
-            return Reply(200, table_of(result).encode(), {"Content-Type": "text/csv; charset=utf-8"})
-        return json_reply(to_evaluate_response(self.request_id, robot, result))
+            return TaskResult.of_csv(table_of(result))
+        return TaskResult.of_json(to_evaluate_response(self.request_id, robot, result))
 
+    def _evaluate_csv(self, deadline: float) -> tuple[str, Evaluation]:
+        settings = csv_settings(self.query)
+        arm = to_arm(settings)
+        with Path(self.file).open("rb") as file:
+            table = MotionCsv.of(file, arm.robot.nq, settings.units)
+            result = evaluate(arm, _motion_of_csv(settings, table), settings.sample_period, deadline)
+        return settings.robot, result
 
-def _parsed(body: bytes) -> EvaluateRequest:
-    try:
-        return EvaluateRequest.model_validate_json(body)
-    except ValidationError as error:
-        errors = error.errors(include_url=False, include_context=False, include_input=False)
-        raise InvalidRequest.by_pydantic(errors, "body") from None
+    def _evaluate_json(self, deadline: float) -> tuple[str, Evaluation]:
+        if self.query:
+            raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
+        body = Path(self.file).read_bytes()
+        request = _validated(lambda: EvaluateRequest.model_validate_json(body), "body")
+        return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, deadline)
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:
@@ -69,8 +63,13 @@ def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:
             given[name] = orjson.loads(text)
         except orjson.JSONDecodeError:
             given[name] = text
+    return _validated(lambda: EvaluateCsvSettings.model_validate(given), "query")
+
+
+def _validated(validate: Callable[[], M], where: str) -> M:
+    """What `validate` returns. Raises InvalidRequest with the part `where` of the request."""
     try:
-        return EvaluateCsvSettings.model_validate(given)
+        return validate()
     except ValidationError as error:
         errors = error.errors(include_url=False, include_context=False, include_input=False)
-        raise InvalidRequest.by_pydantic(errors, "query") from None
+        raise invalid_request(errors, where) from None

@@ -9,9 +9,8 @@ import numpy as np
 from app.convert.arm import robot_named
 from app.convert.fields import fields
 from app.convert.pose import to_matrix, to_pose
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 from app.schemas.ik_path import IKPathRequest
-from app.tasks.task import answer, json_reply
 from optimizer.kinematics.path_following import follow
 from optimizer.problem.arm import Arm
 
@@ -23,11 +22,8 @@ class IKPathTask:
     request: IKPathRequest
     request_id: str
 
-    def run(self, deadline: float) -> Reply:
-        """The answer, or the problem; a thousand points take less than a second."""
-        return answer(self.request_id, self._follow)
-
-    def _follow(self) -> Reply:
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /ik/path`. `deadline` is not watched: a thousand points take less than a second."""
         request = self.request
         arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
         targets = (
@@ -38,7 +34,7 @@ class IKPathTask:
         found = follow(arm, targets, np.array(request.guess), request.tolerance, request.near_singular)
         written = [(t, point.q) for t, point in zip(request.t, found, strict=True) if point.written]
         names = ("q", "position_error", "rotation_error", "smallest_singular_value", "reached", "written", "reason")
-        return json_reply(
+        return TaskResult.of_json(
             {
                 "id": self.request_id,
                 "robot": request.robot,

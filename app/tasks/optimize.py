@@ -1,4 +1,4 @@
-"""What a worker process does with a request."""
+"""POST /optimize in a worker."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from app.convert.request import to_problem
 from app.convert.solution import to_response
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 from app.schemas.request import OptimizeRequest
-from app.tasks.task import answer, json_reply
+from app.tasks.certified import certified
 from optimizer.optimize import optimize
 
 
@@ -19,12 +19,7 @@ class OptimizeTask:
     request: OptimizeRequest
     request_id: str
 
-    def run(self, deadline: float) -> Reply:
-        """The answer, or the problem, within about `deadline` seconds."""
-        return answer(self.request_id, lambda: self._solve(deadline))
-
-    def _solve(self, deadline: float) -> Reply:
-        solution = optimize(to_problem(self.request, deadline))
-        if not solution.certificate.valid:
-            raise AssertionError(f"The optimizer returned a motion that does not hold: {solution.certificate}")
-        return json_reply(to_response(self.request, self.request_id, solution))
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /optimize`, within about `deadline` seconds."""
+        solution = certified(optimize(to_problem(self.request, deadline)))
+        return TaskResult.of_json(to_response(self.request, self.request_id, solution))

@@ -7,39 +7,32 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Literal
 
-import orjson
-
 from app.convert.fields import fields
 from app.convert.request import to_problem
 from app.convert.solution import to_response
-from app.engine.reply import Reply
+from app.engine.result import TaskResult
 from app.schemas.pareto import ParetoRequest
-from app.tasks.stored_answers import AnswerCollector
-from app.tasks.task import answer
+from app.tasks.answer_collector import AnswerCollector
 from optimizer.pareto import Front, pareto
 from optimizer.solution import Solution
 
 
 @dataclass(frozen=True)
 class ParetoTask:
-    """A validated request and its id; the answer's media type is `wanted`."""
+    """A validated request and its id; the media type of the answer is `wanted`."""
 
     request: ParetoRequest
     request_id: str
     wanted: Literal["json", "csv"]
 
-    def run(self, deadline: float) -> Reply:
-        """The answer, or the problem, within about `deadline` seconds."""
-        return answer(self.request_id, lambda: self._solve(deadline))
-
-    def _solve(self, deadline: float) -> Reply:
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /pareto`, within about `deadline` seconds."""
         front = pareto(to_problem(self.request, deadline), self.request.points)
-        shelf = AnswerCollector()
-        points = [self._point(point, shelf) for point in front.points]
+        collector = AnswerCollector()
+        points = [self._point(point, collector) for point in front.points]
         if self.wanted == "csv":
-            return Reply(200, _table(points).encode(), {"Content-Type": "text/csv; charset=utf-8"}, shelf.kept())
-        body = orjson.dumps(self._content(front, points), option=orjson.OPT_SERIALIZE_NUMPY)
-        return Reply(200, body, kept=shelf.kept())
+            return TaskResult.of_csv(_table(points), collector.stored)
+        return TaskResult.of_json(self._content(front, points), collector.stored)
 
     def _content(self, front: Front, points: list[dict[str, Any]]) -> dict[str, Any]:
         return {
@@ -51,7 +44,7 @@ class ParetoTask:
             "solver": fields(front, "wall_time", "nlp_solves"),
         }
 
-    def _point(self, point: Solution, shelf: AnswerCollector) -> dict[str, Any]:
+    def _point(self, point: Solution, collector: AnswerCollector) -> dict[str, Any]:
         energy = point.energy
         totals = {"electrical": energy.electrical.total, "mechanical": energy.mechanical.total}
         return {
@@ -64,7 +57,7 @@ class ParetoTask:
             **fields(point, "lower_bound", "status"),
             "certified": point.certificate.valid,
             "worst_ratio": max(point.certificate.worst_ratio.values()),
-            "answer": shelf.add(to_response(self.request, self.request_id, point)),
+            "answer": collector.add(to_response(self.request, self.request_id, point)),
         }
 
 

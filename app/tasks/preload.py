@@ -1,16 +1,13 @@
-"""Imported once by the server process that workers are forked from, so that they find everything imported."""
+"""Imports everything that workers use, once, in the process that they are forked from."""
 
 from __future__ import annotations
 
 import signal
 
-from app.tasks import evaluate as evaluation
-from app.tasks import ik_path, whatif
-from app.tasks import optimize as tasks
-from app.tasks import pareto as fronts
+from app.tasks import compare, evaluate, ik_path, optimize, pareto, whatif
 
-__all__ = ["evaluation", "fronts", "ik_path", "tasks", "whatif"]
+__all__ = ["compare", "evaluate", "ik_path", "optimize", "pareto", "whatif"]
 
-# A service manager's SIGTERM reaches every process of the service. This one ends with its parent, and its end would be
-# the workers': they have to last until the requests in flight are answered.
+# SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
+# end the workers, which must last until the requests in flight are answered.
 signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -1,40 +1,35 @@
-"""POST /whatif in a worker: the base, then every change made to it."""
+"""POST /whatif in a worker: the base, then each change to it."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-import orjson
-
 from app.convert.arm import to_arm
 from app.convert.evaluation import to_evaluate_response, to_motion
-from app.convert.fields import fields
 from app.convert.request import to_problem
 from app.convert.solution import certificate_fields, to_response
-from app.engine.reply import Reply
-from app.http.problem_details import problem_reply
+from app.engine.result import TaskResult
+from app.http.problem_details import problem_content
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import Change, WhatifRequest
-from app.tasks.stored_answers import AnswerCollector
-from app.tasks.task import answer, json_reply
-from optimizer.certificate import ENERGY_FLOOR
+from app.tasks.answer_collector import AnswerCollector
+from app.tasks.certified import certified
+from app.tasks.deadline_shares import DeadlineShares
+from app.tasks.differences import differences, quantities
+from optimizer.deadline import Deadline
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
 from optimizer.optimize import optimize
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.replay.evaluate import Evaluation, evaluate
-from optimizer.solution import ElectricalEnergy, Energy, Solution
+from optimizer.solution import Solution
 from optimizer.whatif import Changed, whatif
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 T = TypeVar("T")
-
-# a run whose share of the deadline has been used up by others still says so itself [s]
-LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -44,68 +39,62 @@ class WhatifTask:
     request: WhatifRequest
     request_id: str
 
-    def run(self, deadline: float) -> Reply:
-        """The answer, or the base's problem, within about `deadline` seconds."""
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /whatif`, within about `deadline` seconds.
+
+        Raises the error of the base, and InvalidProblem for an invalid change.
+        """
         work = _Optimized if self.request.optimize is not None else _Evaluated
-        return answer(self.request_id, lambda: work(self.request, self.request_id, deadline).reply())
+        return work(self.request, self.request_id, Deadline.after(deadline)).result()
 
 
 class _Work:
-    """What both kinds of base share: the clock, the shelf, and the figures."""
+    """State and rows that both kinds of base share."""
 
-    def __init__(self, request: WhatifRequest, request_id: str, deadline: float) -> None:
+    def __init__(self, request: WhatifRequest, request_id: str, deadline: Deadline) -> None:
         self.request, self.request_id = request, request_id
-        self.began = time.perf_counter()
-        self.end = self.began + deadline
-        self.runs = 1 + len(request.changes)
-        self.shelf = AnswerCollector()
+        self.clock, self.began = deadline.clock, deadline.clock()
+        self.shares = DeadlineShares(deadline, 1 + len(request.changes))
+        self.collector = AnswerCollector()
 
-    def share(self) -> float:
-        """Time [s] of the next run."""
-        left = self.end - time.perf_counter()
-        self.runs -= 1
-        return max(left / (self.runs + 1), LEAST_SHARE)
-
-    def content(self, robot: str, objective: str | None, base: Any, changes: list[Any]) -> Reply:
+    def result_of(self, robot: str, objective: str | None, base: Any, changes: list[Any]) -> TaskResult:
         """The answer."""
-        wall_time = time.perf_counter() - self.began
         content = {
             "id": self.request_id,
             "robot": robot,
             "objective": objective,
             "base": base,
             "changes": changes,
-            "wall_time": wall_time,
+            "wall_time": self.clock() - self.began,
         }
-        return replace(json_reply(content), kept=self.shelf.kept())
+        return TaskResult.of_json(content, self.collector.stored)
 
     def row(self, change: Change, error: Exception | None = None, **given: Any) -> dict[str, Any]:
-        """A change's outcome: what is given of it, and its problem."""
-        problem = None if error is None else orjson.loads(problem_reply(error, self.request_id).body)
+        """The entry of a change in the answer: the fields in `given`, and `error` as a problem."""
+        problem = None if error is None else problem_content(error, self.request_id)
         empty = dict.fromkeys(("same_motion", "reoptimised", "reoptimisation"))
         return {"name": change.name, **empty, **given, "problem": problem}
 
 
 class _Optimized(_Work):
-    """The base is a motion to be optimised."""
+    """The base is optimised."""
 
-    def reply(self) -> Reply:
-        """The answer. Raises what the base does, and InvalidProblem for a change that cannot be."""
+    def result(self) -> TaskResult:
+        """The answer. Raises the error of the base, and InvalidProblem for an invalid change."""
         asked = self.request.optimize
         assert asked is not None
-        first = _located(lambda: to_problem(asked, min(asked.deadline, self.share())), "optimize")
-        # all of them before the first is worked on: bad input is refused at once
+        first = _located(lambda: to_problem(asked, min(asked.deadline, self.shares.next())), "optimize")
+        # all of them before the first run, so that an invalid change is rejected at once
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
-        base = _located(lambda: optimize(first), "optimize")
-        _check(base)
+        base = certified(_located(lambda: optimize(first), "optimize"))
         content = {
-            "answer": self.shelf.add(to_response(asked, self.request_id, base)),
+            "answer": self.collector.add(to_response(asked, self.request_id, base)),
             "status": base.status,
             "holds": True,
-            **_figures(base.energy, base.duration),
+            **quantities(base.energy, base.duration),
         }
         rows = [self._row(asked, k, base, content, problem) for k, problem in enumerate(problems)]
-        return self.content(asked.robot, asked.objective, content, rows)
+        return self.result_of(asked.robot, asked.objective, content, rows)
 
     def _problem(self, asked: OptimizeRequest, k: int) -> Problem | OutsideLimits:
         change = self.request.changes[k]
@@ -117,31 +106,30 @@ class _Optimized(_Work):
     def _row(
         self, asked: OptimizeRequest, k: int, base: Solution, content: dict[str, Any], problem: Problem | OutsideLimits
     ) -> dict[str, Any]:
-        change, share = self.request.changes[k], self.share()
+        change, share = self.request.changes[k], self.shares.next()
         if isinstance(problem, OutsideLimits):
             return self.row(change, problem)
-        limited = replace(problem, deadline=min(asked.deadline, share))
-        found = whatif(base, limited)
+        found = whatif(base, replace(problem, deadline=min(asked.deadline, share)))
         same = {
             "holds": found.certificate.valid,
             "certificate": certificate_fields(found.certificate),
             "answer": None,
-            **_against(content, found.same_motion, base.duration),
+            **differences(content, found.same_motion, base.duration),
         }
         if found.reoptimised is None:
             assert found.error is not None
             return self.row(change, _moved(found.error, f"changes.{k}.arm", change), same_motion=same)
-        return self.row(change, same_motion=same, **self._reoptimised(asked, change, content, found, found.reoptimised))
+        best = certified(found.reoptimised)
+        return self.row(change, same_motion=same, **self._reoptimised(asked, change, content, found, best))
 
     def _reoptimised(
         self, asked: OptimizeRequest, change: Change, content: dict[str, Any], found: Changed, best: Solution
     ) -> dict[str, Any]:
-        _check(best)
         change_of_energy = best.energy.of(asked.objective) - found.same_motion.of(asked.objective)
         outcome = {
-            "answer": self.shelf.add(to_response(_changed(asked, change), self.request_id, best)),
+            "answer": self.collector.add(to_response(_changed(asked, change), self.request_id, best)),
             "status": best.status,
-            **_against(content, best.energy, best.duration),
+            **differences(content, best.energy, best.duration),
         }
         return {"reoptimised": outcome, "reoptimisation": change_of_energy}
 
@@ -149,28 +137,28 @@ class _Optimized(_Work):
 class _Evaluated(_Work):
     """The base is a given motion."""
 
-    def reply(self) -> Reply:
-        """The answer. Raises what the base does, and InvalidProblem for a change that cannot be."""
+    def result(self) -> TaskResult:
+        """The answer. Raises the error of the base, and InvalidProblem for an invalid change."""
         asked = self.request.evaluate
         assert asked is not None
         arm = _located(lambda: to_arm(asked), "evaluate")
         arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         base = _located(lambda: self._evaluate(arm, asked), "evaluate")
         content = {
-            "answer": self.shelf.add(to_evaluate_response(self.request_id, asked.robot, base)),
+            "answer": self.collector.add(to_evaluate_response(self.request_id, asked.robot, base)),
             "status": None,
             "holds": _holds(base),
-            **_figures(base.total.energy, base.total.duration),
+            **quantities(base.total.energy, base.total.duration),
         }
         rows = [self._row(asked, k, content, arm) for k, arm in enumerate(arms)]
-        return self.content(asked.robot, None, content, rows)
+        return self.result_of(asked.robot, None, content, rows)
 
     def _arm(self, asked: EvaluateRequest, k: int) -> Arm:
         change = self.request.changes[k]
         return _located(lambda: to_arm(_changed(asked, change)), f"changes.{k}.arm", change)
 
     def _evaluate(self, arm: Arm, asked: EvaluateRequest) -> Evaluation:
-        return evaluate(arm, to_motion(asked), asked.sample_period, self.share())
+        return evaluate(arm, to_motion(asked), asked.sample_period, self.shares.next())
 
     def _row(self, asked: EvaluateRequest, k: int, content: dict[str, Any], arm: Arm) -> dict[str, Any]:
         change = self.request.changes[k]
@@ -181,14 +169,14 @@ class _Evaluated(_Work):
         same = {
             "holds": _holds(found),
             "certificate": None,
-            "answer": self.shelf.add(to_evaluate_response(self.request_id, asked.robot, found)),
-            **_against(content, found.total.energy, found.total.duration),
+            "answer": self.collector.add(to_evaluate_response(self.request_id, asked.robot, found)),
+            **differences(content, found.total.energy, found.total.duration),
         }
         return self.row(change, same_motion=same)
 
 
 def _located(work: Callable[[], T], where: str, change: Change | None = None) -> T:
-    """What the work returns. Raises what it raises, `_moved`."""
+    """What `work` returns. Raises what it raises; an InvalidProblem with its field path changed by `_moved`."""
     try:
         return work()
     except InvalidProblem as error:
@@ -196,54 +184,23 @@ def _located(work: Callable[[], T], where: str, change: Change | None = None) ->
 
 
 def _moved(error: Exception, where: str, change: Change | None = None) -> Exception:
-    """The error with its field told as the request has it: under `where`, and there no deeper than what the change
-    names. Those that tell of the motion, not of a field, stay as they are."""
+    """The error with its field path prefixed by `where`.
+
+    If the change does not set that field, the path is `where` alone. Errors about the motion, not about a field, are
+    returned unchanged.
+    """
     if not isinstance(error, InvalidProblem) or isinstance(error, OutsideLimits | InvalidTable):
         return error
-    named = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
-    return InvalidProblem(f"{where}.{error.field}" if named else where, str(error))
+    is_set = change is None or error.field.partition(".")[0] in change.arm.model_fields_set
+    return InvalidProblem(f"{where}.{error.field}" if is_set else where, str(error))
 
 
 def _changed(asked: R, change: Change) -> R:
-    """The base's request with the change made."""
+    """The base's request with the fields that the change sets."""
     return asked.model_copy(update={name: getattr(change.arm, name) for name in change.arm.model_fields_set})
 
 
-def _check(solution: Solution) -> None:
-    if not solution.certificate.valid:
-        raise AssertionError(f"The optimizer returned a motion that does not hold: {solution.certificate}")
-
-
 def _holds(result: Evaluation) -> bool:
+    """Whether the motion is within all limits and free of collisions."""
     free = result.nearest is None or result.nearest.distance >= 0
     return free and all(report.held for report in result.limits)
-
-
-def _figures(energy: Energy, duration: float) -> dict[str, Any]:
-    """What base and changes are compared by."""
-    return {
-        "duration": duration,
-        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
-        "mechanical": energy.mechanical.total,
-        **fields(energy, "mean_power", "peak_power"),
-    }
-
-
-def _against(base: dict[str, Any], energy: Energy, duration: float) -> dict[str, Any]:
-    """The figures of a changed arm's motion against those of the base."""
-    figures = _figures(energy, duration)
-    return {
-        name: {part: _delta(base[name][part], value[part]) for part in value}
-        if isinstance(value, dict)
-        else _delta(base[name], value)
-        for name, value in figures.items()
-    }
-
-
-def _delta(base: float, value: float) -> dict[str, Any]:
-    difference = value - base
-    return {
-        "value": value,
-        "difference": difference,
-        "relative": difference / abs(base) if abs(base) > ENERGY_FLOOR else None,
-    }

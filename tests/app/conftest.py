@@ -10,10 +10,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.live import Server, serving
-
-# a cold start: imports, loading the compiled kernel, a first solve [s]
-WARM_UP = 60.0
+from tests.app.live import WARM_UP, Server, serving
 
 
 @pytest.fixture(scope="session", autouse=True)

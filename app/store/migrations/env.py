@@ -1,4 +1,4 @@
-"""Alembic's environment: run by `app.store.database.migrate` with a connection, by `alembic revision` without one."""
+"""Alembic's environment: `app.store.database.migrate` passes a connection, `alembic revision` does not."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from app.store.tables import Table
 
 
 def _run(connection: Connection) -> None:
-    # batches: SQLite alters a table by copying it
+    # batches, because SQLite alters a table by copying it
     context.configure(connection=connection, target_metadata=Table.metadata, render_as_batch=True)
     with context.begin_transaction():
         context.run_migrations()

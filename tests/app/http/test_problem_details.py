@@ -1,4 +1,4 @@
-"""Exceptions and what becomes of them, without a server."""
+"""Exceptions as problem details, without a server."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.http.problem_details import TABLE, problem_reply, problem_type
+from app import exceptions as service
+from app.engine.result import json_document
+from app.exceptions import ServiceError
+from app.http.problem_details import TABLE, problem_content, problem_type
 from app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
 from optimizer import exceptions
 from optimizer.exceptions import JoulepathError
@@ -37,28 +40,41 @@ ERRORS: list[JoulepathError] = [
 ]
 
 
-def test_none_is_left_out() -> None:
-    def all_kinds(kind: type[JoulepathError]) -> set[type[JoulepathError]]:
-        return set(kind.__subclasses__()).union(*(all_kinds(child) for child in kind.__subclasses__()))
+SERVICE_ERRORS: list[ServiceError] = [
+    service.InvalidRequest([{"loc": ["body", "start"], "msg": "Field required"}]),
+    *(kind() for kind in (service.Busy, service.NotReady, service.ShuttingDown, service.WorkerDied)),
+    *(kind() for kind in (service.TaskFailed, service.StoreUnavailable, service.UnknownAnswer, service.EmptyStudy)),
+    *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
+    *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
+]
 
+
+def sent(error: Exception) -> bytes:
+    return json_document(problem_content(error, "the-id"))
+
+
+def all_kinds(kind: type[Exception]) -> set[type[Exception]]:
+    return set(kind.__subclasses__()).union(*(all_kinds(child) for child in kind.__subclasses__()))
+
+
+def test_none_is_left_out() -> None:
     # a base that only others are made of is never raised
     assert {type(error) for error in ERRORS} == all_kinds(JoulepathError) - {exceptions.InCollision}
+    assert {type(error) for error in SERVICE_ERRORS} == all_kinds(ServiceError)
 
 
-@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
-def test_survives_pickling(error: JoulepathError) -> None:
+@pytest.mark.parametrize("error", [*ERRORS, *SERVICE_ERRORS], ids=lambda error: type(error).__name__)
+def test_survives_pickling(error: Exception) -> None:
     copy = pickle.loads(pickle.dumps(error))
     assert type(copy) is type(error)
     assert str(copy) == str(error)
     assert repr(vars(copy)) == repr(vars(error))
 
 
-@pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
-def test_becomes_a_problem_that_fits_its_schema(error: JoulepathError) -> None:
-    reply = problem_reply(error, "the-id")
-    assert reply.media_type == "application/problem+json"
-    problem = problem_type(error).model_validate_json(reply.body)
-    assert (problem.status, problem.instance, problem.detail) == (reply.status, "the-id", str(error))
+@pytest.mark.parametrize("error", [*ERRORS, *SERVICE_ERRORS], ids=lambda error: type(error).__name__)
+def test_becomes_a_problem_that_fits_its_schema(error: Exception) -> None:
+    problem = problem_type(error).model_validate_json(sent(error))
+    assert (problem.instance, problem.detail) == ("the-id", str(error))
 
 
 def test_the_most_special_type_wins() -> None:
@@ -66,22 +82,22 @@ def test_the_most_special_type_wins() -> None:
 
 
 def test_candidates_are_told() -> None:
-    content = json.loads(problem_reply(exceptions.NoTrajectory([CANDIDATE]), "the-id").body)
+    content = json.loads(sent(exceptions.NoTrajectory([CANDIDATE])))
     assert content["candidates"][0]["q_goal"] == [1.0] * 6
     NoTrajectory.model_validate(content)
 
 
 def test_an_unforeseen_error_keeps_its_message_to_itself() -> None:
-    reply = problem_reply(ZeroDivisionError("secret"), "the-id")
-    assert b"secret" not in reply.body
-    Internal.model_validate_json(reply.body)
+    body = sent(ZeroDivisionError("secret"))
+    assert b"secret" not in body
+    Internal.model_validate_json(body)
 
 
 def test_an_unknown_distance_is_null() -> None:
-    content = json.loads(problem_reply(ERRORS[4], "the-id").body)
+    content = json.loads(sent(ERRORS[4]))
     assert content["distance"] is None
     UnreachablePose.model_validate(content)
 
 
 def test_every_exception_of_the_table_is_an_error_of_ours() -> None:
-    assert all(kind.__module__ in ("app.errors", "optimizer.exceptions") for kind in TABLE)
+    assert all(kind.__module__ in ("app.exceptions", "optimizer.exceptions") for kind in TABLE)

@@ -8,20 +8,25 @@ import socket
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
+from contextlib import ExitStack
+from typing import Any, TypeVar
 
 import httpx2
 import pytest
 
 from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
 from app.schemas.response import OptimizeResponse
-from tests.app.live import EXIT, WARM_UP, Server, alive, serving
+from tests.app.live import ANSWER, EXIT, WARM_UP, Server, alive, processor_time, serving
 from tests.app.requests import EXAMPLES, long_search, move
 
-# What /healthz may take while the workers are at it [s]. Alone it takes 2 ms; two busy cores are shared here.
-PROMPT = 1.0
-# the slack that a test on a busy machine leaves to anything [s]
-PATIENCE = 10.0
+T = TypeVar("T")
+
+# What a busy machine may take for anything below [s]; no test waits for it to pass.
+PATIENCE = 60.0
+# A deadline that a busy machine does not reach before a test is through with the request [s].
+LONG = 30.0
+# Processor time that only a worker with a task uses [s].
+AT_WORK = 0.1
 
 
 def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
@@ -31,16 +36,39 @@ def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
         time.sleep(0.05)
 
 
+def received(server: Server) -> int:
+    """Number of requests to /optimize so far."""
+    return sum(entry["message"] == "received" and entry["path"] == "/optimize" for entry in server.logged())
+
+
 def in_background(pool: ThreadPoolExecutor, server: Server, body: Any, count: int = 1) -> list[Future[httpx2.Response]]:
     """Requests that the server has received."""
-
-    def received() -> int:
-        return sum(entry["message"] == "received" and entry["path"] == "/optimize" for entry in server.logged())
-
-    expected = received() + count
+    expected = received(server) + count
     futures = [pool.submit(server.post, "/optimize", body) for _ in range(count)]
-    until(lambda: received() >= expected)
+    until(lambda: received(server) >= expected)
     return futures
+
+
+def start_work(server: Server, start: Callable[[], T], workers: int) -> T:
+    """What `start` returns, once that many workers are at work on it; all were idle."""
+    before = {pid: processor_time(pid) for pid in server.workers()}
+
+    def at_work() -> int:
+        return sum(processor_time(pid) > used + AT_WORK for pid, used in before.items())
+
+    started = start()
+    until(lambda: at_work() >= workers)
+    return started
+
+
+def until_replaced(server: Server, before: list[int], count: int) -> None:
+    """Until that many of the workers have been killed, and others are warm in their place."""
+
+    def replaced() -> bool:
+        now = server.workers()
+        return len(now) == len(before) and len(set(before) - set(now)) == count
+
+    until(replaced)
 
 
 def test_answers(server: Server) -> None:
@@ -50,65 +78,73 @@ def test_answers(server: Server) -> None:
 
 
 def test_long_requests_hold_up_nobody(server: Server) -> None:
-    with ThreadPoolExecutor() as pool:
-        (long,) = in_background(pool, server, long_search(deadline=6))
+    before = server.workers()
+    with start_work(server, lambda: server.open("/optimize", long_search(LONG)), workers=1) as long:
         for _ in range(20):
-            began = time.monotonic()
             assert server.get("/healthz").status_code == 200
-            assert time.monotonic() - began < PROMPT
         assert server.post("/optimize", move()).status_code == 200
-        assert not long.done(), "the other worker answered meanwhile"
-        answer = long.result()
-    # what was found by the deadline
+        assert not long.answered, "the other worker answered meanwhile"
+    until_replaced(server, before, 1)
+
+
+def test_a_deadline_over_http_gives_what_was_found(server: Server) -> None:
+    answer = server.post("/optimize", long_search(deadline=6))
     assert answer.status_code == 200
     assert answer.json()["status"] == "feasible"
-    assert answer.json()["solver"]["wall_time"] < 6 + PATIENCE
 
 
 def test_refuses_what_it_cannot_queue(server: Server) -> None:
     # 2 workers and 4 places in the queue
-    with ThreadPoolExecutor(8) as pool:
-        answers = [future.result() for future in in_background(pool, server, long_search(deadline=2), 8)]
-    refused = [answer for answer in answers if answer.status_code == 503]
-    assert len(refused) == 2
-    for answer in refused:
+    before = server.workers()
+    with ExitStack() as connections:
+        requests = [connections.enter_context(server.open("/optimize", long_search(LONG))) for _ in range(8)]
+        until(lambda: sum(request.answered for request in requests) == 2)
+        assert [request.status() for request in requests if request.answered] == [503, 503]
+        answer = server.post("/optimize", move())
         Busy.model_validate_json(answer.content)
         assert int(answer.headers["retry-after"]) > 0
-    for answer in answers:
-        if answer.status_code == 504:  # its deadline passed in the queue
-            DeadlineExceeded.model_validate_json(answer.content)
-        else:
-            assert answer.status_code in (200, 503)
+    until_replaced(server, before, 2)
+    assert server.post("/optimize", move()).status_code == 200, "whoever hangs up leaves the queue"
+
+
+def test_a_deadline_that_passes_in_the_queue(server: Server) -> None:
+    before = server.workers()
+    with ExitStack() as connections:
+
+        def fill() -> None:
+            for _ in range(2):
+                connections.enter_context(server.open("/optimize", long_search(LONG)))
+
+        start_work(server, fill, workers=2)
+        DeadlineExceeded.model_validate_json(server.post("/optimize", move(deadline=0.5)).content)
+    until_replaced(server, before, 2)
 
 
 def test_a_crash_fails_its_request_only(server: Server) -> None:
-    before = set(server.workers())
+    before = server.workers()
     assert len(before) == 2
     with ThreadPoolExecutor() as pool:
         # two, so that the one worker that is killed has one of them
-        futures = in_background(pool, server, long_search(deadline=3), 2)
-        time.sleep(0.3)  # until the workers have them
-        os.kill(before.pop(), signal.SIGKILL)
+        futures = start_work(server, lambda: in_background(pool, server, long_search(deadline=6), 2), workers=2)
+        os.kill(before[0], signal.SIGKILL)
         answers = [future.result() for future in futures]
     assert sorted(answer.status_code for answer in answers) == [200, 500]
     Internal.model_validate_json(next(answer.content for answer in answers if answer.status_code == 500))
-    until(lambda: len(server.workers()) == 2)
+    until_replaced(server, before, 1)
     assert server.post("/optimize", move()).status_code == 200
 
 
 def test_hanging_up_frees_the_worker(server: Server) -> None:
-    before = set(server.workers())
-    with pytest.raises(httpx2.TimeoutException):
-        httpx2.post(
-            server.url + "/optimize", json=long_search(deadline=30), timeout=1, headers={"X-Request-ID": "gone"}
-        )
-    until(lambda: bool(before - set(server.workers())))
+    before = server.workers()
+    headers = {"X-Request-ID": "gone"}
+    with start_work(server, lambda: server.open("/optimize", long_search(LONG), **headers), workers=1):
+        assert before == server.workers()
     until(lambda: any(entry.get("request_id") == "gone" and entry.get("status") == 499 for entry in server.logged()))
-    until(lambda: len(server.workers()) == 2)
+    until_replaced(server, before, 1)
 
 
 def test_a_large_body_is_answered_before_it_is_sent(server: Server) -> None:
-    answer = httpx2.post(server.url + "/optimize", content=b" " * 20_000_000, timeout=30)
+    answer = httpx2.post(server.url + "/optimize", content=b" " * 20_000_000, timeout=ANSWER)
     assert answer.status_code == 413
     BodyTooLarge.model_validate_json(answer.content)
 
@@ -137,9 +173,10 @@ def test_survives_garbage_on_the_socket(server: Server) -> None:
 
 
 def test_sigterm_answers_or_refuses_all_in_flight() -> None:
-    with serving(workers=2, queue_size=4, shutdown_grace=3) as server, ThreadPoolExecutor(5) as pool:
-        short = in_background(pool, server, long_search(deadline=2), 2)
-        waiting = in_background(pool, server, long_search(deadline=20), 3)
+    # the grace is ample for the short ones on a busy machine, and too short for those that wait
+    with serving(workers=2, queue_size=4, shutdown_grace=10) as server, ThreadPoolExecutor(5) as pool:
+        short = start_work(server, lambda: in_background(pool, server, long_search(deadline=3), 2), workers=2)
+        waiting = in_background(pool, server, long_search(deadline=60), 3)
         everyone = server.descendants()
         # a service manager signals every process
         for pid in everyone:
@@ -167,7 +204,7 @@ def test_sigterm_while_the_workers_warm_up() -> None:
 def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
-        (future,) = in_background(pool, server, long_search(deadline=1.5))
+        (future,) = in_background(pool, server, long_search(deadline=4))
         # a terminal signals the whole foreground group
         for pid in (*everyone, server.process.pid):
             os.kill(pid, signal.SIGINT)
@@ -180,8 +217,7 @@ def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
 def test_workers_do_not_outlive_a_killed_parent() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
-        future = pool.submit(server.post, "/optimize", long_search(deadline=30))
-        time.sleep(0.5)
+        (future,) = start_work(server, lambda: in_background(pool, server, long_search(LONG)), workers=1)
         server.process.kill()
         until(lambda: not any(alive(pid) for pid in everyone))
         assert isinstance(future.exception(), httpx2.TransportError)

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+from tests.app.live import ROOT
+
+EXAMPLES = ROOT / "examples"
 FILES = sorted(EXAMPLES.rglob("*.json"))
 
 

@@ -16,7 +16,7 @@ from app.schemas import errors as problems
 from app.schemas.studies import IterationDetail, Study, StudyList, StudySummary
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.live import Server, serving
-from tests.app.requests import move
+from tests.app.requests import HOME, NEAR, move
 
 ABSENT = "5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
 LINE = {"optimize": move(method="time_scaling")}
@@ -124,6 +124,27 @@ def test_the_history_as_a_table(client: TestClient, three: Any) -> None:
         assert float(row["duration_s"]) == entry["duration"]
         assert (float(row["change_from_last_J"]) if row["change_from_last_J"] else None) == entry["change_from_last"]
         assert row["threshold_met"] == str(entry["threshold_met"]).lower()
+
+
+FAR = {"pose": {"position": [2.0, 0.0, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+TIMES = {"t": [0.0, 1.0, 1.0, 2.0, 3.0], "q": [HOME, NEAR, NEAR, HOME, NEAR]}
+
+
+@pytest.mark.parametrize(
+    ("body", "kind"),
+    [
+        ({"optimize": move(goal={"any_of": [FAR, FAR]})}, problems.UnreachableTargets),
+        ({"evaluate": {"trajectory": TIMES}}, problems.InvalidTable),
+    ],
+)
+def test_what_either_endpoint_refuses_is_documented(
+    client: TestClient, body: Any, kind: type[problems.Problem]
+) -> None:
+    answer = client.post(f"{begin(client)}/iterations", json=body)
+    kind.model_validate_json(answer.content)
+    responses = client.get("/openapi.json").json()["paths"]["/studies/{id}/iterations"]["post"]["responses"]
+    schema = responses[str(answer.status_code)]["content"]["application/problem+json"]["schema"]
+    assert answer.json()["type"] in schema["discriminator"]["mapping"]
 
 
 def test_a_failed_request_leaves_no_trace(client: TestClient) -> None:

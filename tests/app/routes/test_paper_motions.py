@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,8 @@ from starlette.testclient import TestClient
 
 from benchmarks import paper
 from models.robot import Array
+from tests.app.live import ROOT
 
-ROOT = Path(__file__).parents[2]
 PRINTED = np.loadtxt(ROOT / "tests" / "reference" / "paper_table3_power.csv", delimiter=",", skiprows=1)[:, 1]
 # printed figures may differ by rounding in their last digit, optimised ones by what solvers make of another machine
 LAST_DIGIT = 1.01

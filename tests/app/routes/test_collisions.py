@@ -17,8 +17,8 @@ from optimizer.collision.model import CollisionModel
 from optimizer.nlp.clearance_constraint import RESERVE
 from optimizer.problem.arm import Arm
 from tests.app.requests import EXAMPLES, HOME, move
-from tests.app.test_examples import EXAMPLES as FILES
-from tests.app.test_problems import DOWN, refused
+from tests.app.routes.test_examples import EXAMPLES as FILES
+from tests.app.routes.test_problems import DOWN, refused
 from tests.optimizer.moves import ROBOT
 
 # a far obstacle may cost no more than this share of the energy

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-EXAMPLE = json.loads((Path(__file__).parents[2] / "examples" / "ik" / "table_and_post.json").read_text())
+from tests.app.live import ROOT
+
+EXAMPLE = json.loads((ROOT / "examples" / "ik" / "table_and_post.json").read_text())
 BOX = {"name": "box", "shape": "box", "size": [0.1, 0.1, 0.1]}
 
 

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 from app.schemas.errors import UnreachableTargets
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, NEAR, move
-from tests.app.test_validation import POSE, refused
+from tests.app.routes.test_validation import POSE, refused
 
 FAR = {"pose": {"position": [2.0, 0.0, 0.3], "rpy": [0.0, 0.0, 0.0]}}
 

@@ -9,15 +9,17 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.convert.pose import to_matrix
+from app.main import create_app
 from app.schemas import errors as problems
 from app.schemas.common import QuaternionPose
 from app.schemas.suggestions import Suggestions
+from app.settings import Settings
 from models.registry import load_robot
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.tcp import rotated_poses
 from optimizer.problem.arm import Arm
 from tests.app.requests import HOME, NEAR, move
-from tests.app.test_studies import ABSENT, SECRET, added, begin
+from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
 
 SAME = 1e-9
 """Relative: the optimiser computes the same from the same request; clocks only tell it when to stop."""
@@ -209,6 +211,17 @@ def test_what_cannot_be_is_listed(client: TestClient) -> None:
     assert [(entry["step"], entry["problem"]) for entry in content["not_computed"]] == [
         ("duration", "duration-too-short")
     ]
+
+
+def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
+    path = begin(client)
+    added(client, path, {"optimize": move()})
+    with TestClient(create_app(Settings(workers=1)), raise_server_exceptions=False) as stopping:
+        assert stopping.portal is not None
+        stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
+        answer = stopping.get(f"{path}/suggest")
+    assert answer.status_code == 503
+    problems.ShuttingDown.model_validate_json(answer.content)
 
 
 def test_an_empty_study_has_no_next_step(client: TestClient) -> None:

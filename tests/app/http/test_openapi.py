@@ -86,6 +86,16 @@ def test_no_error_model_of_the_framework_is_left(document: dict[str, Any]) -> No
     assert "HTTPValidationError" not in repr(document)
 
 
+def test_every_deadline_is_the_services() -> None:
+    document = create_app(Settings(max_deadline=7.5)).openapi()
+    bodies = {name: schema for name, schema in properties(document) if name.endswith(".deadline")}
+    assert bodies.keys() >= {f"{kind}Request.deadline" for kind in ("Optimize", "Compare", "Pareto", "Whatif")}
+    assert {(schema["maximum"], schema["default"]) for schema in bodies.values()} == {(7.5, 7.5)}
+    parameters = document["paths"]["/studies/{id}/suggest"]["get"]["parameters"]
+    (query,) = [parameter["schema"] for parameter in parameters if parameter["name"] == "deadline"]
+    assert [option.get("maximum") for option in query["anyOf"]] == [7.5, None]
+
+
 def test_version_is_the_projects(document: dict[str, Any]) -> None:
     assert document["info"]["version"] == __version__
     assert f'version = "{__version__}"' in (ROOT / "pyproject.toml").read_text()

@@ -13,8 +13,8 @@ from app.schemas.evaluate import EvaluateResponse
 from app.schemas.response import OptimizeResponse
 from app.schemas.whatif import WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
-from app.store import keep as kept_answers
-from app.tasks.stored_answers import AnswerCollector
+from app.tasks import answer_collector
+from app.tasks.answer_collector import AnswerCollector
 from tests.app.requests import HOME, NEAR, move
 from tests.optimizer.moves import tcp_pose
 
@@ -258,7 +258,7 @@ def change(**arm: Any) -> dict[str, Any]:
         ({"changes": []}, ["changes"]),
         ({"changes": [{"name": f"{k}", "arm": {"payload": None}} for k in range(17)]}, ["changes"]),
         ({"changes": [{"name": "twice", "arm": {"payload": None}}] * 2}, ["changes"]),
-        ({"changes": [{"name": "\x7fkept/0\x7f", "arm": {"payload": None}}]}, ["changes", 0, "name"]),
+        ({"changes": [{"name": "\x7fstored/0\x7f", "arm": {"payload": None}}]}, ["changes", 0, "name"]),
         ({"evaluate": GIVEN}, []),
         ({"optimize": None}, []),
         ({"optimize": LIFT | {"limits": {"velocity": [1.0]}}}, ["optimize", "limits", "velocity"]),
@@ -280,12 +280,12 @@ def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
 
 
 def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept_answers, "MOST_BYTES", 25)
-    shelf = AnswerCollector()
-    marks = [shelf.add({"v": 1.5}) for _ in range(2)]
-    assert len(set(marks)) == len(shelf.kept()) == 2
+    monkeypatch.setattr(answer_collector, "MOST_BYTES", 25)
+    collector = AnswerCollector()
+    placeholders = [collector.add({"v": 1.5}) for _ in range(2)]
+    assert len(set(placeholders)) == len(collector.stored) == 2
     with pytest.raises(InvalidRequest):
-        shelf.add({"v": 1.5})
+        collector.add({"v": 1.5})
 
 
 @pytest.mark.parametrize("name", WHATIF_EXAMPLES)

@@ -1,0 +1,33 @@
+"""What the service provides to its routes. The only module of this room that reads the application's state."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from app.engine.pool import Engine
+from app.settings import Settings
+from app.store.store import Store
+
+# coroutines, because FastAPI would run plain functions in a thread
+
+
+async def _settings(request: Request) -> Settings:
+    settings: Settings = request.app.state.settings
+    return settings
+
+
+async def _engine(request: Request) -> Engine:
+    engine: Engine = request.app.state.engine
+    return engine
+
+
+async def _store(request: Request) -> Store:
+    store: Store = request.app.state.store
+    return store
+
+
+ServiceSettings = Annotated[Settings, Depends(_settings)]
+ServiceEngine = Annotated[Engine, Depends(_engine)]
+ServiceStore = Annotated[Store, Depends(_store)]

@@ -1,0 +1,30 @@
+"""Lists of problems that several routes return."""
+
+from __future__ import annotations
+
+from app.schemas import errors as problems
+
+WORKER_PROBLEMS: tuple[type[problems.Problem], ...] = (
+    problems.Validation,
+    problems.UnknownRobot,
+    problems.BodyTooLarge,
+    problems.Busy,
+    problems.ShuttingDown,
+    problems.DeadlineExceeded,
+)
+"""Of every request that a worker computes."""
+
+MOTION_PROBLEMS: tuple[type[problems.Problem], ...] = (
+    *WORKER_PROBLEMS,
+    problems.UnreachablePose,
+    problems.SingularPose,
+    problems.UnreachableTargets,
+    problems.OutsideLimits,
+    problems.StartInCollision,
+    problems.GoalInCollision,
+    problems.DurationTooShort,
+    problems.TorqueInfeasible,
+    problems.NoTrajectory,
+    problems.NoCollisionFreeTrajectory,
+)
+"""Of every request that optimises a motion."""

@@ -1,0 +1,38 @@
+"""The quantities of a motion on a changed arm, and their differences from those of the base."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from app.convert.fields import fields
+from optimizer.certificate import ENERGY_FLOOR
+from optimizer.solution import ElectricalEnergy, Energy
+
+
+def quantities(energy: Energy, duration: float) -> dict[str, Any]:
+    """The quantities that base and changes are compared by [s, J, W]; `electrical` is a dict of its parts."""
+    return {
+        "duration": duration,
+        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+        "mechanical": energy.mechanical.total,
+        **fields(energy, "mean_power", "peak_power"),
+    }
+
+
+def differences(base: dict[str, Any], energy: Energy, duration: float) -> dict[str, Any]:
+    """The quantities of a motion, each as value, difference and relative difference from that of the base."""
+    return {
+        name: {part: _difference(base[name][part], value[part]) for part in value}
+        if isinstance(value, dict)
+        else _difference(base[name], value)
+        for name, value in quantities(energy, duration).items()
+    }
+
+
+def _difference(base: float, value: float) -> dict[str, Any]:
+    difference = value - base
+    return {
+        "value": value,
+        "difference": difference,
+        "relative": difference / abs(base) if abs(base) > ENERGY_FLOOR else None,
+    }

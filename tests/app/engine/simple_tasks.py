@@ -1,0 +1,77 @@
+"""Tasks for the engine that optimise nothing. In a module of their own, because workers import it."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.engine.result import TaskResult
+
+
+def text(value: object) -> TaskResult:
+    return TaskResult(str(value).encode(), "text/plain")
+
+
+@dataclass(frozen=True)
+class ProcessId:
+    """The worker's process id."""
+
+    request_id: str = "process-id"
+
+    def run(self, deadline: float) -> TaskResult:
+        return text(os.getpid())
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Keeps its worker busy, whatever the deadline, until the file `released` is in the folder; then its process id."""
+
+    folder: Path
+    request_id: str = "hold"
+
+    def run(self, deadline: float) -> TaskResult:
+        (self.folder / "started").touch()
+        while not (self.folder / "released").exists():
+            time.sleep(0.01)
+        return text(os.getpid())
+
+
+@dataclass(frozen=True)
+class TimeLeft:
+    """The time until its deadline [s]."""
+
+    request_id: str = "time-left"
+
+    def run(self, deadline: float) -> TaskResult:
+        return text(deadline)
+
+
+@dataclass(frozen=True)
+class Die:
+    """Ends its worker as a crash in native code does."""
+
+    request_id: str = "die"
+
+    def run(self, deadline: float) -> TaskResult:
+        os.abort()
+
+
+@dataclass(frozen=True)
+class Fail:
+    """Raises an exception."""
+
+    error: Exception
+    request_id: str = "fail"
+
+    def run(self, deadline: float) -> TaskResult:
+        raise self.error
+
+
+def no_warm_up() -> None:
+    pass
+
+
+def failing_warm_up() -> None:
+    raise RuntimeError("no kernel")
