@@ -1,9 +1,10 @@
 # Every target does its own set-up: nothing but Python 3.11 or newer and make has to be there.
-#   make serve   the service on http://HOST:PORT
-#   make test    every check: lint, types, architecture, tests
-#   make bench   the benchmarks
-#   make lock    renew the lockfiles
-#   make clean   remove what these made
+#   make serve      the service on http://HOST:PORT
+#   make test       every check: lint, types, architecture, tests
+#   make test-long  the same, and the tests that take minutes
+#   make bench      the benchmarks
+#   make lock       renew the lockfiles
+#   make clean      remove what these made
 
 PYTHON ?= python3
 HOST ?= 127.0.0.1
@@ -21,13 +22,17 @@ endif
 
 export PYTHONUNBUFFERED := 1
 
-.PHONY: serve test bench lock clean lint kernels
+.PHONY: serve test test-long bench lock clean lint kernels
 
 serve: $(VENV)/.runtime kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
 test: lint kernels
 	$(PY) -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
+
+# an empty marker expression takes back the deselection in pyproject.toml
+test-long: lint kernels
+	$(PY) -m pytest -n auto --dist loadfile -m "" $(PYTEST_ARGS)
 
 lint: $(VENV)/.dev
 	$(PY) -m ruff check $(SOURCES)

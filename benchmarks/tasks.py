@@ -70,7 +70,7 @@ def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -
     robot = load_robot("ur5e")
     rng = np.random.default_rng([seed, index])
     kind = KINDS[index % len(KINDS)] if kind is None else kind
-    q_start, q_goal = _apart(rng, robot), _apart(rng, robot)
+    q_start, q_goal = collision_free(rng, robot), collision_free(rng, robot)
     T_start, T_goal = flange(robot, q_start), flange(robot, q_goal)
     start = {"q": q_start.tolist()} if kind == "joint to pose" else {"pose": as_pose(T_start)}
     body: dict[str, Any] = {"robot": robot.name, "start": start, "goal": {"pose": as_pose(T_goal)}}
@@ -79,7 +79,7 @@ def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -
     return Ask(seed, index, kind, body, T_start, T_goal)
 
 
-def _apart(rng: np.random.Generator, robot: Robot) -> Array:
+def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
     """A configuration (nq,) in which no link touches another."""
     model = CollisionModel(Arm(robot=robot))
     while True:

@@ -1,7 +1,6 @@
-"""Finds a robot arm's motion of least energy. A library: `optimize(Problem(arm=Arm(robot), start=…, goal=…))` gives a
-`Solution`.
+"""Finds the motion of least energy of a robot arm: `optimize(Problem(arm=…, start=…, goal=…))` returns a `Solution`.
 
-The names below are the public ones; robots and their figures are in `models`.
+The names below are the public ones. Robots and their parameters are in `models`.
 """
 
 from models.registry import load_robot

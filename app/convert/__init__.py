@@ -1,0 +1,1 @@
+"""Translation between the schemas and the dataclasses of the library, in both directions."""

@@ -1,1 +1,1 @@
-"""The HTTP contract as pydantic models."""
+"""The HTTP contract as pydantic models: types, units, ranges, examples."""

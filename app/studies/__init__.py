@@ -1,0 +1,1 @@
+"""Progress, suggestions and histories of studies."""

@@ -1,0 +1,1 @@
+"""Bodies, signed distances, the clearance proof in continuous time, and the path planner."""

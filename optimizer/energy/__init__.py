@@ -1,0 +1,1 @@
+"""Torques, losses, the power bus, and the compiled kernel."""

@@ -1,0 +1,1 @@
+"""The nonlinear program of one candidate, and its SQP solver."""

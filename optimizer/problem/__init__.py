@@ -1,0 +1,1 @@
+"""What is asked: frozen, validated data that computes nothing."""

@@ -1,0 +1,1 @@
+"""Branch and bound over candidates: ends, lower bounds, incumbent, refinement, baselines."""

@@ -1,0 +1,1 @@
+"""A motion as a function of time: splines, time scalings, quadrature, retiming."""

@@ -1,0 +1,1 @@
+"""The console command `joulepath`: the service, and its requests without HTTP."""

@@ -1,0 +1,112 @@
+"""From the bytes of a request to those of its answer, by the schemas and tasks of the service."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import uuid
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+import orjson
+
+if TYPE_CHECKING:
+    from app.engine.task import Task
+    from app.schemas.common import Request
+
+M = TypeVar("M", bound="Request")
+
+FILE: Callable[[Any], Any] = click.argument("file", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
+OUTPUT: Callable[[Any], Any] = click.option(
+    "--output",
+    "-o",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the answer to this file instead of standard output.",
+)
+
+
+class Refused(Exception):
+    """The request is answered with a problem: `problem` is its JSON (RFC 9457)."""
+
+    def __init__(self, problem: bytes) -> None:
+        super().__init__(problem)
+        self.problem = problem
+
+
+def new_id() -> str:
+    """An id for a request: its answer or its problem holds it."""
+    return str(uuid.uuid4())
+
+
+def content_of(file: str) -> bytes:
+    """The bytes of a file, or of standard input for `-`."""
+    return sys.stdin.buffer.read() if file == "-" else Path(file).read_bytes()
+
+
+def validated(model: type[M], body: bytes, request_id: str) -> M:
+    """The request in a JSON body. Raises Refused."""
+    from pydantic import ValidationError
+
+    from app.http.problem_details import invalid_request
+
+    try:
+        return model.model_validate_json(body)
+    except ValidationError as error:
+        errors = error.errors(include_url=False, include_context=False, include_input=False)
+        raise _refused(invalid_request(errors, "body"), request_id) from None
+
+
+def answered(task: Task, deadline: float, request_id: str) -> bytes:
+    """The answer of a task for which `deadline` [s] is left. Raises Refused."""
+    from app.exceptions import ServiceError
+    from optimizer.exceptions import JoulepathError
+
+    try:
+        return task.run(deadline).document
+    except (JoulepathError, ServiceError) as error:
+        raise _refused(error, request_id) from None
+
+
+def _refused(error: Exception, request_id: str) -> Refused:
+    from app.engine.result import json_document
+    from app.http.problem_details import problem_content
+
+    return Refused(json_document(problem_content(error, request_id)))
+
+
+def compile_kernel_of(robot_name: str) -> None:
+    """Compiles the robot's kernel if the cache does not have it: a process that ends earlier would leave none.
+
+    Without a C compiler, and for a robot that nobody knows, nothing happens.
+    """
+    from models.registry import load_robot, robot_names
+    from optimizer.energy.kernel_cache import compile_kernel
+
+    if robot_name not in robot_names():
+        return
+    try:
+        compile_kernel(load_robot(robot_name))
+    except (RuntimeError, OSError):
+        return  # CasADi's virtual machine evaluates the same expressions
+
+
+def write(answer: bytes, output: Path | None) -> None:
+    """Writes an answer to a file, or to standard output. Raises click.FileError."""
+    if output is None:
+        # a reader that ends first ends this process silently, as it does with the shell's own tools
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+        sys.stdout.buffer.write(answer if answer.endswith(b"\n") else answer + b"\n")
+        sys.stdout.buffer.flush()
+        return
+    try:
+        output.write_bytes(answer)
+    except OSError as error:
+        raise click.FileError(str(output), error.strerror or "") from None
+
+
+def parsed(answer: bytes) -> dict[str, Any]:
+    """The fields of a JSON answer."""
+    content: dict[str, Any] = orjson.loads(answer)
+    return content

@@ -1,0 +1,105 @@
+"""`joulepath evaluate`."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any, Literal
+
+import click
+import orjson
+
+from app.cli import terminal
+from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, write
+
+Kind = Literal["json", "csv"]
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  joulepath evaluate motion.json
+  joulepath evaluate log.csv --units deg --settings arm.json --format csv --output energies.csv"""
+)
+@FILE
+@OUTPUT
+@click.option("--input", "given", type=click.Choice(["json", "csv"]), help="Kind of FILE. Default: by its name, json.")
+@click.option("--format", "wanted", type=click.Choice(["json", "csv"]), default="json", help="Kind of the answer.")
+@click.option(
+    "--settings",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="JSON file with the fields of the request that accompany a CSV: robot, payload, time_per_segment, ...",
+)
+@click.option("--robot", help="With a CSV: name of the robot.")
+@click.option("--units", type=click.Choice(["rad", "deg"]), help="With a CSV: units of all joint columns.")
+@click.option("--time-per-segment", type=float, help="With a CSV without a column t: time between two rows [s].")
+@click.option(
+    "--interpolation",
+    type=click.Choice(["linear", "trapezoid", "quintic", "spline"]),
+    help="With a CSV without a column t: motion between two rows.",
+)
+@click.option("--sample-period", type=float, help="With a CSV: time between the samples to return [s].")
+@click.option("--deadline", type=click.FloatRange(0, min_open=True), default=120.0, help="Longest wall time [s].")
+def evaluate(
+    file: str,
+    output: Path | None,
+    given: Kind | None,
+    wanted: Kind,
+    settings: Path | None,
+    deadline: float,
+    **options: Any,
+) -> None:
+    """Computes the energy of a given motion, and the limits that it violates.
+
+    FILE is the JSON of `POST /evaluate`, a CSV with one column per joint and optionally a column t, or - for standard
+    input. Options win over the fields of `--settings`.
+    """
+    kind = given or ("csv" if file.lower().endswith(".csv") else "json")
+    query = {name: value for name, value in options.items() if value is not None}
+    if kind == "json" and (query or settings is not None):
+        named = "--settings" if settings is not None else f"--{next(iter(query)).replace('_', '-')}"
+        raise click.UsageError(f"{named} is for a CSV: put the field into the JSON of FILE.")
+    fields = (_settings_in(settings) if settings is not None else {}) | query
+    with tempfile.NamedTemporaryFile(prefix="joulepath-", suffix=f".{kind}") as copy:
+        copy.write(content_of(file))
+        copy.flush()
+        answer = _answer(copy.name, kind, fields, wanted, deadline)
+    write(answer, output)
+    if wanted == "json":
+        terminal.summary(lambda: summary_of(parsed(answer)))
+
+
+def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadline: float) -> bytes:
+    from app.tasks.evaluate import EvaluateTask
+
+    # as the query of POST /evaluate has them: each is JSON
+    query = {name: orjson.dumps(value).decode() for name, value in fields.items()}
+    request_id = new_id()
+    with terminal.progress(f"Evaluating for at most {deadline:g} s"):
+        return answered(EvaluateTask(file, kind, query, wanted, request_id), deadline, request_id)
+
+
+def _settings_in(file: Path) -> dict[str, Any]:
+    """The fields of a settings file. Raises click.UsageError."""
+    try:
+        fields = parsed(file.read_bytes())
+    except orjson.JSONDecodeError:
+        fields = None
+    if not isinstance(fields, dict):
+        raise click.UsageError("--settings must name a file that holds one JSON object.")
+    return fields
+
+
+def summary_of(answer: dict[str, Any]) -> dict[str, str]:
+    """The lines of the summary by their titles."""
+    energy = answer["total"]["energy"]
+    violated = [check["limit"] for check in answer["limits"] if not check["held"]]
+    nearest = answer["nearest"]
+    return {
+        "energy": f"{energy['electrical']['total']:.4g} J electrical, {energy['mechanical']['total']:.4g} J mechanical",
+        "duration": f"{answer['duration']:.4g} s",
+        "violated limits": ", ".join(violated) or "none",
+        "least distance": "not checked"
+        if nearest is None
+        else f"{nearest['distance']:.4f} m, {' and '.join(nearest['pair'])}",
+    }

@@ -1,0 +1,58 @@
+"""The command group, and the exit code of every way in which a command can end."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from app import __version__
+from app.cli.answer import Refused
+from app.cli.evaluate import evaluate
+from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
+from app.cli.optimize import optimize
+from app.cli.robots import robots
+from app.cli.serve import serve
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog="""\b
+Exit codes:
+    0  the answer is written
+    1  the request is valid, and the answer is a problem: no motion, deadline passed, ...
+    2  wrong usage or invalid input: problems validation, invalid-table and unknown-robot
+  130  interrupted by Ctrl-C
+  141  the program that reads standard output has ended (SIGPIPE)
+
+\b
+Example:
+  joulepath optimize request.json > answer.json""",
+)
+@click.version_option(__version__, prog_name="joulepath")
+def joulepath() -> None:
+    """Finds the motion of least energy of a robot arm, with its energy breakdown and a certificate.
+
+    Requests and answers are those of the HTTP service. SI units throughout: m, rad, s, kg, N·m, W, J. A request that
+    fails writes its problem (RFC 9457) to standard error.
+    """
+
+
+for command in (serve, optimize, evaluate, robots):
+    joulepath.add_command(command)
+
+
+def main() -> None:
+    """Runs the command and exits with its code."""
+    try:
+        code = joulepath.main(prog_name="joulepath", standalone_mode=False) or ANSWERED
+    except Refused as refusal:
+        click.echo(refusal.problem, err=True)
+        code = of_problem(refusal.problem)
+    except click.ClickException as error:
+        error.show()
+        # click's own code for a file that cannot be written is 1
+        code = INVALID
+    except (click.Abort, KeyboardInterrupt):
+        code = INTERRUPTED
+    sys.exit(code)

@@ -1,0 +1,165 @@
+"""Least energies of seeded tasks with an ample deadline: what a change of the code must not change.
+
+    python -m benchmarks.energies --count 200 --json build/energies.json
+    python -m benchmarks.energies --count 200 --compare build/energies.json
+
+Five kinds of tasks take turns: joint to joint, joint to pose, the mechanical objective, a payload, and the cells of
+`benchmarks.cells`. The library solves each of them. `--compare` exits with 1 if the task, the outcome or the energy of
+an index differs from the stored run. Energies may differ by RELATIVE.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import orjson
+
+from benchmarks.cells import cell_task
+from benchmarks.command import keep, on_one_core, parser
+from benchmarks.tasks import collision_free, flange
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.exceptions import JoulepathError
+from optimizer.optimize import optimize, warm_up
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+
+Kind = Literal["joint to joint", "joint to pose", "mechanical", "payload", "cell"]
+KINDS: tuple[Kind, ...] = ("joint to joint", "joint to pose", "mechanical", "payload", "cell")
+# so long that no search ends early, and its result does not depend on the machine [s]
+AMPLE = 600.0
+# rounding of reordered sums, amplified by the solver's convergence criterion: relative difference of two energies
+RELATIVE = 1e-6
+# of the numbers of a task (joints [rad], entries of the goal's matrix): rounding alone
+SAME_TASK = 1e-9
+# longest durations that mechanical tasks allow [s]
+MECHANICAL = (3.0, 6.0)
+
+
+def problem_of(seed: int, index: int) -> tuple[Kind, Problem]:
+    """Task `index` of a seed and its kind."""
+    kind, robot = KINDS[index % len(KINDS)], load_robot("ur5e")
+    if kind == "cell":
+        cell = cell_task(seed, index)
+        return kind, Problem(arm=cell.arm, start=cell.q_start, goal=Pose(cell.T_goal), deadline=AMPLE)
+    rng = np.random.default_rng([seed, index])
+    q_start, q_goal = collision_free(rng, robot), collision_free(rng, robot)
+    goal: Array | Pose = q_goal if kind == "joint to joint" else Pose(flange(robot, q_goal))
+    if kind == "mechanical":
+        longest = float(rng.uniform(*MECHANICAL))
+        # its lower bound rules out little: without full turns eight candidates remain, with them it takes minutes
+        return kind, Problem(
+            arm=Arm(robot=robot),
+            start=q_start,
+            goal=goal,
+            objective="mechanical",
+            duration_max=longest,
+            windings=False,
+            deadline=AMPLE,
+        )
+    payload = Payload()
+    if kind == "payload":
+        mass = float(rng.uniform(0.5, robot.rated_payload))
+        payload = Payload(mass=mass, com=rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.15]))
+    return kind, Problem(arm=Arm(robot=robot, payload=payload), start=q_start, goal=goal, deadline=AMPLE)
+
+
+def solve(seed: int, index: int) -> dict[str, Any]:
+    """The outcome of one task: energy of the objective [J] and duration [s], or the name of the error."""
+    kind, problem = problem_of(seed, index)
+    goal = problem.goal.T.ravel() if isinstance(problem.goal, Pose) else problem.goal
+    row: dict[str, Any] = {
+        "index": index,
+        "kind": kind,
+        "task": [*np.asarray(problem.start).tolist(), *np.asarray(goal).tolist()],
+        "outcome": "",
+        "energy": None,
+        "duration": None,
+    }
+    began = time.perf_counter()
+    try:
+        solution = optimize(problem)
+    except JoulepathError as error:
+        return row | {"outcome": type(error).__name__, "wall": time.perf_counter() - began}
+    energy = solution.energy
+    total = energy.electrical.total if problem.objective == "electrical" else energy.mechanical.total
+    return row | {
+        "outcome": solution.status,
+        "energy": total,
+        "duration": solution.duration,
+        "wall": time.perf_counter() - began,
+    }
+
+
+def relative_difference(row: dict[str, Any], other: dict[str, Any]) -> float:
+    """|difference| of two energies over the first; 0 if neither has one, inf if only one has."""
+    ours, theirs = row["energy"], other["energy"]
+    if ours is None or theirs is None:
+        return 0.0 if ours is theirs else float("inf")
+    return float(abs(ours - theirs) / max(abs(theirs), 1e-12))
+
+
+def differences(rows: Sequence[dict[str, Any]], stored: Sequence[dict[str, Any]]) -> list[str]:
+    """One message per index whose task, outcome or energy differs, or that is not stored."""
+    by_index = {row["index"]: row for row in stored}
+    messages = []
+    for row in rows:
+        name, other = f"index {row['index']} ({row['kind']})", by_index.get(row["index"])
+        if other is None:
+            messages.append(f"{name}: not in the stored run")
+        elif row["kind"] != other["kind"] or not same_task(row["task"], other["task"]):
+            messages.append(f"{name}: the task itself differs")
+        elif row["outcome"] != other["outcome"]:
+            messages.append(f"{name}: {row['outcome']}, stored {other['outcome']}")
+        # written so that NaN is a difference
+        elif not relative_difference(row, other) <= RELATIVE:
+            messages.append(
+                f"{name}: {row['energy']:.9g} J, stored {other['energy']:.9g} J: "
+                f"{relative_difference(row, other):.2g} relative"
+            )
+    return messages
+
+
+def same_task(numbers: Sequence[float], others: Sequence[float]) -> bool:
+    """Whether two tasks have the same start and goal up to rounding."""
+    return len(numbers) == len(others) and bool(np.allclose(numbers, others, rtol=0.0, atol=SAME_TASK))
+
+
+def main() -> int:
+    """Solve the tasks, print their energies, and compare."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--count", type=int, default=200, help="tasks (%(default)s)")
+    arguments.add_argument("--compare", type=Path, help="a stored run to compare with")
+    given = arguments.parse_args()
+    on_one_core()
+    compile_kernel(load_robot("ur5e"))
+    warm_up("ur5e")
+    rows = []
+    for index in range(given.count):
+        rows.append(row := solve(given.seed, index))
+        found = row["outcome"] if row["energy"] is None else f"{row['energy']:.6f} J, {row['outcome']}"
+        print(f"{index:4d} {row['kind']:14s} {found}, {row['wall']:.2f} s", flush=True)
+    keep(given.json, {"seed": given.seed, "tasks": rows})
+    if given.compare is None:
+        return 0
+    stored = orjson.loads(given.compare.read_bytes())
+    if stored["seed"] != given.seed:
+        raise SystemExit(f"{given.compare} holds seed {stored['seed']}: give --seed {stored['seed']}")
+    by_index = {row["index"]: row for row in stored["tasks"]}
+    known = [relative_difference(row, by_index[row["index"]]) for row in rows if row["index"] in by_index]
+    print(f"largest relative difference {max(known, default=0.0):.2g} over {len(known)} tasks")
+    messages = differences(rows, stored["tasks"])
+    for message in messages:
+        print(f"DIFFERENT: {message}")
+    return 1 if messages else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,355 @@
+"""The console command as a process: answers, problems, exit codes, and what a terminal shows."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.cli.main import main
+from app.schemas.evaluate import EvaluateResponse
+from app.schemas.evaluate_examples import EVALUATE_EXAMPLES
+from app.schemas.response import OptimizeResponse
+from app.settings import Settings
+from tests.app.requests import NEAR, long_search, move
+
+ROOT = Path(__file__).parents[3]
+COMMAND = [sys.executable, "-c", "from app.cli.main import main; main()"]
+CSV = ROOT / "examples" / "evaluate" / "paper_motion_1.csv"
+CSV_OPTIONS = ("--units", "deg", "--time-per-segment", "1.5")
+# a start of the interpreter with all imports, and a short optimisation, on a busy machine [s]
+PATIENCE = 60.0
+
+
+def environment(**others: str) -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": str(ROOT)} | others
+
+
+def run(*arguments: str, stdin: str = "", cwd: Path = ROOT) -> subprocess.CompletedProcess[bytes]:
+    """The command in a process of its own."""
+    return subprocess.run(
+        [*COMMAND, *arguments],
+        input=stdin.encode(),
+        capture_output=True,
+        cwd=cwd,
+        env=environment(),
+        timeout=PATIENCE,
+    )
+
+
+@dataclass
+class Here:
+    """The command in this process, which has everything imported; for runs that do not write an answer."""
+
+    monkeypatch: pytest.MonkeyPatch
+    capture: pytest.CaptureFixture[bytes]
+
+    def run(self, *arguments: str, stdin: str | bytes = b"") -> tuple[int, bytes, bytes]:
+        """Exit code, standard output and standard error."""
+        given = stdin.encode() if isinstance(stdin, str) else stdin
+        self.monkeypatch.setattr(sys, "argv", ["joulepath", *arguments])
+        self.monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(given)))
+        with pytest.raises(SystemExit) as exits:
+            main()
+        code = exits.value.code
+        assert isinstance(code, int)
+        shown = self.capture.readouterr()
+        return code, shown.out, shown.err
+
+    def problem(self, *arguments: str, stdin: str | bytes = b"") -> tuple[int, dict[str, Any]]:
+        """Exit code, and the problem on standard error when nothing is on standard output."""
+        code, out, err = self.run(*arguments, stdin=stdin)
+        assert out == b""
+        content: dict[str, Any] = json.loads(err)
+        assert {"type", "title", "status", "detail", "instance"} <= content.keys()
+        return code, content
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]) -> Here:
+    return Here(monkeypatch, capfdbinary)
+
+
+def request(**fields: Any) -> str:
+    return json.dumps(move(**fields))
+
+
+def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
+    file = tmp_path / "request.json"
+    file.write_text(request())
+    finished = run("optimize", str(file), cwd=tmp_path)
+    assert (finished.returncode, finished.stderr) == (0, b"")
+    answer = OptimizeResponse.model_validate_json(finished.stdout)
+    assert answer.status == "optimal"
+    assert answer.trajectory.q[-1] == pytest.approx(NEAR)
+
+
+def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None:
+    output = tmp_path / "answer.json"
+    finished = run("optimize", "-", "--output", str(output), stdin=request())
+    assert (finished.returncode, finished.stdout, finished.stderr) == (0, b"", b"")
+    OptimizeResponse.model_validate_json(output.read_bytes())
+
+
+@pytest.mark.parametrize(
+    ("body", "loc"),
+    [
+        ("{", ["body"]),
+        ("", ["body"]),
+        (b"\xff\xfe", ["body"]),
+        (request().replace("-1.57", "NaN", 1), ["body", "start", "q", 1]),
+        (request(limits={"velocity": 1e300}), ["body", "limits", "velocity"]),
+        (request(limits={"velocity": -1.0}), ["body", "limits", "velocity"]),
+        (request(deadline=1e9), ["body", "deadline"]),
+        (request(colour="red"), ["body"]),
+    ],
+)
+def test_an_invalid_request_is_a_validation_problem(here: Here, body: str | bytes, loc: list[str | int]) -> None:
+    code, content = here.problem("optimize", "-", stdin=body)
+    assert (code, content["type"]) == (2, "/problems/validation")
+    assert [error["loc"] for error in content["errors"]] == [loc]
+
+
+def test_an_invalid_request_in_a_process_of_its_own() -> None:
+    finished = run("optimize", "-", stdin=request().replace("-1.57", "NaN", 1))
+    assert (finished.returncode, finished.stdout) == (2, b"")
+    assert json.loads(finished.stderr)["errors"][0]["loc"] == ["body", "start", "q", 1]
+
+
+def test_an_unknown_robot_is_answered_with_the_known_ones(here: Here) -> None:
+    code, content = here.problem("optimize", "-", stdin=request(robot="r2d2"))
+    assert (code, content["type"]) == (2, "/problems/unknown-robot")
+    assert "ur5e" in content["known"]
+
+
+def test_a_valid_request_without_a_motion_exits_with_1(here: Here) -> None:
+    code, content = here.problem("optimize", "-", stdin=request(limits={"torque": 1.0}))
+    assert (code, content["type"]) == (1, "/problems/torque-infeasible")
+
+
+@pytest.mark.parametrize("command", ["optimize", "evaluate"])
+def test_a_file_that_does_not_exist_is_wrong_usage(here: Here, command: str) -> None:
+    code, out, err = here.run(command, "no/such/file.json")
+    assert (code, out) == (2, b"")
+    assert b"'no/such/file.json' does not exist" in err
+
+
+def test_an_output_that_cannot_be_written_is_wrong_usage(here: Here, tmp_path: Path) -> None:
+    code, out, err = here.run("optimize", "-", "--output", str(tmp_path / "no" / "answer.json"), stdin=request())
+    assert (code, out) == (2, b"")
+    assert b"answer.json" in err
+    assert b"Traceback" not in err
+
+
+def test_evaluate_answers_as_the_service_does() -> None:
+    example = next(iter(EVALUATE_EXAMPLES.values()))["value"]
+    finished = run("evaluate", "-", stdin=json.dumps(example))
+    assert (finished.returncode, finished.stderr) == (0, b"")
+    EvaluateResponse.model_validate_json(finished.stdout)
+
+
+def test_evaluate_takes_a_csv_with_options_and_settings(here: Here, tmp_path: Path) -> None:
+    settings, output = tmp_path / "settings.json", tmp_path / "answer.json"
+    settings.write_text(json.dumps({"payload": {"mass": 2.0, "com": [0, 0, 0.05]}, "time_per_segment": 9.0}))
+    given = ("evaluate", str(CSV), *CSV_OPTIONS, "--interpolation", "linear", "--output", str(output))
+    energies = []
+    for more in ((), ("--settings", str(settings))):
+        assert here.run(*given, *more) == (0, b"", b"")
+        answer = EvaluateResponse.model_validate_json(output.read_bytes())
+        # the option, not the file, says 1.5 s for each of two segments
+        assert answer.duration == pytest.approx(3.0)
+        energies.append(answer.total.energy.electrical.total)
+    assert energies[1] > energies[0]
+
+
+def test_evaluate_writes_a_csv_table(here: Here, tmp_path: Path) -> None:
+    output = tmp_path / "energies.csv"
+    options = ("--input", "csv", "--format", "csv", "--output", str(output))
+    assert here.run("evaluate", "-", *CSV_OPTIONS, *options, stdin=CSV.read_bytes()) == (0, b"", b"")
+    head, *rows = output.read_text().splitlines()
+    assert head.startswith("segment,")
+    assert [row.partition(",")[0] for row in rows] == ["1", "2", "total"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "stdin", "kind"),
+    [
+        (("-",), "[]", "validation"),
+        (("-", "--input", "csv"), "q1,q2\n1,nan\n", "invalid-table"),
+        (("-", "--input", "csv", "--robot", "r2d2"), CSV.read_bytes(), "unknown-robot"),
+        (("-", "--input", "csv", "--sample-period", "nan"), CSV.read_bytes(), "validation"),
+        (("-", "--input", "csv", "--units", "deg"), CSV.read_bytes(), "validation"),  # no time_per_segment
+    ],
+)
+def test_an_invalid_motion_is_a_problem(here: Here, arguments: tuple[str, ...], stdin: str | bytes, kind: str) -> None:
+    code, content = here.problem("evaluate", *arguments, stdin=stdin)
+    assert (code, content["type"]) == (2, f"/problems/{kind}")
+
+
+def test_options_for_a_csv_do_not_go_with_json(here: Here, tmp_path: Path) -> None:
+    code, _, err = here.run("evaluate", "-", "--units", "deg", stdin="{}")
+    assert code == 2
+    assert b"--units is for a CSV" in err
+    settings = tmp_path / "settings.json"
+    settings.write_text("[1]")
+    code, _, err = here.run("evaluate", str(CSV), "--settings", str(settings))
+    assert code == 2
+    assert b"one JSON object" in err
+
+
+def test_robots_are_listed_with_their_trust() -> None:
+    finished = run("robots")
+    assert (finished.returncode, finished.stderr) == (0, b"")
+    head, *rows = finished.stdout.decode().splitlines()
+    assert re.split(r"\s{2,}", head)[:4] == ["name", "title", "joints", "payload [kg]"]
+    cells = re.split(r"\s{2,}", next(row for row in rows if row.startswith("ur5e ")))
+    assert cells[1:4] == ["Universal Robots UR5e", "6", "5"]
+    # copper loss comes from a sister robot: no reader may miss that
+    assert "T" in cells[6]
+
+
+@pytest.mark.parametrize("command", ["", "serve", "optimize", "evaluate", "robots"])
+def test_every_help_has_an_example(here: Here, command: str) -> None:
+    code, out, _ = here.run(*command.split(), "--help")
+    assert code == 0
+    text = out.decode()
+    assert re.search(rf"Examples?:\n\s+(echo .*\n.*)?(\S.*)?joulepath {command}", text)
+    if not command:
+        assert all(re.search(rf"^\s+{code}  \S", text, re.MULTILINE) for code in (0, 1, 2, 130, 141))
+
+
+def test_a_reader_that_has_gone_leaves_no_traceback() -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    finished = subprocess.run(
+        [*COMMAND, "optimize", "-"],
+        input=request().encode(),
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        cwd=ROOT,
+        env=environment(),
+        timeout=PATIENCE,
+    )
+    os.close(writing)
+    assert (finished.returncode, finished.stderr) == (-signal.SIGPIPE, b"")
+
+
+def test_ctrl_c_ends_a_search_with_130() -> None:
+    process = subprocess.Popen(
+        [*COMMAND, "optimize", "-"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=ROOT,
+        env=environment(),
+    )
+    assert process.stdin is not None
+    process.stdin.write(json.dumps(long_search(deadline=PATIENCE)).encode())
+    process.stdin.close()
+    process.stdin = None
+    wait_for_work(process.pid)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=PATIENCE / 2)
+    assert (process.returncode, stdout) == (130, b"")
+    assert b"Traceback" not in stderr
+
+
+def wait_for_work(pid: int) -> None:
+    """Waits until the process has used more processor time than its imports need."""
+    imports = 4.0  # s
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        if (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK") > imports:
+            return
+        time.sleep(0.05)
+    raise AssertionError("the search does not start")
+
+
+def on_a_terminal(*arguments: str, stdin: str) -> tuple[int, str, str]:
+    """Exit code, standard output and what a terminal shows as standard error."""
+    terminal, other = pty.openpty()
+    process = subprocess.Popen(
+        [*COMMAND, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=other,
+        cwd=ROOT,
+        env=environment(TERM="xterm", COLUMNS="100"),
+    )
+    os.close(other)
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(stdin.encode())
+    process.stdin.close()
+    shown, answer, end = b"", b"", time.monotonic() + PATIENCE
+    pipes = [terminal, process.stdout.fileno()]
+    while pipes:
+        assert time.monotonic() < end
+        for pipe in select.select(pipes, [], [], 1.0)[0]:
+            try:
+                part = os.read(pipe, 1 << 16)
+            except OSError:  # how a terminal says that nobody writes to it any more
+                part = b""
+            if not part:
+                pipes.remove(pipe)
+            elif pipe == terminal:
+                shown += part
+            else:
+                answer += part
+    os.close(terminal)
+    process.stdout.close()
+    return process.wait(PATIENCE), answer.decode(), shown.decode()
+
+
+def test_a_terminal_shows_progress_and_a_summary() -> None:
+    code, answer, shown = on_a_terminal("optimize", "-", stdin=request())
+    assert code == 0
+    content = json.loads(answer)
+    assert "Optimising for at most 10 s" in shown
+    # the spinner is gone in the end: its line is erased and the cursor is shown again
+    assert shown.rindex("\x1b[2K") > shown.rindex("Optimising")
+    assert shown.rindex("\x1b[?25h") > shown.rindex("\x1b[?25l")
+    plain = re.sub(r"\x1b\[[^a-zA-Z]*[a-zA-Z]|\r", "", shown)
+    lines = dict(re.findall(r"^([a-z ]+?) {2,}(.*)$", plain, re.MULTILINE))
+    energy = content["energy"]
+    assert lines["energy"] == f"{energy['electrical']['total']:.4g} J electrical"
+    assert lines["duration"] == f"{content['duration']:.4g} s"
+    assert lines["status"] == "optimal"
+    assert lines["lower bound"] == f"{energy['lower_bound']:.4g} J"
+    assert lines["gap"] == f"{energy['optimality_gap']:.1%}"
+
+
+def test_serve_takes_host_and_port(here: Here, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the service reads as its settings. That it serves is shown with the installed wheel."""
+    served: list[tuple[str, int]] = []
+
+    def record() -> None:
+        settings = Settings()
+        served.append((settings.host, settings.port))
+
+    monkeypatch.setattr("app.__main__.main", record)
+    # so that what the command sets is undone
+    monkeypatch.setenv("JOULEPATH_HOST", "203.0.113.7")
+    monkeypatch.setenv("JOULEPATH_PORT", "1")
+    assert here.run("serve")[0] == 0
+    assert here.run("serve", "--host", "127.0.0.1", "--port", "8080")[0] == 0
+    assert served == [("203.0.113.7", 1), ("127.0.0.1", 8080)]
+
+
+def test_a_port_beyond_the_range_is_wrong_usage(here: Here) -> None:
+    code, _, err = here.run("serve", "--port", "65536")
+    assert code == 2
+    assert b"65536" in err

@@ -1,0 +1,21 @@
+"""The README's Python code, run as it is printed."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_snippet_prints_what_the_readme_says() -> None:
+    """Its digits are few enough to be the same on every machine."""
+    snippets = re.findall(
+        r"```python\n(.*?)```\n\nIt prints\n\n```\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL
+    )
+    assert len(snippets) == 1
+    ((code, printed),) = snippets
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert run.stdout == printed

@@ -1,0 +1,92 @@
+"""The shape of the code: rooms that say what they are for, files and functions of a readable length, named floors."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("app", "optimizer", "models")
+MOST_LINES = 350  # of a file
+MOST_FUNCTION_LINES = 60  # from the first decorator to the last line, docstring included
+
+
+def sources() -> list[Path]:
+    """Every Python file of the three packages."""
+    return [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+
+
+def rooms() -> list[Path]:
+    """Every folder of the three packages that holds Python files."""
+    return sorted({path.parent for path in sources()})
+
+
+def name(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+def contents(package: str) -> set[str]:
+    """The folders with Python files and the modules that one sees in a package."""
+    folder = ROOT / package
+    folders = {room.relative_to(folder).parts[0] for room in rooms() if folder in room.parents}
+    return folders | {path.stem for path in folder.glob("*.py")} - {"__init__"}
+
+
+@pytest.mark.parametrize("room", rooms(), ids=name)
+def test_a_room_says_in_one_line_what_it_is_for(room: Path) -> None:
+    """A package's own first line counts; the public packages may say more below it."""
+    init = room / "__init__.py"
+    assert init.exists(), f"{name(room)} has no __init__.py"
+    docstring = ast.get_docstring(ast.parse(init.read_text()))
+    assert docstring, f"{name(init)} has no docstring"
+    first, *others = docstring.splitlines()
+    assert first.endswith("."), f"{name(init)}: the first line is no sentence"
+    if room.parent != ROOT:
+        assert not others, f"{name(init)} says more than one line"
+
+
+@pytest.mark.parametrize("path", sources(), ids=name)
+def test_no_file_is_long(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= MOST_LINES
+
+
+@pytest.mark.parametrize("path", sources(), ids=name)
+def test_no_function_is_long(path: Path) -> None:
+    long = {f"{node.name}: {length} lines" for node, length in functions(path) if length > MOST_FUNCTION_LINES}
+    assert not long
+
+
+def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionDef, int]]:
+    """Every function and method of a file with its number of lines."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            assert node.end_lineno is not None
+            first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+            yield node, node.end_lineno - first + 1
+
+
+@pytest.mark.parametrize("package", ["optimizer", "app"])
+def test_the_floors_name_exactly_what_there_is(package: str) -> None:
+    """A layer in parentheses may be absent; import-linter itself ignores one that does not exist."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    (contract,) = (each for each in contracts if each.get("containers") == [package])
+    layers = [layer.strip() for floor in contract["layers"] for layer in re.split(r"[|:]", floor)]
+    optional = {layer.strip("()") for layer in layers if layer.startswith("(")}
+    named = {layer.strip("()") for layer in layers}
+    assert len(named) == len(layers)
+    assert named - optional <= contents(package) <= named
+
+
+@pytest.mark.parametrize("package", ["optimizer", "app"])
+def test_the_architecture_page_names_every_room(package: str) -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    _, _, section = page.partition(f"### {package}/")
+    table = section.partition("\n#")[0]
+    assert table, f"docs/architecture.md has no section {package}/"
+    cells = [row.split("|")[1] for row in table.splitlines() if row.startswith("|")]
+    assert contents(package) <= {word for cell in cells for word in re.findall(r"`(\w+)`", cell)}

@@ -1,0 +1,168 @@
+"""The wheel in an environment of its own: it holds everything that runs, and works from any directory."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import sysconfig
+import time
+import urllib.request
+import venv
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.app.requests import move
+
+ROOT = Path(__file__).parents[1]
+PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check")
+# a cold start of the service with one worker, on a busy machine [s]
+START = 90.0
+STOP = 30.0  # from SIGTERM to the end of the process, at most [s]
+
+Run = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel that `pip wheel .` makes, by the build backend that is installed."""
+    folder = tmp_path_factory.mktemp("wheel")
+    options = [
+        "--quiet",
+        "--disable-pip-version-check",
+        "--no-deps",
+        "--no-build-isolation",
+        "--wheel-dir",
+        str(folder),
+    ]
+    subprocess.run([sys.executable, "-m", "pip", "wheel", *options, str(ROOT)], check=True)
+    (built,) = folder.glob("joulepath-*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The `bin` of an empty environment with the wheel; its dependencies are those of this interpreter."""
+    folder = tmp_path_factory.mktemp("installed") / "venv"
+    venv.create(folder)
+    python = folder / "bin" / "python"
+    install = [
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        str(python),
+        "install",
+        "--quiet",
+        "--disable-pip-version-check",
+    ]
+    subprocess.run([*install, "--no-deps", "--no-index", str(wheel)], check=True)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    # a site directory, so that the .pth files in it count, too
+    line = f"import site; site.addsitedir({sysconfig.get_path('purelib')!r})\n"
+    (packages / "dependencies.pth").write_text(line)
+    return python.parent
+
+
+@pytest.fixture
+def run(environment: Path, tmp_path: Path) -> Run:
+    """Runs a program of the environment in an empty directory."""
+
+    def run(program: str, *arguments: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [environment / program, *arguments],
+            input=stdin,
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            env=clean(os.environ),
+            check=True,
+            timeout=START,
+        )
+
+    return run
+
+
+def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
+    """The variables without those that let Python find this repository."""
+    return {name: value for name, value in variables.items() if not name.startswith("PYTHON")}
+
+
+def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
+    """Every tracked file of the three packages, and nothing else beside the metadata."""
+    tracked = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard", "app", "optimizer", "models"],
+        cwd=ROOT, capture_output=True, text=True, check=True,
+    ).stdout.split()  # fmt: skip
+    present = {name for name in tracked if (ROOT / name).exists()}
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if ".dist-info/" not in name}
+    assert held == present
+    assert {f"{package}/py.typed" for package in ("app", "optimizer", "models")} <= held
+    assert {"models/ur5e/ur5e.urdf", "models/ur5e/figures.yaml"} <= held
+    assert any(name.startswith("app/store/migrations/versions/v0001") for name in held)
+
+
+def test_the_library_comes_from_the_wheel(run: Run, environment: Path) -> None:
+    code = (
+        "import optimizer; from optimizer import Arm, Problem, optimize, load_robot; "
+        "print(optimizer.__file__, load_robot('ur5e').nq)"
+    )
+    path, nq = run("python", "-c", code).stdout.split()
+    assert Path(path).is_relative_to(environment.parent)
+    assert nq == "6"
+
+
+@pytest.mark.long
+def test_the_console_command_works_from_anywhere(run: Run) -> None:
+    assert "ur5e" in run("joulepath", "robots").stdout
+    answer = json.loads(run("joulepath", "optimize", "-", stdin=json.dumps(move())).stdout)
+    assert answer["status"] == "optimal"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", [("python", "-m", "app"), ("joulepath", "serve")])
+def test_the_service_starts_from_anywhere(environment: Path, tmp_path: Path, command: tuple[str, ...]) -> None:
+    """Ready, with a database that its migrations have made, and ended by SIGTERM."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    settings = {
+        "JOULEPATH_HOST": "127.0.0.1",
+        "JOULEPATH_PORT": str(port),
+        "JOULEPATH_WORKERS": "1",
+        "JOULEPATH_DATABASE_URL": f"sqlite:///{tmp_path / 'studies.db'}",
+    }
+    log = tmp_path / "log"
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            [environment / command[0], *command[1:]],
+            cwd=tmp_path, env=clean(os.environ) | settings, stdout=output, stderr=output,
+        )  # fmt: skip
+    try:
+        wait_until_ready(process, f"http://127.0.0.1:{port}/readyz", log)
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/studies", timeout=START) as studies:
+            assert studies.status == 200
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(STOP) == 0
+    finally:
+        process.kill()
+        process.wait()
+
+
+def wait_until_ready(process: subprocess.Popen[bytes], url: str, log: Path) -> None:
+    end = time.monotonic() + START
+    while True:
+        assert process.poll() is None, log.read_text()
+        assert time.monotonic() < end, log.read_text()
+        try:
+            with urllib.request.urlopen(url, timeout=5):
+                return
+        except OSError:
+            time.sleep(0.1)
