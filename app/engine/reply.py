@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 class Reply:
     """What goes back to a caller: status, body, and headers of its own.
 
-    `kept` are whole answers for the database. The body refers to each by a placeholder: see `app.store.keep`.
+    `kept` are whole answers that the body refers to by `reference(k)`, to be put into the store: see `app.kept`.
     """
 
     status: int

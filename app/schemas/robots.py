@@ -65,7 +65,7 @@ class RobotDetail(RobotSummary):
     limits: Figures = part("Limits and rated payload.")
     collision: Figures = part(
         "Capsules that each link lies within (rows of x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, and "
-        "radius), the link that carries the elbow, and the pairs of links that never collide."
+        "radius), and the pairs of links that never meet."
     )
     drives: Figures = part("Motors, gears and inverters.")
     electronics: Figures = part("What the arm draws besides its motors.")

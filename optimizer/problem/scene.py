@@ -1,7 +1,7 @@
-"""Obstacles around the arm and bodies fixed to its flange: shapes, validated on construction.
+"""What stands around the arm and what is fixed to it: shapes, validated on construction.
 
-Every shape is a convex core grown by a radius: a point or segment, a box, the discs of a cylinder, a hull. Distances
-are computed on this form alone.
+Every shape is a convex core grown by a radius: a point or segment, a box, a cylinder's discs, a hull. Distances are
+computed on that form alone.
 """
 
 from __future__ import annotations
@@ -26,10 +26,9 @@ FLAT = 1e-6
 
 @dataclass(frozen=True)
 class Core:
-    """The hull of `points` (m, 3) [m], grown by `radius` [m].
+    """Points (m, 3) [m] whose hull, with every point widened to a disc of radius `ring` about z, grown by `radius`.
 
-    Each point is first widened to a disc of radius `ring` [m] normal to z. `half` (3,) [m] is set for a box: half its
-    edges. With `plane` the core is the half-space below the point, z up.
+    `half` (3,) is set for a box (half its edges). `plane`: the half-space below the point instead, z up.
     """
 
     points: Array
@@ -50,13 +49,13 @@ class Sphere:
 
     @property
     def core(self) -> Core:
-        """The form on which distances are computed."""
+        """Its form for distances."""
         return Core(np.zeros((1, 3)), self.radius)
 
 
 @dataclass(frozen=True)
-class _AlongZ:
-    """A body of revolution of `radius` and `length` [m] along z, centred at the origin."""
+class Capsule:
+    """A segment of `length` [m] along z, centred at the origin, grown by `radius` [m]."""
 
     radius: float
     length: float
@@ -66,29 +65,26 @@ class _AlongZ:
         _size("length", self.length)
 
     @property
-    def _ends(self) -> Array:
-        """Ends (2, 3) [m] of the axis."""
-        return np.array([[0.0, 0.0, -self.length / 2], [0.0, 0.0, self.length / 2]])
-
-
-@dataclass(frozen=True)
-class Capsule(_AlongZ):
-    """A segment of `length` [m] along z, centred at the origin, grown by `radius` [m]."""
-
-    @property
     def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(self._ends, self.radius)
+        """Its form for distances."""
+        return Core(_on_axis(self.length), self.radius)
 
 
 @dataclass(frozen=True)
-class Cylinder(_AlongZ):
+class Cylinder:
     """A cylinder of `radius` [m] and `length` [m] along z, centred at the origin."""
 
+    radius: float
+    length: float
+
+    def __post_init__(self) -> None:
+        _size("radius", self.radius)
+        _size("length", self.length)
+
     @property
     def core(self) -> Core:
-        """The form on which distances are computed."""
-        return Core(self._ends, ring=self.radius)
+        """Its form for distances."""
+        return Core(_on_axis(self.length), ring=self.radius)
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,7 @@ class Box:
 
     @property
     def core(self) -> Core:
-        """The form on which distances are computed."""
+        """Its form for distances."""
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
         return Core(signs * self.size / 2, half=self.size / 2)
 
@@ -116,7 +112,7 @@ class HalfSpace:
 
     @property
     def core(self) -> Core:
-        """The form on which distances are computed."""
+        """Its form for distances."""
         return Core(np.zeros((1, 3)), plane=True)
 
 
@@ -143,7 +139,7 @@ class Mesh:
 
     @cached_property
     def core(self) -> Core:
-        """The form on which distances are computed."""
+        """Its form for distances."""
         return Core(self.vertices)
 
 
@@ -212,6 +208,10 @@ def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
     return Attachment(Capsule(radius, length), T)
+
+
+def _on_axis(length: float) -> Array:
+    return np.array([[0.0, 0.0, -length / 2], [0.0, 0.0, length / 2]])
 
 
 def _size(name: str, value: float) -> None:

@@ -1,4 +1,4 @@
-"""Alembic's environment: run by `app.store.database.migrate` with a connection, by `alembic revision` without one."""
+"""Alembic's door: `app.store.migrate` comes in with a connection, `alembic revision --autogenerate` without one."""
 
 from __future__ import annotations
 
