@@ -27,7 +27,7 @@ from optimizer.deadline import Clock
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
 from optimizer.optimize import one_thread
 from optimizer.problem.problem import Problem
-from optimizer.search.fastest import fastest, fastest_of
+from optimizer.search.fastest import fastest, fastest_from, fastest_of
 from optimizer.search.free_goal import between
 from optimizer.search.run import Run
 from optimizer.solution import Solution
@@ -114,19 +114,14 @@ class _Search:
 
     def front(self) -> Front:
         """The front. Raises the errors of `pareto`."""
-        self.race.prepare()
-        found = fastest(self.race.incumbent)
-        if found is None:
-            candidates = [candidate.report() for candidate in self.race.incumbent.candidates]
-            late = self.race.incumbent.deadline.passed
-            raise DeadlineExceeded(candidates) if late else NoTrajectory(candidates)
-        spline, problem = found[1], self.problem
+        spline, known = self.fastest()
+        problem = self.problem
         if problem.duration_max is not None and spline.duration > problem.duration_max:
             raise DurationTooShort(spline.duration)
         first = max(spline.duration, problem.duration_min or 0.0)
         # the fastest motion is at hand even where time runs out over the cheapest
         self.solve(first, [spline])
-        self.add(self.run([], least=first), problem.duration_max or math.inf)
+        self.add(self.run(known, least=first), problem.duration_max or math.inf)
         while len(self.nodes) < self.n and self.left() > 0 and (k := self.widest()) is not None:
             left, right = self.nodes[k : k + 2]
             if len(self.nodes) == self.n - 1 and self.end_again():
@@ -136,6 +131,26 @@ class _Search:
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
         return self.result(spline.duration, complete=self.left() > 0)
+
+    def fastest(self) -> tuple[Spline, list[Spline]]:
+        """The fastest motion, and motions of least energy known by then. Raises the errors of `optimize`.
+
+        The minimum-time solve may fail on a candidate on which the least-energy solve does not. Then the motion of
+        least energy is its initial guess; if it fails again, that motion is the fastest one known.
+        """
+        self.race.prepare()
+        found = fastest(self.race.incumbent)
+        if found is not None:
+            return found[1], []
+        run = self.run([])
+        try:
+            answer = run.solution()
+            known, incumbent = answer.trajectory.spline, run.incumbent
+            candidate = between(incumbent.prepared, incumbent.candidates, answer.start.q, answer.goal.q)
+            faster = fastest_from(incumbent, candidate, known)
+        finally:
+            self.solves += run.incumbent.solves
+        return (known if faster is None or faster.duration > known.duration else faster), [known]
 
     def left(self) -> float:
         """Time left [s]."""

@@ -48,6 +48,12 @@ def fastest(incumbent: Incumbent) -> tuple[Candidate, Spline] | None:
     return None if winner is None or best is None else (winner, best)
 
 
+def fastest_from(incumbent: Incumbent, candidate: Candidate, spline: Spline) -> Spline | None:
+    """The fastest motion of one candidate, optimised from one of its motions; None if none was found."""
+    solver = solver_of(incumbent, candidate, all_durations(incumbent.prepared))
+    return incumbent.add_effort(solver.solve_from(*sampled(spline), fine=False)).spline
+
+
 def fastest_of(incumbent: Incumbent, candidate: Candidate) -> Spline | None:
     """The fastest motion of one candidate, whatever durations the problem allows; None if none was found."""
     return incumbent.add_effort(solver_of(incumbent, candidate, all_durations(incumbent.prepared)).solve()).spline

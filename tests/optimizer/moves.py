@@ -26,6 +26,8 @@ PAPER = Path(__file__).parents[1] / "reference" / "paper_table1_poses.csv"
 PAYLOAD = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.1]), inertia=np.diag([0.004, 0.005, 0.003]))
 TILTED = np.array([2.0, -4.0, -8.7])
 CEILING = np.array([0.0, 0.0, 9.81])
+# a deadline [s] that no search comes near, however busy the machine
+AMPLE = 300.0
 
 
 def problem(start: Any = START, goal: Any = GOAL, **given: Any) -> Problem:
@@ -37,7 +39,7 @@ def problem_with(start: Any, goal: Any, **given: Any) -> Problem:
     """A problem of the UR5e, or of `robot`; `given` are fields of its arm and its own."""
     own = {name: value for name, value in given.items() if name in Problem.__dataclass_fields__}
     arm = {name: value for name, value in given.items() if name not in own}
-    return Problem(arm=Arm(**{"robot": ROBOT} | arm), start=start, goal=goal, **own)
+    return Problem(arm=Arm(**{"robot": ROBOT} | arm), start=start, goal=goal, **{"deadline": AMPLE} | own)
 
 
 def changed(asked: Problem, **given: Any) -> Problem:

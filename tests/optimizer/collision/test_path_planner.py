@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from itertools import pairwise
 
@@ -27,6 +26,7 @@ from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, caps
 from optimizer.problem.tool_cone import ToolCone
 from optimizer.trajectories.spline import sample
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
+from tests.optimizer.clocks import LAST_READINGS, CountingClock
 from tests.optimizer.moves import ROBOT, problem_with
 
 # s: ample, so that a seed and not the machine's load decides what is found
@@ -186,10 +186,9 @@ def walled_in() -> tuple[Arm, Array, Array]:
 def test_no_path_to_a_walled_in_goal_and_an_answer_by_the_deadline() -> None:
     closed, q_start, q_goal = walled_in()
     assert least(closed, q_start[None]) > 0 and least(closed, q_goal[None]) > 0
-    begin = time.perf_counter()
-    assert plan_paths(closed, q_start, q_goal, Deadline.after(0.3)) == []
-    # a run ends within a few checks of the deadline
-    assert time.perf_counter() - begin < 1.0
+    clock, readings = CountingClock(), 30
+    assert plan_paths(closed, q_start, q_goal, Deadline.after(readings, clock)) == []
+    assert readings < clock.now < readings + LAST_READINGS
 
 
 def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
