@@ -18,6 +18,7 @@ from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.losses import breakdown
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.linear_algebra import one_thread
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -30,6 +31,7 @@ from optimizer.trajectories.spline import Spline
 ENERGY_FLOOR = 1e-6  # J; below it a relative error says nothing
 
 
+@one_thread()
 def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy) -> Certificate:
     """Replay `spline` and hold it against everything that was asked and reported.
 

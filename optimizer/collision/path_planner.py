@@ -6,6 +6,10 @@ OMPL has it, run several times; each way found is shortened by OMPL's shortcuts.
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
@@ -33,6 +37,13 @@ SAME = 0.5
 INTERPOLATED, INTERPOLATION_STEPS, ALLOWED_PENETRATION = 33, 9, 0.02
 # samples of a way, and the share of its length over which a corner is rounded
 SAMPLES, ROUNDING = 201, 0.06
+# time [s] after which a thread that waits for another one's planner looks at its deadline
+PATIENCE = 0.02
+
+# Held from the seed to the last shortcut: every planner, sampler and simplifier of OMPL that is made draws its seed
+# from one generator of the process, so that two threads at once would take seeds from each other. Little is lost:
+# planners spend their time in the validity checks, which need Python's global lock.
+_OMPL = threading.Lock()
 
 
 def plan_paths(
@@ -57,20 +68,34 @@ def plan_paths(
             break
     else:
         return []
-    # what OMPL has to say goes to the console; and it warns of a seed set anew, which is what is meant here
-    ou.setLogLevel(ou.LOG_NONE)
-    ou.RNG.setSeed(seed)
     found: list[Array] = []
-    for run in range(RUNS * most):
-        if len(found) == most or deadline.passed:
-            break
-        path = _plan(arm, space, q_start, q_goal, BOUND_MARGINS[run % len(BOUND_MARGINS)], deadline)
-        if path is not None and not any(_same(path, other) for other in found):
-            found.append(path)
-        # the straight line is free, or no room is wide enough
-        if (found and len(found[0]) == 2) or (not found and run + 1 == len(BOUND_MARGINS)):
-            break
+    with _seeded(seed, deadline):
+        for run in range(RUNS * most):
+            if len(found) == most or deadline.passed:
+                break
+            path = _plan(arm, space, q_start, q_goal, BOUND_MARGINS[run % len(BOUND_MARGINS)], deadline)
+            if path is not None and not any(_same(path, other) for other in found):
+                found.append(path)
+            # the straight line is free, or no room is wide enough
+            if (found and len(found[0]) == 2) or (not found and run + 1 == len(BOUND_MARGINS)):
+                break
     return sorted(found, key=lambda path: length(path, arm.active_limits.v_max))
+
+
+@contextmanager
+def _seeded(seed: int, deadline: Deadline) -> Iterator[None]:
+    """OMPL for the calling thread alone, its random numbers seeded; without OMPL once the deadline has passed."""
+    while not (mine := _OMPL.acquire(timeout=PATIENCE)) and not deadline.passed:
+        pass
+    try:
+        if mine:
+            # what OMPL has to say goes to the console; and it warns of a seed set anew, which is what is meant here
+            ou.setLogLevel(ou.LOG_NONE)
+            ou.RNG.setSeed(seed)
+        yield
+    finally:
+        if mine:
+            _OMPL.release()
 
 
 def along(path: Array, duration: float, v_max: Array) -> tuple[Array, Array]:

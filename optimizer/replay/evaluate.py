@@ -23,6 +23,7 @@ from optimizer.energy.bus_flow import charges, drawn_at
 from optimizer.energy.losses import breakdown, power_flow
 from optimizer.energy.plant import Plant
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Arm
 from optimizer.replay.limit_report import LimitMonitor, LimitReport
 from optimizer.replay.nearest_contact import ClearanceMonitor, LeastClearance
@@ -105,6 +106,7 @@ class Evaluation:
     nearest: LeastClearance | None
 
 
+@one_thread()
 def evaluate(
     arm: Arm, motion: Waypoints | Log, sample_period: float | None = None, deadline: float = np.inf
 ) -> Evaluation:
