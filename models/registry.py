@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -22,12 +23,21 @@ def robot_names() -> tuple[str, ...]:
     return ROBOTS
 
 
-@cache
+_LOADING = threading.Lock()
+
+
 def load_robot(name: str) -> Robot:
-    """The robot of that name, loaded once per process.
+    """The robot of that name, loaded once per process: all threads get the same object.
 
     Raises LookupError for a name that is not in `robot_names()`.
     """
+    # robots are compared by identity, and `cache` lets two threads that miss at the same time both load one
+    with _LOADING:
+        return _load_robot(name)
+
+
+@cache
+def _load_robot(name: str) -> Robot:
     figures = load_figures(name)
     model = _load_model(name)
     drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})

@@ -19,6 +19,7 @@ from optimizer.energy.losses import breakdown
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Arm
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
@@ -33,6 +34,7 @@ from optimizer.trajectories.spline import Spline
 ENERGY_FLOOR = 1e-6  # J; relative errors of energies below it are taken relative to it
 
 
+@one_thread()
 def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, reported: Energy) -> Certificate:
     """Certificate of `spline` as a motion of `problem` whose energy is `reported`.
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import time
-from contextlib import AbstractContextManager
-from functools import cache
-
-from threadpoolctl import ThreadpoolController
 
 from models.registry import load_robot
 from optimizer.deadline import Clock
 from optimizer.energy.kernel import kernel_for
+from optimizer.linear_algebra import one_thread
 from optimizer.methods import METHODS
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
@@ -27,17 +24,6 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
     """
     with one_thread():
         return Run(problem, clock=clock).solution()
-
-
-def one_thread() -> AbstractContextManager[object]:
-    """A context in which linear algebra keeps to one thread: matrices here are small, more would cost than give."""
-    limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
-    return limit
-
-
-@cache
-def _blas() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 def warm_up(robot_name: str) -> None:

@@ -25,7 +25,7 @@ import numpy as np
 
 from optimizer.deadline import Clock
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
-from optimizer.optimize import one_thread
+from optimizer.linear_algebra import one_thread
 from optimizer.problem.problem import Problem
 from optimizer.search.fastest import fastest, fastest_from, fastest_of
 from optimizer.search.free_goal import between

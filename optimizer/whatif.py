@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from optimizer.certificate import certify
 from optimizer.deadline import Clock, Deadline
 from optimizer.exceptions import JoulepathError
-from optimizer.optimize import one_thread, optimize
+from optimizer.linear_algebra import one_thread
+from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem, narrowed
 from optimizer.search.incumbent import SLACK
@@ -34,6 +35,7 @@ class Changed:
     error: JoulepathError | None
 
 
+@one_thread()
 def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> Changed:
     """Hold the answer `base` against `problem`, the same motion asked of a changed arm of as many joints.
 
@@ -54,8 +56,7 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
     same, best = energy.of(problem.objective), found.energy.of(problem.objective)
     if certificate.valid and same < best * (1 - SLACK) and left > 0:
         try:
-            with one_thread():
-                again = Run(replace(problem, deadline=left), [spline], clock).solution()
+            again = Run(replace(problem, deadline=left), [spline], clock).solution()
         except JoulepathError:
             # too little time was left: the first answer stands
             return Changed(energy, certificate, found, None)

@@ -54,9 +54,9 @@ class ConvexPairs:
         return distance, normal, point
 
     def _shape(self, number: int) -> tuple[coal.CollisionGeometry, float, coal.Transform3s]:
-        if number not in self._shapes:
-            self._shapes[number] = coal_shape(self._cores[number])
-        return self._shapes[number]
+        shape = self._shapes.get(number)
+        # two threads may both make it; all of them go on with the first
+        return self._shapes.setdefault(number, coal_shape(self._cores[number])) if shape is None else shape
 
 
 def _lower_bound(first: Core, T_first: Array, second: Core, T_second: Array) -> tuple[float, Array, Array]:

@@ -6,6 +6,10 @@ implementation of OMPL, run several times; OMPL's path simplifier shortens each 
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from ompl import base as ob
 from ompl import geometric as og
@@ -38,6 +42,13 @@ SAME_PATH = 0.5
 INTERPOLATED, INTERPOLATION_STEPS, ALLOWED_PENETRATION = 33, 9, 0.02
 # samples of a path; fraction of its length, on either side, over which its corners are averaged, and points of the mean
 SAMPLES, ROUNDING, ROUNDING_POINTS = 201, 0.06, 9
+# time [s] after which a thread that waits for another one's planner looks at its deadline
+PATIENCE = 0.02
+
+# Held from the seed to the last shortcut: every planner, sampler and simplifier of OMPL that is made draws its seed
+# from one generator of the process, so that two threads at once would take seeds from each other. Little is lost:
+# planners spend their time in the validity checks, which need Python's global lock.
+_OMPL = threading.Lock()
 
 
 def plan_paths(
@@ -60,22 +71,36 @@ def plan_paths(
     checker = next((each for each in checkers if each.is_valid(q_start) and each.is_valid(q_goal)), None)
     if checker is None:
         return []
-    # OMPL logs to the console, and warns of a seed that is set again, as every call does here
-    ou.setLogLevel(ou.LOG_NONE)
-    ou.RNG.setSeed(seed)
     paths: list[Array] = []
-    for run in range(RUNS * most):
-        if len(paths) == most or deadline.passed:
-            break
-        bounds = _bounds(arm.active_limits, q_start, q_goal, BOUND_MARGINS[run % len(BOUND_MARGINS)])
-        path = _plan(checker, bounds, q_start, q_goal, deadline)
-        if path is not None and not any(_is_same(path, other) for other in paths):
-            paths.append(path)
-        straight_line_is_free = bool(paths) and len(paths[0]) == 2
-        all_bounds_failed = not paths and run + 1 == len(BOUND_MARGINS)
-        if straight_line_is_free or all_bounds_failed:
-            break
+    with _seeded(seed, deadline):
+        for run in range(RUNS * most):
+            if len(paths) == most or deadline.passed:
+                break
+            bounds = _bounds(arm.active_limits, q_start, q_goal, BOUND_MARGINS[run % len(BOUND_MARGINS)])
+            path = _plan(checker, bounds, q_start, q_goal, deadline)
+            if path is not None and not any(_is_same(path, other) for other in paths):
+                paths.append(path)
+            straight_line_is_free = bool(paths) and len(paths[0]) == 2
+            all_bounds_failed = not paths and run + 1 == len(BOUND_MARGINS)
+            if straight_line_is_free or all_bounds_failed:
+                break
     return sorted(paths, key=lambda path: length(path, arm.active_limits.v_max))
+
+
+@contextmanager
+def _seeded(seed: int, deadline: Deadline) -> Iterator[None]:
+    """OMPL for the calling thread alone, its random numbers seeded; without OMPL once the deadline has passed."""
+    while not (mine := _OMPL.acquire(timeout=PATIENCE)) and not deadline.passed:
+        pass
+    try:
+        if mine:
+            # OMPL logs to the console, and warns of a seed that is set again, as every call does here
+            ou.setLogLevel(ou.LOG_NONE)
+            ou.RNG.setSeed(seed)
+        yield
+    finally:
+        if mine:
+            _OMPL.release()
 
 
 def along(path: Array, duration: float, v_max: Array) -> tuple[Array, Array]:

@@ -1,10 +1,9 @@
-"""The per-node functions of the programme: built once per robot, compiled, and cached on disk.
+"""The per-node functions of the NLP, ready to be called: compiled once per robot, evaluated from any thread.
 
-`node` gives cost, motor torque and their first and second derivatives at one instant of a motion; everything that a
+`node` gives cost, motor torque and their first and second derivatives at one instant of a motion. Everything that a
 request may change (payload, gravity, drives, friction, objective) is a parameter. The functions are compiled by the
-system's C compiler once and kept under `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`), named by a digest of all
-that they depend on. Until the compiled file is there, or where there is no compiler, CasADi's virtual machine
-evaluates the same expressions.
+system's C compiler and stored on disk: see `kernel_cache`. Until the compiled library exists, or if there is no
+compiler, CasADi's virtual machine evaluates the same expressions.
 
 `python -m optimizer.energy.precompile` compiles the kernels of all robots.
 """
@@ -19,55 +18,72 @@ import numpy as np
 
 from models.robot import Array, Robot
 from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, seal_path
-from optimizer.energy.kernel_expressions import FUNCTION_NAMES, build
+from optimizer.energy.kernel_expressions import FUNCTION_NAMES, SYMBOLICS, build
 
-# nodes evaluated by one call where the caller's number varies
+# nodes per call of a function whose number of nodes varies from caller to caller
 CHUNK = 64
 
 
-class _Mapped:
-    """A function mapped over a fixed number of nodes, called on numpy buffers without copies or conversions."""
+class _Evaluation:
+    """A function mapped over a fixed number of nodes, with its own memory: for one thread.
 
-    def __init__(self, function: ca.Function, count: int) -> None:
-        self._function = function.map(count)
-        self._buffer, self._run = self._function.buffer()
-        self.arguments = [np.zeros(self._function.size_in(i)[::-1]) for i in range(self._function.n_in())]
-        self.results = [np.zeros(self._function.size_out(i)[::-1]) for i in range(self._function.n_out())]
+    Arguments and results are numpy arrays that CasADi reads and writes in place, without copies or conversions.
+    """
+
+    def __init__(self, mapped: ca.Function) -> None:
+        self._buffer, self._run = mapped.buffer()
+        self.arguments = [np.zeros(mapped.size_in(i)[::-1]) for i in range(mapped.n_in())]
+        self.results = [np.zeros(mapped.size_out(i)[::-1]) for i in range(mapped.n_out())]
         for i, array in enumerate(self.arguments):
             self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self.results):
             self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """Evaluate; row k of every argument belongs to node k. The results are overwritten by the next call."""
+        """Evaluate; row k of every argument belongs to node k. The next call overwrites the results."""
         for own, given in zip(self.arguments, arguments, strict=True):
             own[...] = given
         self._run()
         return self.results
 
 
+class _Evaluations(threading.local):
+    """The calling thread's evaluations by function and number of nodes. They are freed when the thread ends."""
+
+    def __init__(self) -> None:
+        self.known: dict[tuple[str, int], _Evaluation] = {}
+
+
 class Kernel:
-    """A robot's functions, ready to be called on arrays of nodes. Not for several threads at once."""
+    """A robot's functions on arrays of nodes. Any number of threads may call one kernel at the same time.
+
+    Every thread has its own memory for arguments and results, because CasADi evaluates without Python's global lock.
+    """
 
     def __init__(self, robot: Robot, functions: list[ca.Function], compiled: bool) -> None:
         self.nq = robot.nq
         self.compiled = compiled
         self._functions = dict(zip(FUNCTION_NAMES, functions, strict=True))
-        self._mapped: dict[tuple[str, int], _Mapped] = {}
+        self._mapped: dict[tuple[str, int], ca.Function] = {}
+        self._evaluations = _Evaluations()
 
-    def _map(self, name: str, count: int) -> _Mapped:
-        key = (name, count)
-        if key not in self._mapped:
-            self._mapped[key] = _Mapped(self._functions[name], count)
-        return self._mapped[key]
+    def _evaluation(self, name: str, count: int) -> _Evaluation:
+        known, key = self._evaluations.known, (name, count)
+        if key not in known:
+            with SYMBOLICS:
+                if key not in self._mapped:
+                    self._mapped[key] = self._functions[name].map(count)
+                known[key] = _Evaluation(self._mapped[key])
+        return known[key]
 
     def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
         """Cost (N,), tau_motor (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N, 3nq, 3nq).
 
-        y (N, 3nq), multiplier (N, nq), weight (N,), p packed `Parameters`. Views that the next call overwrites.
+        y (N, 3nq) = q, v, a; multiplier (N, nq); weight (N,); p packed `Parameters`. The results are views: the
+        thread's next call with as many nodes overwrites them.
         """
         count, nq = len(y), self.nq
-        cost, tau, gradient, jacobian, hessian = self._map("node", count)(y, multiplier, weight[:, None], p)
+        cost, tau, gradient, jacobian, hessian = self._evaluation("node", count)(y, multiplier, weight[:, None], p)
         return (
             cost[:, 0],
             tau,
@@ -77,40 +93,56 @@ class Kernel:
         )
 
     def value(self, y: Array, p: Array) -> tuple[Array, Array]:
-        """Cost (N,) and tau_motor (N, nq). Views that the next call overwrites."""
-        cost, tau = self._map("value", len(y))(y, p)
+        """Cost (N,) and tau_motor (N, nq) [N·m]. Views: the thread's next call with as many nodes overwrites them."""
+        cost, tau = self._evaluation("value", len(y))(y, p)
         return cost[:, 0], tau
 
     def torque(self, q: Array, v: Array, a: Array, p: Array) -> Array:
-        """Rigid body and rotor torque tau (k, nq) for any number of samples."""
+        """Rigid body and rotor torque tau (k, nq) [N·m] for any number of samples."""
         count = len(q)
-        mapped = self._map("torque", CHUNK)
+        evaluation = self._evaluation("torque", CHUNK)
         y = np.zeros((-(-count // CHUNK) * CHUNK, 3 * self.nq))
         y[:count] = np.hstack([q, v, a])
-        return np.concatenate([mapped(y[i : i + CHUNK], p)[0].copy() for i in range(0, len(y), CHUNK)])[:count]
+        return np.concatenate([evaluation(y[i : i + CHUNK], p)[0].copy() for i in range(0, len(y), CHUNK)])[:count]
 
 
 class _Loader:
-    """Holds a robot's kernel and swaps the compiled one in when it is there."""
+    """Loads a robot's kernel, for any number of threads: compiled as soon as the library exists, else interpreted.
+
+    The interpreted kernel stays referenced after the compiled one has replaced it: other threads may still use it, and
+    expressions must be freed under `SYMBOLICS`.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.library_path = library_path(robot)
-        self._kernel: Kernel | None = None
+        self._lock = threading.Lock()
+        self._compiled: Kernel | None = None
+        self._interpreted: Kernel | None = None
         self._compiling: threading.Thread | None = None
 
     def get(self) -> Kernel:
-        if self._kernel is not None and (self._kernel.compiled or not seal_path(self.library_path).exists()):
-            return self._kernel
+        # read once: other threads only ever set it
+        compiled = self._compiled
+        if compiled is not None:
+            return compiled
+        with self._lock:
+            return self._compiled or self._load()
+
+    def _load(self) -> Kernel:
+        if self._interpreted is not None and not seal_path(self.library_path).exists():
+            return self._interpreted
         if is_intact(self.library_path):
-            functions = [ca.external(name, str(self.library_path)) for name in FUNCTION_NAMES]
-            self._kernel = Kernel(self._robot, functions, compiled=True)
-        elif self._kernel is None:
-            self._kernel = Kernel(self._robot, build(self._robot), compiled=False)
-        if not self._kernel.compiled and self._compiling is None and compiler() is not None:
+            with SYMBOLICS:
+                functions = [ca.external(name, str(self.library_path)) for name in FUNCTION_NAMES]
+            self._compiled = Kernel(self._robot, functions, compiled=True)
+            return self._compiled
+        if self._interpreted is None:
+            self._interpreted = Kernel(self._robot, build(self._robot), compiled=False)
+        if self._compiling is None and compiler() is not None:
             self._compiling = threading.Thread(target=self._compile, name="kernel-compiler", daemon=True)
             self._compiling.start()
-        return self._kernel
+        return self._interpreted
 
     def _compile(self) -> None:
         try:
@@ -119,11 +151,17 @@ class _Loader:
             log.warning("kernel of %s not compiled, the virtual machine serves: %s", self._robot.name, error)
 
 
+_LOADERS = threading.Lock()
+
+
 @cache
 def _loader(robot: Robot) -> _Loader:
     return _Loader(robot)
 
 
 def kernel_for(robot: Robot) -> Kernel:
-    """The kernel of a robot: compiled if the cache has it, else interpreted while the compiler runs."""
-    return _loader(robot).get()
+    """The kernel of a robot: compiled if the library is on disk, else interpreted while the compiler runs."""
+    # `cache` lets two threads that miss at the same time both build: only one loader may compile
+    with _LOADERS:
+        loader = _loader(robot)
+    return loader.get()

@@ -1,4 +1,8 @@
-"""Compiled kernels on disk: compiled once by the system's C compiler, named by a digest of all they depend on."""
+"""Compiled kernels on disk: `JOULEPATH_CACHE_DIR` (default `~/.cache/joulepath`) holds one library per robot.
+
+The system's C compiler makes it once. Its name contains a digest of everything that it depends on; beside it lies a
+seal, the hash of the library, so that a damaged file is noticed before it is loaded.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ import numpy as np
 import models.robot
 from models.robot import Robot
 from optimizer.energy import inverse_dynamics, kernel_expressions, losses
-from optimizer.energy.kernel_expressions import build
+from optimizer.energy.kernel_expressions import SYMBOLICS, build
 
 log = logging.getLogger(__name__)
 
@@ -26,24 +30,27 @@ COMPILER_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
 
 
 def cache_directory() -> Path:
-    """Where compiled kernels are kept."""
+    """Folder of the compiled kernels."""
     given = os.environ.get("JOULEPATH_CACHE_DIR")
     return Path(given) if given else Path.home() / ".cache" / "joulepath"
+
+
+# modules whose code decides what is compiled
+SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions)
 
 
 def digest(robot: Robot) -> str:
     """Hash of everything that the compiled functions depend on: the chain, the sources, versions, compiler flags."""
     h = hashlib.sha256()
-    for module in (models.robot, inverse_dynamics, losses, kernel_expressions):
-        h.update(Path(str(module.__file__)).read_bytes())
-    h.update(Path(__file__).read_bytes())
+    for path in (*(str(module.__file__) for module in SOURCES), __file__):
+        h.update(Path(path).read_bytes())
     h.update(repr((version("casadi"), COMPILER_FLAGS, os.uname().machine)).encode())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
-    figures = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
-    figures += [body.toDynamicParameters() for body in robot.model.inertias]
-    for figure in figures:
+    constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
+    constants += [body.toDynamicParameters() for body in robot.model.inertias]
+    for constant in constants:
         # rounded, since the last digit of a sine differs between processors; + 0.0 makes -0.0 and 0.0 one
-        h.update((np.round(figure, 12) + 0.0).tobytes())
+        h.update((np.round(constant, 12) + 0.0).tobytes())
     return h.hexdigest()[:24]
 
 
@@ -53,12 +60,12 @@ def library_path(robot: Robot) -> Path:
 
 
 def seal_path(path: Path) -> Path:
-    """File that holds the library's own hash, so that a damaged library is noticed before it is loaded."""
+    """File with the library's hash."""
     return path.with_suffix(".sha256")
 
 
 def is_intact(path: Path) -> bool:
-    """Whether the library is there and is the one that was sealed."""
+    """Whether the library exists and has the hash of its seal."""
     try:
         return seal_path(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
     except OSError:
@@ -71,9 +78,9 @@ def compiler() -> str | None:
 
 
 def compile_kernel(robot: Robot) -> Path:
-    """Compile a robot's functions into the cache, once however many processes ask; returns the library.
+    """Compile a robot's functions, once however many threads and processes ask. Returns the path of the library.
 
-    Raises RuntimeError where there is no compiler or it fails, OSError where the cache cannot be written.
+    Raises RuntimeError if there is no compiler or it fails, OSError if the cache cannot be written.
     """
     target = library_path(robot)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -85,20 +92,29 @@ def compile_kernel(robot: Robot) -> Path:
         if command is None:
             raise RuntimeError("no C compiler found")
         with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-            generator = ca.CodeGenerator("kernel.c", {"with_header": False})
-            for function in build(robot):
-                generator.add(function)
-            generator.generate(folder + "/")
-            library = Path(folder) / "kernel.so"
-            source = str(Path(folder) / "kernel.c")
+            library, seal = Path(folder) / "kernel.so", Path(folder) / "kernel.sha256"
+            source = _write_source(robot, Path(folder))
             run = subprocess.run(
-                [command, *COMPILER_FLAGS, source, "-o", str(library), "-lm"], capture_output=True, text=True
+                [command, *COMPILER_FLAGS, str(source), "-o", str(library), "-lm"], capture_output=True, text=True
             )
             if run.returncode:
                 raise RuntimeError(f"the C compiler failed: {run.stderr[-500:]}")
-            seal = Path(folder) / "kernel.sha256"
             seal.write_text(hashlib.sha256(library.read_bytes()).hexdigest())
             # the seal first: a library without its seal counts as damaged, a seal without its library as absent
             seal.replace(seal_path(target))
             library.replace(target)
     return target
+
+
+def _write_source(robot: Robot, folder: Path) -> Path:
+    """Write the functions of a robot as C; their expressions are freed before the lock is."""
+    with SYMBOLICS:
+        _generate(robot, folder)
+    return folder / "kernel.c"
+
+
+def _generate(robot: Robot, folder: Path) -> None:
+    generator = ca.CodeGenerator("kernel.c", {"with_header": False})
+    for function in build(robot):
+        generator.add(function)
+    generator.generate(f"{folder}/")

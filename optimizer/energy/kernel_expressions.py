@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import astuple, dataclass
 from typing import Any
 
@@ -12,14 +13,32 @@ from models.robot import Array, Drives, FrictionLaw, Robot
 from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
 from optimizer.energy.losses import drawn_power, power_flow, smooth_abs
 
+FUNCTION_NAMES = ("torque", "value", "node")
+
+# Held while expressions are built, turned into functions, mapped or freed. CasADi works on them without Python's global
+# lock, all expressions share constants and caches, and only some of its builds guard these against other threads.
+# Evaluating a function needs no lock, as long as every thread has a buffer of its own.
+SYMBOLICS = threading.RLock()
+
+# fields of `Parameters` that are one number; those of other sizes than one number per joint
+_SCALARS = frozenset(
+    ("mass", "base_power", "regeneration", "isolated", "electrical", "mechanical", "time", "knee", "width")
+)
+_SIZES = {"com": 3, "inertia": 6, "gravity": 3} | dict.fromkeys(_SCALARS, 1)
+
 
 @dataclass(frozen=True)
 class Parameters:
-    """What a request may change, in the order in which the compiled functions take it.
+    """Everything that a request may change, in the order in which the compiled functions take it.
 
-    Shapes: com (3,), inertia (6,) ixx ixy ixz iyy iyz izz, gravity (3,), per joint (nq,). `knee` [rad/s] and `width`
-    [W] smooth friction's reversal and the cost's corners; `isolated` is 1 where every joint burns its own surplus, else
-    0; `electrical`, `mechanical` [1] and `time` [W] weigh the cost.
+    The payload: `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) ixx ixy ixz iyy iyz izz about the com
+    [kg·m²]. `gravity` (3,) [m/s²] in the base frame. Per joint (nq,): `rotor_inertia` [kg·m²]; friction `coulomb`,
+    `curved` [N·m], `speed` [rad/s], `viscous` [N·m·s/rad]; drives `torque_constant` [N·m/A], `copper` [W/A²],
+    `inverter_constant` [W], `inverter_linear` [W/A], `inverter_quadratic` [W/A²]; `link_mass_scale` [1].
+
+    `base_power` [W] of the electronics; `regeneration` [1], the fraction of net surplus that the supply takes back;
+    `isolated` is 1 if every joint dissipates its own surplus, else 0. `electrical`, `mechanical` [1] and `time` [W]
+    weigh the parts of the cost. `knee` [rad/s] smooths the reversal of friction, `width` [W] the corners of the cost.
     """
 
     mass: Any
@@ -47,83 +66,125 @@ class Parameters:
     width: Any
 
     def pack(self) -> Array:
-        """One vector."""
+        """All parameters as one vector."""
         return np.concatenate([np.atleast_1d(np.asarray(value, dtype=float)) for value in astuple(self)])
 
     @staticmethod
     def symbols(nq: int) -> tuple[Parameters, ca.SX]:
-        """Symbols of the same layout, and their vector."""
-        sizes = {"com": 3, "inertia": 6, "gravity": 3}
-        scalars = {"mass", "base_power", "regeneration", "isolated"}
-        scalars |= {"electrical", "mechanical", "time", "knee", "width"}
-        scalars |= {"electrical", "mechanical", "time", "knee", "width"}
-        names = Parameters.__dataclass_fields__
-        values = {n: ca.SX.sym(n, sizes.get(n, 1 if n in scalars else nq)) for n in names}
+        """Symbols for an arm of nq joints, and the vector of them in the order of `pack`."""
+        values = {n: ca.SX.sym(n, _SIZES.get(n, nq)) for n in Parameters.__dataclass_fields__}
         return Parameters(**values), ca.vertcat(*values.values())
+
+    @property
+    def payload(self) -> SymbolicPayload:
+        """The payload's symbols."""
+        return SymbolicPayload(self.mass, self.com, self.inertia)
+
+    @property
+    def friction(self) -> FrictionLaw:
+        """The friction law of these coefficients."""
+        return FrictionLaw("symbolic", self.coulomb, self.curved, self.speed, self.viscous, self.knee)
+
+    @property
+    def drives(self) -> Drives:
+        """The drives of these coefficients; the gear ratio plays no part."""
+        return Drives(
+            gear_ratio=None,  # type: ignore[arg-type]
+            torque_constant=self.torque_constant,
+            rotor_inertia=self.rotor_inertia,
+            copper=self.copper,
+            inverter_constant=self.inverter_constant,
+            inverter_linear=self.inverter_linear,
+            inverter_quadratic=self.inverter_quadratic,
+        )
+
+
+@dataclass(frozen=True)
+class _Power:
+    """Cost and motor torque as functions of the torque tau (nq,) [N·m] and the speed v (nq,) [rad/s] alone.
+
+    `slope` (2 nq,) and `bend` (2 nq, 2 nq) are the cost's derivatives by tau and v; `friction_slope` (nq, nq) is that
+    of the friction torque by v, `friction_bend` (nq, nq) the second one of multiplier · friction torque.
+    """
+
+    cost: ca.SX
+    tau_motor: ca.SX
+    slope: ca.SX
+    bend: ca.SX
+    friction_slope: ca.SX
+    friction_bend: ca.SX
 
 
 def build(robot: Robot) -> list[ca.Function]:
     """The functions of a robot as CasADi expressions.
 
-    `torque`(y, p) → tau: rigid body and rotor torque.
-    `value`(y, p) → cost, tau_motor.
+    `torque`(y, p) → tau: rigid body and rotor torque [N·m].
+    `value`(y, p) → cost [W], tau_motor [N·m].
     `node`(y, multiplier, weight, p) → cost, tau_motor, gradient of the cost, Jacobian of tau_motor (nq, 3 nq), and the
     Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_motor. y = (q, v, a) stacked.
     """
+    with SYMBOLICS:
+        return _functions(robot)
+
+
+def _functions(robot: Robot) -> list[ca.Function]:
     nq = robot.nq
     y = ca.SX.sym("y", 3 * nq)
     q, v, a = y[:nq], y[nq : 2 * nq], y[2 * nq :]
     par, p = Parameters.symbols(nq)
-    payload = SymbolicPayload(par.mass, par.com, par.inertia)
-    tau = inverse_dynamics(robot.model, q, v, a, payload, par.gravity, par.rotor_inertia, par.link_mass_scale)
-    friction = FrictionLaw("symbolic", par.coulomb, par.curved, par.speed, par.viscous, par.knee)
-    drives = Drives(
-        gear_ratio=None,  # type: ignore[arg-type]
-        torque_constant=par.torque_constant,
-        rotor_inertia=par.rotor_inertia,
-        copper=par.copper,
-        inverter_constant=par.inverter_constant,
-        inverter_linear=par.inverter_linear,
-        inverter_quadratic=par.inverter_quadratic,
-    )
-    # cost and friction of torque t and speed w, apart from the dynamics that t comes from
-    t, w = ca.SX.sym("t", nq), ca.SX.sym("w", nq)
-    # the inverter's |i| is rounded off over a tenth of an ampere per watt of width
-    flow = power_flow(t, w, drives, friction, 0.1 * par.width, ca)
-    shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
-    # six corners in place of one, each rounded off by a sixth
-    isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / nq, ca))
-    drawn = (1 - par.isolated) * shared + par.isolated * isolated
-    mechanical = ca.sum1(smooth_abs(t * w, par.width, ca))
-    cost = par.electrical * drawn + par.mechanical * mechanical + par.time
+    tau = inverse_dynamics(robot.model, q, v, a, par.payload, par.gravity, par.rotor_inertia, par.link_mass_scale)
     multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")
-    inner = ca.vertcat(t, w)
-    bent, sloped = ca.hessian(cost, inner)
-    friction_bent, _ = ca.hessian(ca.dot(multiplier, friction.torque(w, ca)), w)
-    local = [cost, flow.tau_motor, sloped, bent, ca.jacobian(friction.torque(w, ca), w), friction_bent]
-    cost, tau_motor, sloped, bent, friction_slope, friction_bent = ca.substitute(local, [t, w], [tau, v])
-
-    # the chain rule by hand: a third of the operations that differentiating the composed cost twice would take
-    J_tau = ca.jacobian(tau, y)
-    J_inner = ca.vertcat(J_tau, ca.horzcat(ca.SX(nq, nq), ca.SX.eye(nq), ca.SX(nq, nq)))
-    pull = ca.SX.sym("pull", nq)
-    dynamics_bent = ca.substitute(ca.hessian(ca.dot(pull, tau), y)[0], pull, weight * sloped[:nq] + multiplier)
-    # half of a symmetric product, mirrored
-    hessian = dynamics_bent + ca.tril2symm(ca.tril(J_inner.T @ (weight * bent @ J_inner)))
-    hessian[nq : 2 * nq, nq : 2 * nq] += friction_bent
-    J_motor = J_tau + 0
-    J_motor[:, nq : 2 * nq] += friction_slope
+    power = _power(par, tau, v, multiplier)
+    gradient, jacobian, hessian = _derivatives(power, tau, y, multiplier, weight)
     dense = ca.densify
+    value = [power.cost, dense(power.tau_motor)]
+    node = [*value, dense(gradient), dense(jacobian), dense(hessian)]
     return [
         ca.Function("torque", [y, p], [dense(tau)], {"cse": True}),
-        ca.Function("value", [y, p], [cost, dense(tau_motor)], {"cse": True}),
-        ca.Function(
-            "node",
-            [y, multiplier, weight, p],
-            [cost, dense(tau_motor), dense(J_inner.T @ sloped), dense(J_motor), dense(hessian)],
-            {"cse": True},
-        ),
+        ca.Function("value", [y, p], value, {"cse": True}),
+        ca.Function("node", [y, multiplier, weight, p], node, {"cse": True}),
     ]
 
 
-FUNCTION_NAMES = ("torque", "value", "node")
+def _power(par: Parameters, tau: ca.SX, v: ca.SX, multiplier: ca.SX) -> _Power:
+    """Cost and motor torque at torque tau and speed v, differentiated before these are put in."""
+    nq = tau.numel()
+    t, w = ca.SX.sym("t", nq), ca.SX.sym("w", nq)
+    cost, tau_motor = _cost(par, t, w)
+    bend, slope = ca.hessian(cost, ca.vertcat(t, w))
+    friction_torque = par.friction.torque(w, ca)
+    friction_bend, _ = ca.hessian(ca.dot(multiplier, friction_torque), w)
+    local = [cost, tau_motor, slope, bend, ca.jacobian(friction_torque, w), friction_bend]
+    return _Power(*ca.substitute(local, [t, w], [tau, v]))
+
+
+def _cost(par: Parameters, t: ca.SX, w: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Smoothed cost [W] and motor torque [N·m] for torques t and speeds w."""
+    # the inverter's |i| is smoothed over a tenth of an ampere per watt of width
+    flow = power_flow(t, w, par.drives, par.friction, 0.1 * par.width, ca)
+    shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
+    # one corner per joint instead of one for all: each is smoothed over its share of the width
+    isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / t.numel(), ca))
+    drawn = (1 - par.isolated) * shared + par.isolated * isolated
+    mechanical = ca.sum1(smooth_abs(t * w, par.width, ca))
+    return par.electrical * drawn + par.mechanical * mechanical + par.time, flow.tau_motor
+
+
+def _derivatives(power: _Power, tau: ca.SX, y: ca.SX, multiplier: ca.SX, weight: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Gradient of the cost, Jacobian of tau_motor, and Hessian of weight · cost + multiplier · tau_motor, all by y.
+
+    The chain rule is applied by hand: it takes a third of the operations that differentiating the composed cost twice
+    takes.
+    """
+    nq = tau.numel()
+    speeds = slice(nq, 2 * nq)
+    J_tau = ca.jacobian(tau, y)
+    J_inner = ca.vertcat(J_tau, ca.horzcat(ca.SX(nq, nq), ca.SX.eye(nq), ca.SX(nq, nq)))
+    pull = ca.SX.sym("pull", nq)
+    dynamics_bend = ca.substitute(ca.hessian(ca.dot(pull, tau), y)[0], pull, weight * power.slope[:nq] + multiplier)
+    # half of a symmetric product, mirrored
+    hessian = dynamics_bend + ca.tril2symm(ca.tril(J_inner.T @ (weight * power.bend @ J_inner)))
+    hessian[speeds, speeds] += power.friction_bend
+    jacobian = J_tau + 0
+    jacobian[:, speeds] += power.friction_slope
+    return J_inner.T @ power.slope, jacobian, hessian

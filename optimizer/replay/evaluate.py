@@ -20,6 +20,7 @@ from optimizer.energy.bus_flow import charges
 from optimizer.energy.losses import breakdown, power_flow
 from optimizer.energy.plant import Plant
 from optimizer.exceptions import DeadlineExceeded
+from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Arm
 from optimizer.replay.interval_energy import IntervalEnergy, joined
 from optimizer.replay.limit_report import LimitMonitor, LimitReport
@@ -52,6 +53,7 @@ class Evaluation:
     nearest: LeastClearance | None
 
 
+@one_thread()
 def evaluate(
     arm: Arm,
     motion: Waypoints | Log,

@@ -1,0 +1,108 @@
+"""Any number of threads of one process: every result is, bit for bit, what one thread alone gives."""
+
+from __future__ import annotations
+
+import random
+import threading
+from collections.abc import Iterator, Sequence
+
+import pytest
+from threadpoolctl import threadpool_limits
+
+from optimizer.methods import polynomial_ga
+from tests.optimizer.concurrent_work import Work, all_work, fingerprint
+
+THREADS = 8
+# work for every thread, a second in all, and work for one thread each
+QUICK = (
+    "move 2 by time_scaling",
+    "move 4 by uniform_scaling",
+    "move 5 by bspline",
+    "move 8 by lagrange",
+    "move 11 by bspline",
+    "move 13 by lagrange",
+    "uniformly scaled pose",
+    "out of reach",
+    "replay linear",
+    "replay with storage",
+    "replayed log",
+    "inverse kinematics 1",
+    "circle",
+    "certificate 1",
+    "certificate 2",
+)
+SLOW = (
+    "post",
+    "lower post",
+    "genetic algorithm",
+    "front",
+    "loaded pose",
+    "lighter load",
+    "any turn about the tool",
+    "carried cup",
+)
+FEW_GENERATIONS = 20
+# s: ample for a machine that is busy with other things; a quiet one needs a tenth
+PATIENCE = 1200.0
+
+
+@pytest.fixture(autouse=True)
+def _several_blas_threads() -> Iterator[None]:
+    """As in a program that leaves linear algebra as it is: results must not depend on its threads either."""
+    with threadpool_limits(limits=4, user_api="blas"):
+        yield
+
+
+def in_threads(shares: Sequence[Sequence[Work]]) -> list[dict[str, object]]:
+    """The fingerprint of every result by the work's name, for threads that each do their share at the same time."""
+    found: list[dict[str, object]] = [{} for _ in shares]
+    errors: list[BaseException] = []
+    ready = threading.Barrier(len(shares))
+
+    def work(own: dict[str, object], share: Sequence[Work]) -> None:
+        try:
+            ready.wait()
+            for each in share:
+                own[each.name] = fingerprint(each.run())
+        except BaseException as error:
+            errors.append(error)
+
+    threads = [threading.Thread(target=work, args=each, daemon=True) for each in zip(found, shares, strict=True)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE)
+    if errors:
+        raise errors[0]
+    assert not any(thread.is_alive() for thread in threads), "a thread waits for another for ever"
+    return found
+
+
+def assert_as_alone(shares: Sequence[Sequence[Work]]) -> None:
+    """First alone, then in threads."""
+    works = {each.name: each for share in shares for each in share}
+    alone = {name: fingerprint(each.run()) for name, each in works.items()}
+    for own, share in zip(in_threads(shares), shares, strict=True):
+        assert [each.name for each in share if own[each.name] != alone[each.name]] == []
+
+
+def shuffled(works: Sequence[Work], seed: int) -> list[Work]:
+    return random.Random(seed).sample(list(works), len(works))
+
+
+@pytest.mark.timeout(2 * PATIENCE)
+def test_eight_threads_give_what_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every thread does the same quick work; the rest goes round. Two threads plan paths at the same time."""
+    monkeypatch.setattr(polynomial_ga, "GENERATIONS", FEW_GENERATIONS)
+    works = {each.name: each for each in all_work()}
+    quick = [works[name] for name in QUICK]
+    assert_as_alone([[works[name], *shuffled(quick, k)] for k, name in enumerate(SLOW)])
+
+
+@pytest.mark.long
+@pytest.mark.timeout(2 * PATIENCE)
+def test_eight_threads_give_what_one_gives_fifty_times_each() -> None:
+    """Every thread does all the work, in an order of its own."""
+    works = all_work()
+    assert len(works) == 50
+    assert_as_alone([shuffled(works, k) for k in range(THREADS)])
