@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from models.robot import Array
+from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from optimizer.trajectories.spline import Spline
 
 
@@ -202,7 +203,6 @@ class Certificate:
     balance_error: float
     clearance: Clearance | None
 
-    RATIO_TOLERANCE = 1e-6
     POSITION_TOLERANCE = 1e-6
     # rounding of control points (1e-16 rad) over the square of the shortest knot span
     REST_TOLERANCE = 1e-7
@@ -212,7 +212,7 @@ class Certificate:
     def valid(self) -> bool:
         """Whether the motion holds every limit, meets its ends at rest and has its energy right. NaN is not valid."""
         return (
-            all(ratio <= 1 + self.RATIO_TOLERANCE for ratio in self.worst_ratio.values())
+            all(ratio <= 1 + RATIO_TOLERANCE for ratio in self.worst_ratio.values())
             and all(error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error)
             and self.rest_error <= self.REST_TOLERANCE
             and self.energy_error <= self.ENERGY_TOLERANCE

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import cast
 
 from optimizer.deadline import Deadline
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate
+from optimizer.solution import CandidateStatus
 
 PRUNED = "its lower bound is not below the best energy found"
 
@@ -36,9 +38,9 @@ def explore(
         if deadline.passed:
             break
         candidate.attempt = outcome = attempt(candidate)
-        if outcome.status == "out of time":
+        if outcome.status is SolveStatus.OUT_OF_TIME:
             break
-        candidate.status, candidate.reason = outcome.status, outcome.reason
+        candidate.status, candidate.reason = cast(CandidateStatus, outcome.status.value), outcome.reason
         if outcome.spline is not None:
             candidate.energy = prepared.objective_of(prepared.energy(outcome.spline))
             if best is None or best.energy is None or candidate.energy < best.energy:

@@ -23,7 +23,7 @@ from optimizer.kinematics.orientation_tolerance import nearest_orientation, tilt
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.free_spline import COARSE, FreeSpline
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import Guess
 from optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from optimizer.nlp.nonlinear_program import NonlinearProgram
@@ -202,7 +202,7 @@ def _proposal(
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
     result = solve(program, free, spline.duration, None, deadline)
-    count(SolveResult("failed", "a proposal", result.iterations, 1))
+    count(SolveResult(SolveStatus.FAILED, "a proposal", result.iterations, 1))
     if not result.feasible:
         return None
     return Guess(space, program.points(result.free), result.duration)

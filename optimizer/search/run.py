@@ -20,7 +20,7 @@ from optimizer.exceptions import (
 )
 from optimizer.methods import METHODS, solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals, fastest
-from optimizer.methods.method import Method, SolveResult
+from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
 from optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
@@ -42,7 +42,7 @@ from optimizer.solution import (
     UnreachableTarget,
 )
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import Spline, peak_rates, retimed, sampled, time_scale
+from optimizer.trajectories.spline import Spline, lasting, least_time_scale, retimed, sampled
 from optimizer.trajectories.time_scalings import quintic_spline
 
 # share of the deadline kept for checking and reporting the answer, at most [s]
@@ -120,9 +120,9 @@ class Run:
         """Why no candidate has a motion: what is in the way, where that is what stopped the best of them."""
         candidates = [candidate.report() for candidate in self.candidates]
         hits = [
-            (candidate, candidate.attempt.hit)
+            (candidate, candidate.attempt.collision)
             for candidate in self.candidates
-            if candidate.attempt and candidate.attempt.hit
+            if candidate.attempt and candidate.attempt.collision
         ]
         if not hits:
             return NoTrajectory(candidates)
@@ -156,7 +156,7 @@ class Run:
             solved.sort(
                 key=lambda o: self.prepared.objective_of(self.prepared.energy(o.spline)) if o.spline else np.inf
             )
-        late = [outcome for outcome in outcomes if outcome.status == "out of time"]
+        late = [outcome for outcome in outcomes if outcome.status is SolveStatus.OUT_OF_TIME]
         self.cut_short |= bool(late)
         return (solved + late + outcomes)[0]
 
@@ -180,7 +180,7 @@ class Run:
         same = [e for e in self.candidates if (e.start.target, e.goal.target) == ends]
         candidate = free_goal.between(self.prepared, self.candidates, found.start.q, found.goal.q, same)
         spline = found.trajectory.spline
-        outcome = SolveResult("solved", "converged", spline=spline, stationarity=found.solver.stationarity)
+        outcome = SolveResult(SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity)
         return candidate, outcome, self.prepared.energy(spline)
 
     def warm_start(self, spline: Spline) -> None:
@@ -192,11 +192,13 @@ class Run:
         if candidate.status == "infeasible" or self.deadline.passed:
             return
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
-        retimed = replace(spline, knots=spline.knots * (np.clip(spline.duration, least, most) / spline.duration))
-        energy = self.prepared.energy(retimed)
-        if self.certified(candidate, retimed, energy).valid:
-            self.accept_if_better(candidate, SolveResult("solved", "a known motion, retimed", spline=retimed), energy)
-        self.solve_from(candidate, *sampled(retimed), fine=self.problem.method == "time_scaling")
+        known = lasting(spline, float(np.clip(spline.duration, least, most)))
+        energy = self.prepared.energy(known)
+        if self.certified(candidate, known, energy).valid:
+            self.accept_if_better(
+                candidate, SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known), energy
+            )
+        self.solve_from(candidate, *sampled(known), fine=self.problem.method == "time_scaling")
         outcome = self.attempt(candidate)
         if outcome.spline is None:
             return
@@ -361,13 +363,12 @@ class Run:
             "quintic": quintic_spline(candidate.q_start, candidate.q_goal, best.duration),
         }
         for name in better:
-            limits = self.problem.arm.active_limits
-            needed = time_scale(peak_rates(motions[name]) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+            needed = least_time_scale(motions[name], self.problem.arm.active_limits.rates)
             spline = retimed(motions[name], max(needed, 1.0))
             energy = self.prepared.energy(spline)
             if self.allows(spline.duration) and self.certified(candidate, spline, energy).valid:
                 self.accept_if_better(
-                    candidate, SolveResult("solved", f"the {name} motion itself", spline=spline), energy
+                    candidate, SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline), energy
                 )
 
     def certified(self, candidate: Candidate, spline: Spline, energy: Energy) -> Certificate:
