@@ -55,7 +55,7 @@ def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
             outcome = solver.improve(Guess(space, points, 0.0))
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
-            solved += outcome.status == "solved"
+            solved += outcome.spline is not None
         rows.append(_row(n, walls[1:], iterations[1:]) | {"nodes": len(space.nodes), "solved": solved - 1})
     return rows
 
@@ -76,7 +76,7 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
             ).solve()
             walls.append(time.perf_counter() - began)
             iterations.append(outcome.iterations)
-            solved += outcome.status == "solved"
+            solved += outcome.spline is not None
         rows.append(_row(robot.nq, walls[1:], iterations[1:]) | {"solved": solved - 1})
     return rows
 

@@ -54,8 +54,8 @@ def measure(seed: int, count: int, method: MethodName) -> dict[str, Any]:
     return {
         "wall": Spread.of([wall for _, wall, _ in runs]),
         "iterations": Spread.of([outcome.iterations for _, _, outcome in runs]),
-        "statuses": dict(Counter(outcome.status for _, _, outcome in runs)),
-        "unsolved": [f"seed {move.seed} index {move.index}" for move, _, o in runs if o.status != "solved"],
+        "statuses": dict(Counter(outcome.status.value for _, _, outcome in runs)),
+        "unsolved": [f"seed {move.seed} index {move.index}" for move, _, o in runs if o.spline is None],
     }
 
 

@@ -7,6 +7,7 @@ from enum import StrEnum
 from typing import Literal
 
 from models.robot import Array
+from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from optimizer.trajectories.spline import Spline
 
 # what is minimised: energy drawn from the supply, or mechanical work
@@ -217,7 +218,6 @@ class Certificate:
     balance_error: float
     clearance: Clearance | None
 
-    RATIO_TOLERANCE = 1e-6
     POSITION_TOLERANCE = 1e-6
     # rounding of control points (1e-16 rad) over the square of the shortest knot span
     REST_TOLERANCE = 1e-7
@@ -227,7 +227,7 @@ class Certificate:
     def valid(self) -> bool:
         """Whether the motion holds every limit, meets its ends at rest and has its energy right. NaN is not valid."""
         return (
-            all(ratio <= 1 + self.RATIO_TOLERANCE for ratio in self.worst_ratio.values())
+            all(ratio <= 1 + RATIO_TOLERANCE for ratio in self.worst_ratio.values())
             and all(error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error)
             and self.rest_error <= self.REST_TOLERANCE
             and self.energy_error <= self.ENERGY_TOLERANCE

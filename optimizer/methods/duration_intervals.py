@@ -1,10 +1,9 @@
-"""Over which durations, and by which kernel parameters, a candidate's objective is a smooth cost.
+"""Intervals of durations on which the objective of a candidate is smooth, with the kernel parameters of each.
 
-Without a cycle and without a store, one interval holds all durations, and the cost is the objective itself. Waiting is
-linear in the duration on either side of the instant at which brakes would be on: a interval each, in which it is a
-weight
-on time, exactly. What a store saves depends on the whole course of its charge: there the cost takes every joule of net
-surplus to be worth `surplus_value`, and what it finds is judged by the exact energy.
+Without a cycle and without energy storage, one interval holds all durations, and the cost is the objective. In a cycle,
+the energy of waiting is linear in the duration on either side of the instant at which the brakes engage: one interval
+each, with an exact weight on time. The saving of an energy storage depends on the charge over the whole motion: the
+cost values each joule of net surplus at the constant `surplus_value`, and motions are compared by their exact energy.
 """
 
 from __future__ import annotations
@@ -19,8 +18,10 @@ from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 
 @dataclass(frozen=True)
 class DurationInterval:
-    """Durations [s], packed kernel parameters, and a constant part of the cost [J]; `minimum_time`: time is the
-    cost."""
+    """Durations from t_min to t_max [s], packed kernel parameters p, and a constant part of the cost [J].
+
+    `minimum_time`: the duration is the cost.
+    """
 
     p: Array
     t_min: float
@@ -32,7 +33,10 @@ class DurationInterval:
 def duration_intervals(
     prepared: PreparedProblem, q_goal: Array, surplus_value: float | None = None
 ) -> list[DurationInterval]:
-    """The duration_intervals of a problem for motions that end at q_goal (nq,), in order of duration."""
+    """The intervals of a problem for motions that end at q_goal (nq,) [rad], in order of duration.
+
+    `surplus_value` [1] is the value of a joule of net surplus with energy storage; None: the highest possible.
+    """
     problem = prepared.problem
     t_min = LEAST_DURATION if problem.duration_min is None else problem.duration_min
     t_max = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
@@ -55,5 +59,5 @@ def duration_intervals(
 
 
 def fastest(prepared: PreparedProblem) -> DurationInterval:
-    """All durations, and the duration as the cost."""
+    """All durations, with the duration as cost."""
     return DurationInterval(prepared.fastest_parameters, LEAST_DURATION, LONGEST_DURATION, minimum_time=True)

@@ -1,8 +1,8 @@
-"""`bspline`: every joint a quintic B-spline of its own, its control points and the duration optimised together.
+"""`bspline`: one quintic B-spline per joint; control points and duration are optimised together.
 
 C. Hansen, J. Öltjen, D. Meike, T. Ortmaier, "Enhanced approach for energy-efficient trajectory generation of industrial
-robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated where jerk switches, and the ways to a first
-guess, are this project's.
+robots", IEEE CASE 2012: B-splines optimised by an SQP. Knots repeated at the switches of jerk, and the initial guesses,
+are this project's.
 """
 
 from __future__ import annotations
@@ -12,32 +12,31 @@ from typing import ClassVar
 
 from models.robot import Array
 from optimizer.collision.path_planner import along, interpolation_is_free, length
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import Guess, SqpMethod
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
-from optimizer.trajectories import bspline
-from optimizer.trajectories import seven_segment as profile
+from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
 from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
 from optimizer.trajectories.spline import Spline, sample
 
-# control points of a first attempt with evenly spaced knots
+# control points of the first attempt, with evenly spaced knots
 COARSE = 13
-# evenly spaced knots are not tried where less than this multiple of the shortest duration is allowed
+# evenly spaced knots are not tried if less than this multiple of the shortest duration is allowed
 TIGHT = 1.12
-# how often knots are repeated where jerk switches: it bends there in a refined motion, and jumps in the finest
+# multiplicity of knots at the switches of jerk: with 2 the slope of jerk may jump there, with 3 jerk itself
 REFINED, EXACT = 2, 3
-# shares of the time left that a candidate's ways around may take, looking for them and in all
+# fractions of the time left for path planning, and for planning and the solves from planned paths together
 PLANNING, PATIENCE = 0.1, 0.3
-# a way longer than the shortest by more than this is not tried
+# planned paths longer than this multiple of the shortest one are skipped
 DETOUR = 1.3
-# said of what came of one
+# appended to the reason of a motion with a planned path as initial guess
 FROM_PLANNED_PATH = ", from a planned collision-free path"
 
 
 class FreeSpline(SqpMethod):
-    """Solves a candidate over splines whose knots follow from where jerk switches."""
+    """Solves a candidate by splines with knots at the switches of jerk."""
 
     guess_baselines: ClassVar[tuple[BaselineName, ...]] = (
         "trapezoid",
@@ -49,58 +48,65 @@ class FreeSpline(SqpMethod):
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic", "ruckig", "ruckig_slowed")
 
     def solve(self) -> SolveResult:
-        """From the ground up; over knots made for haste where time is short or evenly spaced ones find nothing."""
-        shortest = float(profile.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
+        """From the smoothed time-optimal motion on evenly spaced knots.
+
+        If time is short, or this finds no motion, then from the time-optimal motion with knots at its switches of jerk.
+        If the result collides, from planned collision-free paths.
+        """
+        shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
             tried.append(self.improve(Guess(space, self._smoothed(space), 0.0)))
-        if not tried or (tried[-1].status == "failed" and tried[-1].hit is None):
+        if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
             tried.append(self.improve(self.time_optimal_guess()))
-        if tried[-1].status == "failed" and tried[-1].hit is not None:
-            tried.append(self.around(tried[-1]))
-        return replace(tried[-1], iterations=sum(a.iterations for a in tried), solves=sum(a.solves for a in tried))
+        if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
+            tried.append(self.from_planned_paths(tried[-1]))
+        return _with_effort(tried[-1], tried)
 
-    def around(self, stuck: SolveResult) -> SolveResult:
-        """From ways that hit nothing, the cheapest motion that comes of them; `stuck` itself where none does."""
+    def from_planned_paths(self, failed: SolveResult) -> SolveResult:
+        """The motion of least energy from planned collision-free paths as initial guesses; `failed` if there is none.
+
+        A path is skipped if linear interpolation between it and a motion already found is almost collision-free: the
+        NLP would find the same motion again.
+        """
         prepared, space = self.prepared, bspline.uniform(COARSE)
         v_max, left = prepared.problem.arm.active_limits.v_max, max(self.deadline.left, 0.0)
         planning, patience = self.deadline.within(PLANNING * left), self.deadline.within(PATIENCE * left)
-        ways = prepared.surroundings.planned_paths(self.q_start, self.q_goal, planning)
+        paths = prepared.surroundings.planned_paths(self.q_start, self.q_goal, planning)
         found: list[SolveResult] = []
-        for way in ways:
-            if patience.passed or length(way, v_max) > DETOUR * length(ways[0], v_max):
+        for path in paths:
+            if patience.passed or length(path, v_max) > DETOUR * length(paths[0], v_max):
                 break
-            q, t = along(way, 1.0, v_max)
+            q, t = along(path, 1.0, v_max)
             motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
             if any(interpolation_is_free(prepared.surroundings.model, q, motion) for motion in motions):
                 continue
             points = space.fit(self.coordinates.from_joints(q), t)
-            outcome = self.improve(Guess(space, points, 0.0), guarded=True, deadline=patience)
-            found.append(replace(outcome, reason=f"{outcome.reason}{FROM_PLANNED_PATH}"))
-        solved = [
-            (prepared.objective_of(prepared.energy(a.spline)), k) for k, a in enumerate(found) if a.spline is not None
-        ]
-        best = found[min(solved)[1]] if solved else stuck
-        return replace(best, iterations=sum(a.iterations for a in found), solves=sum(a.solves for a in found))
+            result = self.improve(Guess(space, points, 0.0, collision_free=True), deadline=patience)
+            found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
+        energies = [(self._energy(a.spline), k) for k, a in enumerate(found) if a.spline is not None]
+        return _with_effort(found[min(energies)[1]] if energies else failed, found)
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
-        """More control points, placed where jerk switches, unless they are placed so already."""
+        """Whether the knots are evenly spaced: `solve_from` places more of them, at the switches of jerk."""
         return len(found.control_points) == COARSE
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
-        """From samples q (k, nq) at times t (k,), over knots where jerk bends, or jumps if `fine`."""
+        """From samples q (k, nq) at times t (k,), with knots REFINED, or EXACT if `fine`."""
         duration = float(t[-1])
         space = self.graded(duration, EXACT if fine else REFINED)
-        guess = Guess(space, space.fit(self.coordinates.from_joints(q), t / duration), duration)
-        # what was led around something would otherwise go back to where it is stuck
-        outcome = self.improve(guess, guarded=self.prepared.surroundings.is_near_contact(q))
-        led = outcome.status == "solved" and self.prepared.surroundings.has_planned_paths(self.q_start, self.q_goal)
-        return replace(outcome, reason=f"{outcome.reason}{FROM_PLANNED_PATH}") if led else outcome
+        points = space.fit(self.coordinates.from_joints(q), t / duration)
+        # without clearance constraints, a motion from a planned path would return to the obstacle
+        result = self.improve(
+            Guess(space, points, duration, collision_free=self.prepared.surroundings.is_near_contact(q))
+        )
+        planned = result.spline is not None and self.prepared.surroundings.has_planned_paths(self.q_start, self.q_goal)
+        return replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}") if planned else result
 
     def time_optimal_guess(self) -> Guess:
-        """The fastest motion under limits on speed, acceleration and jerk, in a space that holds its jerk's jumps."""
+        """The time-optimal motion under limits on speed, acceleration and jerk, with knots at its jumps of jerk."""
         line = self.coordinates
         fastest = time_optimal(line.limits, line.start, line.goal)
         duration = max(fastest.duration, LEAST_DURATION)
@@ -108,16 +114,21 @@ class FreeSpline(SqpMethod):
         return Guess(space, space.fit(fastest.q, fastest.t / duration), duration)
 
     def graded(self, duration: float, repeat: int) -> Basis:
-        """A space with knots where the leading coordinate's jerk switches in a motion of that duration."""
+        """A space with knots at the switches of the leading coordinate's jerk in a motion of `duration` [s]."""
         line = self.coordinates
-        return bspline.graded(profile.switches(line.goal - line.start, duration, line.limits), repeat)
+        return bspline.graded(seven_segment.switches(line.goal - line.start, duration, line.limits), repeat)
 
     def _smoothed(self, space: Basis) -> Array:
-        """Control points (n, r) of the fastest motion with its corners rounded: its positions at the Greville points.
+        """Control points (n, r) of the smoothed time-optimal motion: its positions at the Greville points.
 
-        Control values set to a function's values there give a spline that varies less than the function (Schoenberg).
+        A spline with a function's values there as control values varies less than the function (Schoenberg).
         """
         line = self.coordinates
         points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
         points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
         return points
+
+
+def _with_effort(result: SolveResult, tried: list[SolveResult]) -> SolveResult:
+    """A result with the effort of all attempts."""
+    return replace(result, iterations=sum(a.iterations for a in tried), solves=sum(a.solves for a in tried))

@@ -1,4 +1,4 @@
-"""`lagrange`: every joint one polynomial over the motion, its values at Chebyshev nodes and the duration optimised.
+"""`lagrange`: one polynomial per joint; its values at Chebyshev nodes and the duration are optimised.
 
 L.-P. Luo, C. Yuan, R.-J. Yan, Q. Yuan, J. Wu, K.-S. Shin, C.-S. Han, "Trajectory planning for energy minimization of
 industry robotic manipulators using the Lagrange interpolation method", Int. J. Precis. Eng. Manuf. 16, 2015: Lagrange
@@ -11,10 +11,9 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import Guess, SqpMethod
 from optimizer.solution import BaselineName
 from optimizer.trajectories.polynomial import polynomials
@@ -22,19 +21,19 @@ from optimizer.trajectories.ruckig_motion import time_optimal
 from optimizer.trajectories.spline import Spline
 from optimizer.trajectories.time_scalings import quintic
 
-# degree 15: every two nodes more save a UR5e some 0.15 % and take a fifth more time, here as at degrees 9 to 19, while
-# Bernstein's coefficients lose a digit with each three
+# degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all degrees from 9 to
+# 19; Bernstein's coefficients lose a digit with every three nodes
 NODES = 10
-# points at which a motion's positions are held against their limits
+# points at which positions are compared with their limits
 POSITION_POINTS = 512
-# nodes are moved inwards by this multiple of what the polynomial exceeds a limit by between them
+# nodes are moved inwards by this multiple of the excess between them
 POSITION_REPAIR = 1.5
-# a joint that starts or ends on its limit is beyond it by no more than this [rad]
+# greatest excess by rounding of a joint that starts or ends on its limit [rad]
 ROUNDING = 1e-9
 
 
 class Lagrange(SqpMethod):
-    """Solves a candidate over polynomials of degree NODES + 5."""
+    """Solves a candidate by polynomials of degree NODES + 5."""
 
     guess_baselines: ClassVar[tuple[BaselineName, ...]] = (
         "trapezoid",
@@ -45,28 +44,33 @@ class Lagrange(SqpMethod):
     )
 
     def solve(self) -> SolveResult:
-        """From the fastest jerk-limited motion, then from the quintic if that finds nothing."""
+        """From the time-optimal jerk-limited motion; if that finds no motion, from the quintic."""
         fastest = time_optimal(self.coordinates.limits, self.q_start, self.q_goal)
-        if fastest.duration > 0:
-            first = self.solve_from(fastest.q, fastest.t, fine=False)
-            if first.status in ("solved", "out of time"):
-                return first
-        else:
-            first = SolveResult("failed", "not tried")
         straight = quintic(self.q_start, self.q_goal, 1.0)
+        if fastest.duration == 0:
+            return self.solve_from(straight.q, straight.t, fine=False)
+        first = self.solve_from(fastest.q, fastest.t, fine=False)
+        if first.status in (SolveStatus.SOLVED, SolveStatus.OUT_OF_TIME):
+            return first
         second = self.solve_from(straight.q, straight.t, fine=False)
-        return replace(second, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
+        # of two failures, the one with a collision came further
+        collided = second.status is SolveStatus.FAILED and second.collision is None and first.collision is not None
+        result = first if collided else second
+        return replace(result, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,)."""
         space, duration = polynomials(NODES), float(t[-1])
         return self.improve(Guess(space, space.fit(q, t / duration), duration))
 
-    def _overshoot(self, spline: Spline) -> tuple[Array, ...]:
-        """Values at nodes do not bound a polynomial between them."""
-        q = BSpline(spline.knots, spline.control_points, spline.degree)(
-            np.linspace(0.0, spline.duration, POSITION_POINTS)
-        )
+    def overshoot(self, spline: Spline) -> tuple[Array, Array]:
+        """Excess (nq,) [rad] below and above the position limits: values at nodes do not bound a polynomial between."""
+        q = spline.curve(np.linspace(0.0, spline.duration, POSITION_POINTS))
         limits = self.prepared.problem.arm.active_limits
         below, above = limits.q_min - q.min(axis=0), q.max(axis=0) - limits.q_max
-        return tuple(np.where(beyond > ROUNDING, POSITION_REPAIR * beyond, 0.0) for beyond in (below, above))
+        return _repair(below), _repair(above)
+
+
+def _repair(excess: Array) -> Array:
+    """How far position limits move inwards for an excess (nq,) [rad]."""
+    return np.where(excess > ROUNDING, POSITION_REPAIR * excess, 0.0)

@@ -1,10 +1,11 @@
-"""A method: solves one candidate by one parametrisation."""
+"""A method: solves one candidate in one parametrisation."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,44 +14,58 @@ from optimizer.deadline import Deadline
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.solution import BaselineName, Clearance
-from optimizer.trajectories.quadrature import grid
-from optimizer.trajectories.spline import Spline, fine_samples, sample
+from optimizer.trajectories.spline import Spline
 
-# points per knot span at which torque is checked between the nodes
-TORQUE_POINTS = 4
+DEADLINE_PASSED = "the deadline passed"
+CONVERGED = "converged"
+
+
+class SolveStatus(StrEnum):
+    """Outcome of solving one candidate.
+
+    SOLVED: there is a motion within the limits. INFEASIBLE: the method has none for this candidate. FAILED: the method
+    found none. PRUNED: the motion collides and, even so, needs at least as much energy as the best motion known.
+    OUT_OF_TIME: the deadline passed.
+    """
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    FAILED = "failed"
+    PRUNED = "pruned"
+    OUT_OF_TIME = "out of time"
 
 
 @dataclass(frozen=True)
 class SolveResult:
-    """What came of a candidate: the spline if it is solved, and what was spent on it.
+    """Result of solving one candidate: status, reason for the report, the motion if solved, and the effort.
 
-    `iterations` are the method's own: of the SQP, generations, or energies evaluated. `hit` is what the best motion
-    found runs into, where it does. It is pruned where it is dearer than a motion known even before it keeps clear.
+    `iterations` are those of the method: SQP iterations, generations, or energies evaluated. `solves` counts the NLPs.
+    `collision` is the clearance that the best motion found violates, None if it violates none.
     """
 
-    status: Literal["solved", "infeasible", "failed", "pruned", "out of time"]
+    status: SolveStatus
     reason: str
     iterations: int = 0
     solves: int = 0
     spline: Spline | None = None
     stationarity: float | None = None
-    hit: Clearance | None = None
+    collision: Clearance | None = None
 
 
 class Method(ABC):
-    """Solves one candidate, from q_start to q_goal (nq,), by one method, before `deadline`.
+    """Solves one candidate, from q_start to q_goal (nq,) [rad], before `deadline`.
 
-    `interval` says which durations are allowed and what is minimised; None: the problem's first.
+    `interval` holds the allowed durations and the cost; None: the first one of the problem.
     """
 
-    # the baselines that are first guesses of a motion of this kind, and those that are motions of this kind
+    # baselines used as initial guess, and baselines that the method can represent exactly and therefore accepts
     guess_baselines: ClassVar[tuple[BaselineName, ...]] = ()
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ()
-    # how many candidates are solved before the rest is left
+    # greatest number of candidates that are solved
     most_solved: ClassVar[int | None] = None
-    # whether it ends where nothing nearby is better
+    # whether it ends in a local optimum
     converges: ClassVar[bool] = True
-    # what a motion already found spends [J], in the objective: it is not worth the while to keep dearer ones clear
+    # energy of the best motion known [J], in the objective: motions that collide and need more are not solved further
     best_known: float = np.inf
 
     def __init__(
@@ -68,21 +83,16 @@ class Method(ABC):
 
     @abstractmethod
     def solve(self) -> SolveResult:
-        """The method, from the ground up."""
+        """Solve without an initial guess from elsewhere (cold start)."""
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
-        """Whether `learn` may make more of what `solve` found."""
+        """Whether `solve_from` may improve the motion that `solve` found."""
         return False
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
-        """An attempt from samples q (k, nq) at times t (k,) of a motion; `fine` where a first one fell short."""
-        return SolveResult("failed", "the method takes no motion for a guess")
+        """Solve from samples q (k, nq) [rad] of a motion at times t (k,) [s] (warm start).
 
-    def torque_peaks(self, spline: Spline) -> Array:
-        """Greatest absolute motor torques (nq,) at the nodes of a motion and at the certificate's own instants."""
-        # where a joint turns back, friction changes sign within a millisecond
-        between, replayed = fine_samples(spline, TORQUE_POINTS)[1:], sample(spline, grid(spline.duration))
-        q, v, a = (np.concatenate(both) for both in zip(between, replayed, strict=True))
-        tau = self.prepared.torques(q, v, a) + self.prepared.friction.torque(v)
-        return np.asarray(np.abs(tau).max(axis=0))
+        `fine`: in a finer space, after a first attempt needed more energy than the samples.
+        """
+        return SolveResult(SolveStatus.FAILED, "the method takes no initial guess")

@@ -1,9 +1,9 @@
-"""`polynomial_ga`: every joint one polynomial, its values and the duration bred by a genetic algorithm.
+"""`polynomial_ga`: one polynomial per joint; its values and the duration are found by a genetic algorithm.
 
 R.-F. Fung, Y.-H. Cheng, "Trajectory planning based on minimum absolute input energy for an LCD glass-handling robot",
 Appl. Math. Model. 38, 2014: high-degree polynomials by a real-coded genetic algorithm. The algorithm is PyGAD's (A. F.
-Gad, "PyGAD: an intuitive genetic algorithm Python library", Multimed. Tools Appl. 83, 2024). Nothing tells that it has
-converged, so its answers never count as optimal.
+Gad, "PyGAD: an intuitive genetic algorithm Python library", Multimed. Tools Appl. 83, 2024). It has no test of
+convergence, so its answers never count as optimal. It does not avoid obstacles: a motion that collides is a failure.
 """
 
 from __future__ import annotations
@@ -15,33 +15,35 @@ import numpy as np
 from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.method import Method, SolveResult
+from optimizer.methods.limit_repair import torque_peaks
+from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.trajectories import quintic
 from optimizer.trajectories.polynomial import polynomials
-from optimizer.trajectories.spline import peak_rates, retimed, spline_of, time_scale
+from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
 
-# degree 9: more values are more to search than a few seconds are enough for
+# degree 9: with more values a few seconds are too short for the search
 NODES = 4
 POPULATION, GENERATIONS, PARENTS, ELITE, TOURNAMENT = 80, 120, 24, 4, 4
 SEED = 0
-# how far values may leave the straight line: this share of the joint's displacement, and this much in any case [rad]
-TRAVEL_SHARE, LEAST_REACH = 0.25, 0.15
-# spread of the first population and of a mutation, as a share of that; how many genes mutate
+# greatest deviation of a value from the straight line: this fraction of the joint's displacement, at least this [rad]
+DISPLACEMENT_FRACTION, LEAST_REACH = 0.25, 0.15
+# spread of the first population and of a mutation, as a fraction of that deviation; fraction of genes that mutate
 SPREAD, MUTATION, MUTATION_SHARE = 0.1, 0.08, 0.15
-# the slowest duration bred, in multiples of the shortest that speed, acceleration and jerk allow
+# the longest duration, in multiples of the shortest one within the limits on speed, acceleration and jerk
 SLOWEST = 4.0
-# rates peak between grid points, torque between nodes: kept below their limits by these shares
-RATES_HELD, TORQUE_HELD = 1 - 1e-3, 1 - 5e-3
-# what a limit broken by all of itself multiplies the cost by, beyond 1
+# the limits on rates and torque are used up to these ratios: rates peak between grid points, torque between nodes
+RATES_USED, TORQUE_USED = 1 - 1e-3, 1 - 5e-3
+# relative increase of the cost for a limit exceeded by 100 %
 PENALTY = 20.0
-# a motion that still breaks torque between the nodes is retimed by this factor, so many times at most
-SLOWER, SLOWINGS = 1.01, 60
+# a motion that exceeds torque between the nodes is retimed by this factor, at most so many times
+TIME_SCALE, RETIMINGS = 1.01, 60
 
 
 class PolynomialGA(Method):
-    """Solves a candidate by breeding. Genes: departures from the straight line at the nodes, and the duration."""
+    """Solves a candidate by a genetic algorithm; genes are the deviations from the straight line, and the duration."""
 
-    # each takes seconds: those of least bound, which are likeliest to be best
+    # each takes seconds: only the candidates of least lower bound are solved
     most_solved: ClassVar[int | None] = 3
     converges: ClassVar[bool] = False
 
@@ -55,23 +57,22 @@ class PolynomialGA(Method):
     ) -> None:
         super().__init__(prepared, q_start, q_goal, deadline, interval)
         self.space = polynomials(NODES)
-        x = self.space.at
-        self._line = q_start + np.outer(x**3 * (10 - 15 * x + 6 * x**2), q_goal - q_start)
-        self._reach = np.maximum(TRAVEL_SHARE * np.abs(q_goal - q_start), LEAST_REACH)
+        self._line = q_start + np.outer(quintic.fraction(self.space.at), q_goal - q_start)
+        self._reach = np.maximum(DISPLACEMENT_FRACTION * np.abs(q_goal - q_start), LEAST_REACH)
         self.generations = 0
         self.first_cost = np.inf
 
     def solve(self) -> SolveResult:
-        """Breed until the generations or the time are used up, and make the best motion hold every limit."""
+        """Run all generations, or until the deadline, and bring the best motion within the limits."""
         import pygad  # a request for another method need not wait for it
 
         if self.deadline.passed:
-            return SolveResult("out of time", "the deadline passed")
+            return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
         rng = np.random.default_rng(SEED)
         genes = NODES * len(self.q_start) + 1
         first = np.clip(rng.normal(0.0, SPREAD, (POPULATION, genes)), -1.0, 1.0)
         first[:, -1] = np.linspace(-1.0, 1.0, POPULATION)
-        # straight lines at several durations among them
+        # a quarter are straight lines, at several durations
         first[::4, :-1] = 0.0
         self.first_cost = float(self.costs(first).min())
         ga = pygad.GA(
@@ -95,10 +96,10 @@ class PolynomialGA(Method):
         )
         ga.run()
         best = np.asarray(ga.best_solution(ga.last_generation_fitness)[0], dtype=float)
-        return self._held(best)
+        return self._within_limits(best)
 
     def costs(self, genes: Array) -> Array:
-        """The cost [J] of every chromosome (P, n), (P,), with the penalties for what it breaks."""
+        """The cost (P,) [J] of every chromosome (P, n), with penalties for the limits that it exceeds."""
         limits = self.prepared.problem.arm.active_limits
         points, duration, late = self._decoded(genes)
         count, nq = len(points), points.shape[2]
@@ -108,29 +109,28 @@ class PolynomialGA(Method):
         cost, tau = self.prepared.kernel.value(z.reshape(-1, 3 * nq), self.interval.p)
         nodes = len(self.space.nodes)
         total = duration * (cost.reshape(count, nodes) @ self.space.weights) + self.interval.constant
-        torque = np.abs(tau).reshape(count, nodes, nq).max(axis=1) / (limits.tau_max * TORQUE_HELD)
+        torque = np.abs(tau).reshape(count, nodes, nq).max(axis=1) / (limits.tau_max * TORQUE_USED)
         q = z[:, :, 0]
         beyond = np.maximum(limits.q_min - q.min(axis=1), q.max(axis=1) - limits.q_max) / self._reach
         broken = np.maximum(torque - 1, 0).sum(axis=1) + np.maximum(beyond, 0).sum(axis=1) + late
         return np.asarray(total + PENALTY * broken * np.abs(total))
 
     def _decoded(self, genes: Array) -> tuple[Array, Array, Array]:
-        """Points (P, NODES + 2, nq), durations (P,) [s], and by which share the longest duration is too short (P,)."""
+        """Points (P, NODES + 2, nq), durations (P,) [s], and the relative excess over the longest duration (P,)."""
         count, nq = len(genes), len(self.q_start)
         values = self._line + genes[:, :-1].reshape(count, NODES, nq) * self._reach
         ends = np.ones((count, 1, 1))
         points = np.concatenate([ends * self.q_start, values, ends * self.q_goal], axis=1)
         limits = self.prepared.problem.arm.active_limits
         peaks = np.abs(np.einsum("dgm,pmj->pdgj", self.space.at_grid, points, optimize=True)).max(axis=2)
-        ratios = (peaks / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD)).max(axis=2)
-        least = np.maximum((ratios ** (1 / np.arange(1, 4))).max(axis=1), self.t_min)
+        least = np.maximum(time_scales(peaks / (limits.rates * RATES_USED)), self.t_min)
         # the gene is linear in the duration's logarithm
         duration = np.clip(least * SLOWEST ** ((genes[:, -1] + 1) / 2), self.t_min, self.t_max)
         return points, duration, np.maximum(least / self.t_max - 1, 0)
 
     def _fitness(self, ga: Any, genes: Array, indices: Any) -> list[float]:
         genes = np.asarray(genes, dtype=float).reshape(-1, NODES * len(self.q_start) + 1)
-        # as many as ever: the kernel is set up for a number of nodes
+        # always POPULATION of them: the kernel is set up for a number of nodes
         padded = np.concatenate([genes, np.zeros((POPULATION - len(genes), genes.shape[1]))])
         return [float(-cost) for cost in self.costs(padded)[: len(genes)]]
 
@@ -138,19 +138,24 @@ class PolynomialGA(Method):
         self.generations += 1
         return "stop" if self.deadline.passed else None
 
-    def _held(self, genes: Array) -> SolveResult:
-        """The motion of a chromosome, retimed until it holds every limit between the nodes too."""
+    def _within_limits(self, genes: Array) -> SolveResult:
+        """The motion of a chromosome, retimed until it is within the limits between the nodes too."""
         limits = self.prepared.problem.arm.active_limits
         points, duration, _ = self._decoded(genes[None])
         spline = spline_of(self.space, points[0], float(duration[0]))
-        needed = time_scale(peak_rates(spline) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+        needed = least_time_scale(spline, limits.rates)
         if needed > 1:
             spline = retimed(spline, needed)
-        for _ in range(SLOWINGS):
-            if spline.duration > self.t_max or (self.torque_peaks(spline) <= limits.tau_max).all():
+        for _ in range(RETIMINGS):
+            if spline.duration > self.t_max or (torque_peaks(self.prepared, spline) <= limits.tau_max).all():
                 break
-            spline = retimed(spline, SLOWER)
-        if spline.duration > self.t_max or (self.torque_peaks(spline) > limits.tau_max).any():
-            return SolveResult("failed", "bred no motion that holds the limits", self.generations, 1)
+            spline = retimed(spline, TIME_SCALE)
+        if spline.duration > self.t_max or (torque_peaks(self.prepared, spline) > limits.tau_max).any():
+            reason = "the genetic algorithm found no motion within the limits"
+            return SolveResult(SolveStatus.FAILED, reason, self.generations, 1)
+        collision = self.prepared.surroundings.worst_violation(spline)
+        if collision is not None:
+            reason = f"found no collision-free motion: {collision.message}"
+            return SolveResult(SolveStatus.FAILED, reason, self.generations, 1, collision=collision)
         reason = f"the best of {self.generations} generations"
-        return SolveResult("solved", reason, self.generations, 1, spline)
+        return SolveResult(SolveStatus.SOLVED, reason, self.generations, 1, spline)

@@ -1,7 +1,4 @@
-"""One start and goal pair: what solves it, and the way from a first guess to a motion that holds every limit.
-
-The methods themselves are in `optimizer.methods`, a file each.
-"""
+"""Methods whose motions form a linear space: from an initial guess to a motion within every limit, by the SQP."""
 
 from __future__ import annotations
 
@@ -12,45 +9,66 @@ import numpy as np
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import Deadline
-from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.limit_repair import MARGIN, initial_bounds, tightened
-from optimizer.methods.method import Method, SolveResult
-from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
+from optimizer.methods.limit_repair import (
+    MARGIN,
+    LimitCheck,
+    initial_bounds,
+    path_excess,
+    repair_factors,
+    slightly_retimed,
+    tightened,
+    with_repaired_path,
+)
+from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from optimizer.nlp.sqp import SqpStatus, solve
+from optimizer.nlp.nonlinear_program import NonlinearProgram
+from optimizer.nlp.sqp import Result, SqpStatus, solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Clearance
 from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, peak_rates, retimed, sample, spline_of, time_scale
+from optimizer.trajectories.spline import Spline, spline_of, time_scale
 
-# times that limits are tightened where the motion breaks them between the nodes, and by how much beyond the excess
+# times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 8
-REPAIR_MARGIN = 2e-4
-# torque is tightened by this multiple of its excess: the peak that is held down between two nodes comes up beside them
-TORQUE_REPAIR = 1.5
-# a motion is retimed by at most this factor in place of another solve
-MOST_STRETCH = 1 + 5e-4
-# first durations tried, in multiples of the shortest that the guess allows
-STRETCHES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
-# samples at which limits along the path are looked at, and the multiple of an excess by which they are tightened
-PATH_SAMPLES, PATH_REPAIR = 401, 1.5
-NO_BETTER = "its best motion hits something, and even so spends no less than the best found"
+# initial durations tried, in multiples of the shortest one of the guess
+TIME_SCALES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
+NO_BETTER = (
+    "not solved further: its motion collides, and even so needs at least as much energy as the best motion found"
+)
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Where to begin: a spline space, all control points (n, r) in the candidate's coordinates, a duration [s]."""
+    """An initial guess: spline space, all control points (n, r) in the candidate's coordinates, duration [s].
+
+    `collision_free`: the NLP has clearance constraints from the start. Other guesses get them after a collision.
+    """
 
     space: Basis
     points: Array
     duration: float
+    collision_free: bool = False
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """One solve: the NLP, its limits before they become those of the coordinates, and where the SQP starts.
+
+    `pairs` are the pairs of bodies that have a clearance constraint.
+    """
+
+    program: NonlinearProgram
+    limits: Limits
+    pairs: Indices
+    free: Array
+    duration: float
+    multiplier: Array | None = None
 
 
 class SqpMethod(Method):
-    """A method whose motions live in a linear space and are optimised by the SQP."""
+    """A method whose motions form a linear space; the SQP optimises them."""
 
     def __init__(
         self,
@@ -63,105 +81,78 @@ class SqpMethod(Method):
         super().__init__(prepared, q_start, q_goal, deadline, interval)
         self.coordinates = self._coordinates(prepared.problem.arm.active_limits.scaled(1 - MARGIN))
 
-    def improve(self, guess: Guess, guarded: bool = False, deadline: Deadline | None = None) -> SolveResult:
-        """Optimise from a guess, tightening the limits where the motion breaks them between the nodes.
+    def improve(self, guess: Guess, deadline: Deadline | None = None) -> SolveResult:
+        """Optimise from a guess. While the motion exceeds a limit between the nodes, tighten the limit and repeat.
 
-        With `guarded`, for a guess that hits nothing, it keeps clear from the first step on. `deadline` is one earlier
-        than the candidate's.
+        `deadline` replaces the candidate's if it is given.
         """
-        interval, kernel = self.interval, self.prepared.kernel
         deadline = self.deadline if deadline is None else deadline
-        program = NonlinearProgram(
-            kernel, guess.space, interval.p, self.coordinates, self.t_min, self.t_max, interval.constant
-        )
-        pairs: Indices = np.zeros(0, dtype=np.intp)
-        if guarded:
-            guessed = spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
-            pairs = self.prepared.surroundings.active_pairs(guessed)
-        path = self.prepared.surroundings.with_clearance(pairs) if guarded else self.prepared.path
-        program = replace(program, path=path, path_bounds=initial_bounds(path))
-        limits = self.prepared.problem.arm.active_limits.scaled(1 - MARGIN)
-        free = guess.points[guess.space.free]
-        duration = self._first_duration(program, free, guess.duration)
-        iterations, multiplier, hit = 0, None, None
+        stage = self._first_stage(guess)
+        iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):
-            result = solve(program, free, duration, multiplier, deadline)
+            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, deadline)
             iterations += result.iterations
             if result.status is SqpStatus.OUT_OF_TIME:
-                return SolveResult("out of time", "the deadline passed", iterations, solves)
-            if result.violation > FEASIBILITY:
-                reason = f"found no motion of {guess.space.n} control points that holds the limits"
-                reason = reason if hit is None else f"found no way around: {hit.message}"
-                return SolveResult("failed", reason, iterations, solves, hit=hit)
-            spline = spline_of(guess.space, program.joint_points(result.free), result.duration)
-            excess = self._excess(spline)
-            if excess is not None:
-                spline = self._stretched(spline, excess)
-                excess = self._excess(spline)
-            hit = self.prepared.surroundings.worst_violation(spline)
-            if (
-                hit is not None
-                and not len(pairs)
-                and self.prepared.objective_of(self.prepared.energy(spline)) >= self.best_known
-            ):
-                return SolveResult("pruned", NO_BETTER, iterations, solves)
-            beyond = self._beyond(spline, program.path, hit)
-            if excess is None and hit is None and not beyond.any():
-                return SolveResult("solved", "converged", iterations, solves, spline, result.stationarity)
-            if excess is not None:
-                limits = tightened(limits, excess)
-                program = replace(program, coordinates=self._coordinates(limits))
-            # pairs are watched only once something is hit, since most motions hit nothing
-            nearby = pairs if hit is None else np.union1d(pairs, self.prepared.surroundings.active_pairs(spline))
-            program = self._watched(program, pairs, nearby, beyond, hit)
-            pairs = nearby
-            # the solver takes no step for positions alone: it bounds them
-            free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
-            duration, multiplier = result.duration, result.multiplier
-        reason = "limits stay broken between the nodes" if hit is None else f"found no way around: {hit.message}"
-        return SolveResult("failed", reason, iterations, REPAIRS, hit=hit)
+                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, iterations, solves)
+            if not result.feasible:
+                reason = f"found no motion of {guess.space.n} control points within the limits"
+                return _failed(reason, collision, iterations, solves)
+            check = self._checked(stage.program, result)
+            collision = check.collision
+            if check.passed:
+                return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, check.spline, result.stationarity)
+            if collision is not None and not len(stage.pairs) and self._energy(check.spline) >= self.best_known:
+                return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
+            stage = self._repaired(stage, result, check)
+        return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
 
-    def _watched(
-        self, program: NonlinearProgram, pairs: Indices, nearby: Indices, beyond: Array, hit: Clearance | None
-    ) -> NonlinearProgram:
-        """The program with the limits along its path tightened, and all of `nearby` watched instead of `pairs`."""
-        room = program.path_bounds - beyond
-        if len(nearby) > len(pairs):
-            path = self.prepared.surroundings.with_clearance(nearby)
-            widened = initial_bounds(path)
-            widened[np.append(np.ones(len(room) - len(pairs), dtype=bool), np.isin(nearby, pairs))] = room
-            return replace(program, path=path, path_bounds=widened)
-        if hit is not None and program.path is not None and not beyond.any():
-            # met nowhere, but not proven either: a hair more between the points that are held
-            room -= np.where(np.array(program.path.names) == CLEARANCE, RESERVE / SCALE, 0.0)
-        return replace(program, path_bounds=room)
+    def overshoot(self, spline: Spline) -> tuple[Array, Array]:
+        """Excess (nq,) [rad] of a motion below and above the position limits.
 
-    def _beyond(self, spline: Spline, path: PathConstraints | None, hit: Clearance | None) -> Array:
-        """By how much each share of the limits along the path must shrink, (c,): they are broken between the points."""
-        if path is None:
-            return np.zeros(0)
-        # clearance comes last, and where it is proven the motion keeps it
-        looked_at = path if hit is not None else self.prepared.path
-        share = np.zeros(len(path.names))
-        if looked_at is not None:
-            q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
-            share[: len(looked_at.names)] = looked_at.ratios(q, v).max(axis=0)
-        beyond = share - 1
-        return np.where(beyond > -REPAIR_MARGIN / 4, PATH_REPAIR * np.maximum(beyond, 0.0) + REPAIR_MARGIN, 0.0)
+        None for a B-spline: it stays within the hull of its control points.
+        """
+        none = np.zeros(len(self.q_start))
+        return none, none
 
     def _coordinates(self, limits: Limits) -> Coordinates:
-        """What the space describes: every joint by itself."""
+        """The coordinates of the spline: here every joint by itself."""
         return Coordinates.joints(self.q_start, self.q_goal, limits)
 
+    def _energy(self, spline: Spline) -> float:
+        """Energy of a motion [J], in the objective."""
+        return self.prepared.objective_of(self.prepared.energy(spline))
+
+    def _first_stage(self, guess: Guess) -> _Stage:
+        prepared, interval = self.prepared, self.interval
+        pairs: Indices = np.zeros(0, dtype=np.intp)
+        path = prepared.path
+        if guess.collision_free:
+            pairs = prepared.surroundings.active_pairs(
+                spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
+            )
+            path = prepared.surroundings.with_clearance(pairs)
+        program = NonlinearProgram(
+            prepared.kernel,
+            guess.space,
+            interval.p,
+            self.coordinates,
+            self.t_min,
+            self.t_max,
+            interval.constant,
+            path=path,
+            path_bounds=initial_bounds(path),
+        )
+        free = guess.points[guess.space.free]
+        limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
+        return _Stage(program, limits, pairs, free, self._first_duration(program, free, guess.duration))
+
     def _first_duration(self, program: NonlinearProgram, free: Array, least: float) -> float:
-        """The cheapest of a few durations at which the guess holds the limits on speed, acceleration and jerk."""
-        limits = program.limits
-        rates = limits.rates
+        """The duration [s] of least cost among a few at which the guess is within the limits on its rates."""
         peaks = np.abs(program.kinematics(free)).max(axis=1)
-        shortest = max(time_scale(peaks / rates), least, program.t_min)
+        shortest = max(time_scale(peaks / program.limits.rates), least, program.t_min)
         if shortest >= program.t_max:
             return program.t_max
-        durations = [shortest * stretch for stretch in STRETCHES]
+        durations = [shortest * scale for scale in TIME_SCALES]
         if program.t_max < LONGEST_DURATION:
             durations.append(program.t_max)
         best, chosen = np.inf, shortest
@@ -169,37 +160,44 @@ class SqpMethod(Method):
             if duration > program.t_max:
                 continue
             cost, tau = program.value(free, duration)
-            cost *= 1 + float(np.maximum(np.abs(tau) / limits.tau_max - 1, 0).max())
+            cost *= 1 + float(np.maximum(np.abs(tau) / program.limits.tau_max - 1, 0).max())
             if cost < best:
                 best, chosen = cost, duration
             elif best < np.inf and duration < program.t_max:
                 break
         return chosen
 
-    def _stretched(self, spline: Spline, factors: Limits) -> Spline:
-        """The motion retimed until speed, acceleration and jerk hold their limits, if that takes next to no time."""
-        needed = time_scale(1 / factors.rates)
-        return spline if needed > MOST_STRETCH or spline.duration * needed > self.t_max else retimed(spline, needed)
+    def _checked(self, program: NonlinearProgram, result: Result) -> LimitCheck:
+        """The motion that an NLP gave, slightly retimed if that repairs it, with its excess over the limits."""
+        prepared = self.prepared
+        spline = spline_of(program.basis, program.joint_points(result.free), result.duration)
+        factors = repair_factors(prepared, spline, self.overshoot(spline))
+        if factors is not None:
+            spline = slightly_retimed(spline, factors, self.t_max)
+            factors = repair_factors(prepared, spline, self.overshoot(spline))
+        collision = prepared.surroundings.worst_violation(spline)
+        return LimitCheck(spline, factors, collision, path_excess(prepared, spline, program.path, collision))
 
-    def _excess(self, spline: Spline) -> Limits | None:
-        """The factors (≤ 1) by which each limit must be tightened, positions by how much [rad]; None if all hold."""
-        limits = self.prepared.problem.arm.active_limits
-        rates = peak_rates(spline)
-        found = {
-            "v_max": rates[0] / limits.v_max,
-            "a_max": rates[1] / limits.a_max,
-            "j_max": rates[2] / limits.j_max,
-            "tau_max": self.torque_peaks(spline) / limits.tau_max,
-        }
-        below, above = self._overshoot(spline)
-        held = 1 - REPAIR_MARGIN / 4
-        if max(float(ratio.max()) for ratio in found.values()) <= held and not (below.any() or above.any()):
-            return None
-        factors = {name: np.where(r > held, r + REPAIR_MARGIN, 1.0) for name, r in found.items()}
-        factors["tau_max"] = 1 + TORQUE_REPAIR * (factors["tau_max"] - 1)
-        return Limits(q_min=below, q_max=above, **{name: 1 / factor for name, factor in factors.items()})
+    def _repaired(self, stage: _Stage, result: Result, check: LimitCheck) -> _Stage:
+        """The next solve: limits tightened by their excess, from where the SQP ended."""
+        program, limits, pairs = stage.program, stage.limits, stage.pairs
+        if check.factors is not None:
+            limits = tightened(limits, check.factors)
+            program = replace(program, coordinates=self._coordinates(limits))
+        # clearance is constrained only after a collision, since most motions have none
+        nearby = (
+            pairs
+            if check.collision is None
+            else np.union1d(pairs, self.prepared.surroundings.active_pairs(check.spline))
+        )
+        program = with_repaired_path(self.prepared, program, pairs, nearby, check)
+        # the SQP takes no step for positions alone: it bounds them
+        free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
+        return _Stage(program, limits, nearby, free, result.duration, result.multiplier)
 
-    def _overshoot(self, spline: Spline) -> tuple[Array, ...]:
-        """How far the joints go below and above their range [rad], (nq,) each: a B-spline's hull keeps it inside."""
-        none = np.zeros(len(self.q_start))
-        return none, none
+
+def _failed(reason: str, collision: Clearance | None, iterations: int, solves: int) -> SolveResult:
+    """The result without a motion; a collision is its cause if there was one."""
+    if collision is not None:
+        reason = f"found no collision-free motion: {collision.message}"
+    return SolveResult(SolveStatus.FAILED, reason, iterations, solves, collision=collision)

@@ -1,7 +1,7 @@
-"""The shortest time law along the straight line in joint space, by toppra (Pham, Pham 2018).
+"""The time-optimal scaling of the straight line in joint space, by toppra (Pham, Pham 2018).
 
-toppra knows speed, acceleration and torque, not jerk: its law bounds the duration of every time-scaled motion from
-below, says whether there is one at all, and shapes the first guess.
+toppra limits speed, acceleration and torque, but not jerk. Its duration is therefore a lower bound for every motion
+along the line. Its scaling says whether there is such a motion, and serves as initial guess.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from optimizer.trajectories.bspline import greville
 logging.getLogger("toppra").setLevel(logging.ERROR)
 
 GRID = np.linspace(0.0, 1.0, 31)
-# share of toppra's duration that counts as proven: its constraints hold at the grid points only
+# fraction of toppra's duration that counts as a lower bound: its constraints hold at the grid points only
 TRUST = 0.98
 
 
@@ -35,20 +35,20 @@ class TimeOptimalScaling:
 
     @property
     def duration_bound(self) -> float:
-        """No time-scaled motion is shorter [s]."""
+        """Lower bound on the duration of every motion along the line [s]."""
         return TRUST * float(self.times[-1])
 
     def fractions(self, knots: Array) -> Array:
-        """Control values (n,) of a spline over clamped knots of [0, 1] that follows the law, at rest at both ends."""
+        """Control values (n,) of a spline over clamped knots of [0, 1] that follows the scaling from rest to rest."""
         values = np.interp(greville(knots) * self.times[-1], self.times, GRID)
         values[:3], values[-3:] = 0.0, 1.0
         return np.asarray(values)
 
 
 def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> TimeOptimalScaling | None:
-    """The shortest law under speed, acceleration and torque limits, None where there is none.
+    """The time-optimal scaling under speed, acceleration and torque limits; None if there is none.
 
-    The motor torque's limit is relaxed by the most that friction can lend: the result stays a bound.
+    The limit of the motor torque is relaxed by the greatest friction torque, so that the duration stays a lower bound.
     """
     limits, model = prepared.problem.arm.active_limits, prepared.model
     displacement = q_goal - q_start
@@ -75,7 +75,7 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
 
 @lru_cache(maxsize=32)
 def _rate_constraints(v_max: tuple[float, ...], a_max: tuple[float, ...]) -> tuple[Any, Any]:
-    """toppra's constraints on speed and acceleration: kept, since it prints their limits whenever it makes one."""
+    """toppra's constraints on speed and acceleration; cached, since toppra prints the limits of every new one."""
     v, a = np.array(v_max), np.array(a_max)
     return (
         constraint.JointVelocityConstraint(np.stack([-v, v], axis=1)),

@@ -1,13 +1,11 @@
-"""`uniform_scaling`: a given motion retimed evenly, by the factor at which it spends least.
+"""`uniform_scaling`: the time-optimal motion with time scaled by the one factor of least energy.
 
 D. Meike, M. Pellicciari, G. Berselli, "Energy efficient use of multirobot production lines in the automotive industry:
 detailed system modeling and optimization", IEEE Trans. Autom. Sci. Eng. 11, 2014: one factor per motion scales the time
-of what the controller would do. The motion given here is the time-optimal jerk-limited one of all joints in step.
+of the controller's motion. Here this is the time-optimal jerk-limited motion of all joints together.
 """
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -15,23 +13,22 @@ from scipy.optimize import minimize_scalar
 from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.methods.duration_intervals import DurationInterval
-from optimizer.methods.method import Method, SolveResult
+from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import Spline, peak_rates, sample, time_scale
+from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample
 
-# factors tried, each so many times the one before; the search ends when so many in a row spend more than the best
+# ratio of successive factors, and the number of successive factors without a decrease that ends the search
 RATIO, PATIENCE = 1.12, 8
-# how near the best factor is come, as a share of it
-NEARNESS = 1e-5
-# rates are used up to this share of their limits, so that rounding does not break them, and torque up to this, since
-# its peaks lie between samples
-RATES_HELD, TORQUE_HELD = 1 - 1e-9, 1 - 1e-4
+# relative tolerance of the best factor
+FACTOR_TOLERANCE = 1e-5
+# the limits on rates and torque are used up to these ratios, because of rounding and of torque peaks between samples
+RATES_USED, TORQUE_USED = 1 - 1e-9, 1 - 1e-4
 
 
 class UniformScaling(Method):
-    """Solves a candidate by the factor that slows its time-optimal motion."""
+    """Solves a candidate by the factor that scales the time of its time-optimal motion."""
 
     def __init__(
         self,
@@ -46,58 +43,57 @@ class UniformScaling(Method):
         q, self._v, a = sample(self.given, grid(self.given.duration))
         self._q = q
         still = np.zeros_like(q)
-        # rigid-body torque is that of holding still plus a part quadratic in speed: a factor divides that by its square
+        # rigid-body torque is the static torque plus a part quadratic in speed, which a factor k divides by k²
         self._holding = prepared.torques(q, still, still)
         self._moving = prepared.torques(q, self._v, a) - self._holding
         self._evaluations = 0
 
     def solve(self) -> SolveResult:
-        """The factor of least energy (or the least factor, in haste) at which limits, torque and duration hold."""
-        limits, length = self.prepared.problem.arm.active_limits, self.given.duration
-        hit = self.prepared.surroundings.worst_violation(self.given)
-        if hit is not None:
-            return SolveResult("infeasible", f"the given motion hits something: {hit.message}", hit=hit)
-        needed = time_scale(
-            peak_rates(self.given) / (np.stack([limits.v_max, limits.a_max, limits.j_max]) * RATES_HELD)
-        )
+        """The factor of least cost within the limits and the allowed durations."""
+        length = self.given.duration
+        collision = self.prepared.surroundings.worst_violation(self.given)
+        if collision is not None:
+            reason = f"the time-optimal motion collides: {collision.message}"
+            return SolveResult(SolveStatus.INFEASIBLE, reason, collision=collision)
+        needed = least_time_scale(self.given, self.prepared.problem.arm.active_limits.rates * RATES_USED)
         least, most = max(needed, self.t_min / length), self.t_max / length
         if least > most:
-            return SolveResult("infeasible", f"retimed evenly, the motion takes at least {least * length:.4f} s")
+            reason = f"the time-optimal motion takes at least {least * length:.4f} s within the limits"
+            return SolveResult(SolveStatus.INFEASIBLE, reason)
         factors, costs = [least], [self._cost(least)]
         while factors[-1] < most and (np.isinf(costs).all() or len(costs) - int(np.argmin(costs)) <= PATIENCE):
             if self.deadline.passed:
-                return SolveResult("out of time", "the deadline passed", self._evaluations)
+                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, self._evaluations)
             factors.append(min(factors[-1] * RATIO, most))
             costs.append(self._cost(factors[-1]))
         best = int(np.argmin(costs))
         if np.isinf(costs[best]):
-            return SolveResult("failed", "found no factor at which torque holds its limit", self._evaluations)
+            return SolveResult(SolveStatus.FAILED, "found no time scale within the limits", self._evaluations)
         factor, low, high = factors[best], factors[max(best - 1, 0)], factors[min(best + 1, len(factors) - 1)]
         if high > low:
             found = minimize_scalar(
-                self._cost, bounds=(low, high), method="bounded", options={"xatol": NEARNESS * factor}
+                self._cost, bounds=(low, high), method="bounded", options={"xatol": FACTOR_TOLERANCE * factor}
             )
             if found.fun < costs[best]:
                 factor = float(found.x)
-        return SolveResult("solved", "converged", self._evaluations, 1, self._slowed(factor))
+        return SolveResult(SolveStatus.SOLVED, CONVERGED, self._evaluations, 1, self._retimed(factor))
 
-    def _slowed(self, factor: float) -> Spline:
+    def _retimed(self, factor: float) -> Spline:
         # rounding must not leave the duration's bounds
-        duration = min(max(self.given.duration * factor, self.t_min), self.t_max)
-        return replace(self.given, knots=self.given.knots / self.given.duration * duration)
+        return lasting(self.given, min(max(self.given.duration * factor, self.t_min), self.t_max))
 
     def _cost(self, factor: float) -> float:
-        """What is minimised; infinite where torque, or a limit along the path, is broken."""
+        """The cost [J], or the duration [s] for minimum time; infinite if torque or a path constraint is exceeded."""
         self._evaluations += 1
         tau = self._holding + self._moving / factor**2 + self.prepared.friction.torque(self._v / factor)
-        if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_HELD).any():
+        if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_USED).any():
             return np.inf
         if (
             self.prepared.path is not None
-            and (self.prepared.path.ratios(self._q, self._v / factor) > TORQUE_HELD).any()
+            and (self.prepared.path.ratios(self._q, self._v / factor) > TORQUE_USED).any()
         ):
             return np.inf
-        spline = self._slowed(factor)
+        spline = self._retimed(factor)
         return (
             spline.duration if self.interval.minimum_time else self.prepared.objective_of(self.prepared.energy(spline))
         )

@@ -92,7 +92,10 @@ class _GoalRows:
 
 @dataclass
 class _Rows:
-    """Rows A x ≤ b in the order goal, path, torque, kinematic; the last are added to. Variables and goal stay hard."""
+    """Constraints A x ≤ b in the order goal, path, torque, kinematic. Variables and goal are never relaxed.
+
+    `chosen` (3, M, r) marks the grid points with a kinematic row, `places` lists them in the order of the rows.
+    """
 
     goal: _GoalRows
     lower: Array

@@ -9,7 +9,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
-from optimizer.methods.method import Method, SolveResult
+from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
 
@@ -35,7 +35,7 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
     solved = [result for result in results if result.spline is not None]
     if len(solved) > 1:
         solved.sort(key=lambda result: _objective(incumbent, result))
-    late = [result for result in results if result.status == "out of time"]
+    late = [result for result in results if result.status is SolveStatus.OUT_OF_TIME]
     incumbent.cut_short |= bool(late)
     return (solved + late + results)[0]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from optimizer.deadline import Deadline
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.solution import CandidateStatus
@@ -36,9 +36,9 @@ def explore(
         if deadline.passed:
             break
         candidate.attempt = result = attempt(candidate)
-        if result.status == "out of time":
+        if result.status is SolveStatus.OUT_OF_TIME:
             break
-        candidate.settle(CandidateStatus(result.status), Reason.METHOD, result.reason)
+        candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
         if result.spline is not None:
             candidate.energy = prepared.objective_of(prepared.energy(result.spline))
             if best is None or best.energy is None or candidate.energy < best.energy:

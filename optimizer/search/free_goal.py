@@ -21,7 +21,7 @@ from optimizer.kinematics.orientation_tolerance import nearest_orientation, tilt
 from optimizer.kinematics.tcp import flange_pose, tcp_jacobian, tcp_pose
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.free_spline import COARSE, FreeSpline
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import Guess
 from optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from optimizer.nlp.nonlinear_program import NonlinearProgram
@@ -186,7 +186,7 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Gues
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
     result = solve(program, free, spline.duration, None, incumbent.deadline)
-    incumbent.add_effort(SolveResult("failed", "a proposal", result.iterations, 1))
+    incumbent.add_effort(SolveResult(SolveStatus.FAILED, "a proposal", result.iterations, 1))
     if not result.feasible:
         return None
     return Guess(space, program.points(result.free), result.duration)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from models.robot import Array
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.search.attempts import solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
 from optimizer.solution import Baseline, BaselineName
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import Spline, peak_rates, retimed, sampled, time_scale
+from optimizer.trajectories.spline import Spline, lasting, least_time_scale, retimed, sampled
 from optimizer.trajectories.time_scalings import quintic_spline
 
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
@@ -37,7 +37,7 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     may_be_slower = problem.objective == "mechanical" and spline.duration < longest * (1 - SLACK)
     if may_be_slower and not deadline.passed:
         # the smoothed |tau v| is above zero at rest, the work is not: a free duration ends too soon
-        slower = retimed(spline, longest / spline.duration)
+        slower = lasting(spline, longest)
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
 
 
@@ -93,14 +93,14 @@ def accept_baseline(incumbent: Incumbent, candidate: Candidate, better: list[Bas
     fastest = time_optimal_spline(limits, candidate.q_start, candidate.q_goal)
     motions: dict[BaselineName, Spline] = {
         "ruckig": fastest,
-        "ruckig_slowed": retimed(fastest, duration / fastest.duration),
+        "ruckig_slowed": lasting(fastest, duration),
         "quintic": quintic_spline(candidate.q_start, candidate.q_goal, duration),
     }
     for name in better:
-        needed = time_scale(peak_rates(motions[name]) / np.stack([limits.v_max, limits.a_max, limits.j_max]))
+        needed = least_time_scale(motions[name], limits.rates)
         spline = retimed(motions[name], max(needed, 1.0))
         energy = incumbent.prepared.energy(spline)
         if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
             incumbent.accept_if_better(
-                candidate, SolveResult("solved", f"the {name} motion itself", spline=spline), energy
+                candidate, SolveResult(SolveStatus.SOLVED, f"the {name} motion itself", spline=spline), energy
             )

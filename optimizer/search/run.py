@@ -10,7 +10,7 @@ import numpy as np
 
 from optimizer.deadline import Clock, Deadline
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
 from optimizer.problem.problem import Problem
@@ -32,7 +32,7 @@ from optimizer.solution import (
     SolverReport,
     UnreachableTarget,
 )
-from optimizer.trajectories.spline import Spline, sampled
+from optimizer.trajectories.spline import Spline, lasting, sampled
 
 # share of the deadline kept for the certificate and the report of the answer, at most [s]
 RESERVE_SHARE, RESERVE = 0.2, 0.1
@@ -93,7 +93,7 @@ class Run:
         """The error for no motion at all; it names the collision that stopped the best candidate, if there is one."""
         candidates = self.incumbent.candidates
         reports = [candidate.report() for candidate in candidates]
-        hits = [(each, each.attempt.hit) for each in candidates if each.attempt and each.attempt.hit]
+        hits = [(each, each.attempt.collision) for each in candidates if each.attempt and each.attempt.collision]
         if not hits:
             return NoTrajectory(reports)
         candidate, hit = max(hits, key=lambda each: each[1].min_clearance)
@@ -135,7 +135,7 @@ class Run:
         same = [each for each in incumbent.candidates if (each.start.target, each.goal.target) == targets]
         candidate = free_goal.between(incumbent.prepared, incumbent.candidates, found.start.q, found.goal.q, same)
         spline = found.trajectory.spline
-        result = SolveResult("solved", "converged", spline=spline, stationarity=found.solver.stationarity)
+        result = SolveResult(SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity)
         return candidate, result, incumbent.prepared.energy(spline)
 
     def warm_start(self, spline: Spline) -> None:
@@ -150,11 +150,11 @@ class Run:
         if candidate.status is CandidateStatus.INFEASIBLE or incumbent.deadline.passed:
             return
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
-        known = replace(spline, knots=spline.knots * (np.clip(spline.duration, least, most) / spline.duration))
+        known = lasting(spline, float(np.clip(spline.duration, least, most)))
         energy = prepared.energy(known)
         if incumbent.certified(candidate, known, energy).valid:
             incumbent.accept_if_better(
-                candidate, SolveResult("solved", "a known motion, retimed", spline=known), energy
+                candidate, SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known), energy
             )
         solve_from(incumbent, candidate, sampled(known), fine=self.problem.method == "time_scaling")
         result = solve(incumbent, candidate)

@@ -6,19 +6,20 @@ import numpy as np
 
 from models.robot import Array, Limits
 
-RATIO_TOLERANCE = 1e-6  # as the certificate's
+# a limit counts as exceeded only beyond this ratio of it: rounding, in the certificate and wherever ratios are judged
+RATIO_TOLERANCE = 1e-6
 
 
 def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, float]:
-    """The worst value / limit over samples and joints; arrays (k, nq), where k may differ between them."""
+    """The largest value / limit over samples and joints of arrays (k, nq); k may differ between the arrays."""
     return {name: float(each.max()) for name, each in ratios(limits, q, v, a, jerk, tau_motor).items()}
 
 
 def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, Array]:
     """Value / limit (k, nq) of every sample and joint; k may differ between the arrays.
 
-    A position's ratio is its distance from the middle of the joint's range over half the range, so that 1 is on a
-    limit, also where the two limits are not opposite.
+    The ratio of a position is its distance from the middle of the joint's range over half the range: 1 is on a limit,
+    even if the two limits are not opposite.
     """
     middle, half = (limits.q_max + limits.q_min) / 2, (limits.q_max - limits.q_min) / 2
     return {

@@ -113,4 +113,4 @@ def retimed(spline: Spline, factor: float) -> Spline:
 
 def lasting(spline: Spline, duration: float) -> Spline:
     """The motion along the same path with time scaled so that it takes exactly `duration` [s]."""
-    return replace(spline, knots=spline.knots / spline.duration * duration)
+    return spline if duration == spline.duration else replace(spline, knots=spline.knots / spline.duration * duration)

@@ -10,6 +10,7 @@ from starlette.testclient import TestClient
 
 from app.schemas.response import OptimizeResponse
 from optimizer.solution import Certificate
+from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.requests import EXAMPLES, HOME, NEAR, long_search, move
 
 # of numbers that are computed in one place and only passed on
@@ -80,7 +81,7 @@ def test_compares_and_accounts(asked_and_answered: tuple[dict[str, Any], dict[st
 def test_certificate_holds(asked_and_answered: tuple[dict[str, Any], dict[str, Any]]) -> None:
     _, answer = asked_and_answered
     certificate = answer["certificate"]
-    assert max(certificate["worst_ratio"].values()) <= 1 + Certificate.RATIO_TOLERANCE
+    assert max(certificate["worst_ratio"].values()) <= 1 + RATIO_TOLERANCE
     for error in (certificate["start_error"], certificate["goal_error"]):
         assert max(error.values()) <= Certificate.POSITION_TOLERANCE
 

@@ -13,7 +13,7 @@ from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods import METHODS, solver_for
 from optimizer.methods import duration_intervals as duration_intervals
-from optimizer.methods.method import Method, SolveResult
+from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.trajectories.seven_segment import shortest_duration
@@ -52,7 +52,7 @@ def solver(start: Array, goal: Array, fastest: bool = False, wait: float = 60.0,
 
 
 def spline(attempt: SolveResult) -> Spline:
-    assert attempt.status == "solved" and attempt.spline is not None, attempt.reason
+    assert attempt.status is SolveStatus.SOLVED and attempt.spline is not None, attempt.reason
     return attempt.spline
 
 
@@ -79,7 +79,7 @@ def test_limits_hold_between_the_nodes(method: str, objective: str) -> None:
         longest = None if objective == "electrical" else 2.0 * float(shortest_duration(goal - start, own))
         mine = solver(start, goal, method=method, objective=objective, duration_max=longest, **given)
         attempt = mine.solve()
-        if method == "time_scaling" and attempt.status == "infeasible":
+        if method == "time_scaling" and attempt.status is SolveStatus.INFEASIBLE:
             continue  # a straight line may lead where the arm cannot be held
         assert_held(mine.prepared.problem, spline(attempt))
         assert attempt.iterations > 0 and attempt.solves > 0
@@ -116,13 +116,13 @@ def test_haste_forgets_the_duration_asked_for() -> None:
 def test_too_little_time_gives_no_motion(method: str) -> None:
     least = float(shortest_duration(GOAL - START, ROBOT.limits))
     attempt = solver(START, GOAL, method=method, **fixed(0.9 * least)).solve()
-    assert attempt.status in ("infeasible", "failed") and attempt.spline is None and attempt.reason
+    assert attempt.status in (SolveStatus.INFEASIBLE, SolveStatus.FAILED) and attempt.spline is None and attempt.reason
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
     attempt = solver(START, GOAL, method=method, wait=-1.0).solve()
-    assert attempt.status == "out of time" and attempt.spline is None
+    assert attempt.status is SolveStatus.OUT_OF_TIME and attempt.spline is None
 
 
 @pytest.mark.parametrize("method", METHODS)

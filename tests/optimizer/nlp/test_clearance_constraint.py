@@ -11,7 +11,7 @@ from optimizer.deadline import NEVER
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import NO_BETTER
 from optimizer.nlp.clearance_constraint import COUNTED, RESERVE, SCALE, ClearanceConstraint
 from optimizer.nlp.working_set_qp import NEAR_PATH
@@ -81,7 +81,7 @@ def test_what_is_far_away_changes_nothing() -> None:
     assert with_ball == pytest.approx(without, rel=SAME_ENERGY)
 
 
-def test_what_is_dearer_than_a_known_motion_is_not_kept_clear() -> None:
+def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned() -> None:
     task = PreparedProblem.of(problem_with(HOME, GOAL, scene=Scene((low_post(),))))
     free = solved(collisions=False).energy.electrical.total
 
@@ -90,9 +90,9 @@ def test_what_is_dearer_than_a_known_motion_is_not_kept_clear() -> None:
         solver.best_known = best_known
         return solver.solve()
 
-    assert attempt(np.inf).status == attempt(1.1 * free).status == "solved"
+    assert attempt(np.inf).status is attempt(1.1 * free).status is SolveStatus.SOLVED
     pruned = attempt(0.9 * free)
-    assert (pruned.status, pruned.reason, pruned.spline) == ("pruned", NO_BETTER, None)
+    assert (pruned.status, pruned.reason, pruned.spline) == (SolveStatus.PRUNED, NO_BETTER, None)
 
 
 def every_pair(model: CollisionModel) -> PathConstraints:
