@@ -11,6 +11,7 @@ from pydantic.json_schema import models_json_schema
 
 from app.schemas.errors import PROBLEMS, Internal, Problem
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
+from app.schemas.examples import BODY_EXAMPLES
 from app.settings import Settings
 
 _REF = "#/components/schemas/{model}"
@@ -84,4 +85,8 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
     for name in ("OptimizeRequest", "CompareRequest", "ParetoRequest", "WhatifRequest"):
         deadline = schemas[name]["properties"]["deadline"]
         deadline |= {"maximum": settings.max_deadline, "default": min(deadline["default"], settings.max_deadline)}
+    # put in here, because FastAPI leaves out what is null in the examples of a route
+    for path, by_media_type in BODY_EXAMPLES.items():
+        for media_type, examples in by_media_type.items():
+            document["paths"][path]["post"]["requestBody"]["content"][media_type]["examples"] = examples
     return document

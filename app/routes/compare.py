@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
@@ -13,7 +11,6 @@ from app.http.openapi import problem_responses
 from app.routes.parameters import allowed_deadline
 from app.schemas import errors as problems
 from app.schemas.compare import CompareRequest, CompareResponse
-from app.schemas.examples import COMPARE_EXAMPLES
 from app.settings import Settings
 from app.tasks.compare import CompareTask
 
@@ -43,9 +40,7 @@ router = APIRouter(tags=["motion"])
         problems.DeadlineExceeded,
     ),
 )
-async def compare(
-    request: Request, body: Annotated[CompareRequest, Body(openapi_examples=COMPARE_EXAMPLES)]
-) -> Response:
+async def compare(request: Request, body: CompareRequest) -> Response:
     """Solves one request by several methods, one after another, and answers a table of their energies, durations and
     solve times, each motion certified. A method that finds nothing has its problem in its row; where none finds a
     motion, the answer is the problem of the first one asked for."""

@@ -14,7 +14,7 @@ from app.http.handlers import to_http
 from app.http.openapi import problem_responses
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
-from app.schemas.evaluate_examples import CSV_EXAMPLES, CSV_TABLE, EVALUATE_EXAMPLES
+from app.schemas.examples.evaluate import CSV_TABLE
 from app.settings import Settings
 from app.tasks.evaluate import EvaluateTask
 
@@ -42,11 +42,8 @@ def _openapi() -> dict[str, Any]:
         "requestBody": {
             "required": True,
             "content": {
-                "application/json": {
-                    "schema": {"$ref": _REF.format(model=EvaluateRequest.__name__)},
-                    "examples": EVALUATE_EXAMPLES,
-                },
-                "text/csv": {"schema": {"type": "string"}, "examples": CSV_EXAMPLES},
+                "application/json": {"schema": {"$ref": _REF.format(model=EvaluateRequest.__name__)}},
+                "text/csv": {"schema": {"type": "string"}},
             },
         },
     }

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import to_http
 from app.http.openapi import problem_responses
 from app.schemas import errors as problems
-from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathRequest, IKPathResponse
+from app.schemas.ik_path import IKPathRequest, IKPathResponse
 from app.settings import Settings
 from app.tasks.ik_path import IKPathTask
 
@@ -32,7 +30,7 @@ router = APIRouter(tags=["motion"])
         problems.DeadlineExceeded,
     ),
 )
-async def follow(request: Request, body: Annotated[IKPathRequest, Body(openapi_examples=IK_PATH_EXAMPLES)]) -> Response:
+async def follow(request: Request, body: IKPathRequest) -> Response:
     """Follows positions or poses of the TCP from a guess, each from the configuration before (Levenberg-Marquardt).
     What is out of reach, nearly singular or beyond a joint's range is listed and left out of `trajectory`, which
     `POST /evaluate` takes as it is."""

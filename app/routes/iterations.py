@@ -19,7 +19,6 @@ from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.studies import IterationDetail, IterationRequest, OptimizeStep
-from app.schemas.study_examples import ITERATION_EXAMPLES
 from app.settings import Settings
 from app.store import studies
 from app.store.store import Store
@@ -70,7 +69,7 @@ async def add(
     request: Request,
     response: Response,
     id: StudyId,
-    body: Annotated[IterationRequest, Body(openapi_examples=ITERATION_EXAMPLES)],
+    body: Annotated[IterationRequest, Body()],
     key: Key = None,
 ) -> Any:
     """Computes the next step and keeps it: what was asked, the whole answer, and its energy against the step before,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
@@ -12,7 +10,6 @@ from app.http.handlers import to_http
 from app.http.openapi import problem_responses
 from app.routes.parameters import allowed_deadline
 from app.schemas import errors as problems
-from app.schemas.examples import OPTIMIZE_EXAMPLES
 from app.schemas.request import OptimizeRequest
 from app.schemas.response import OptimizeResponse
 from app.settings import Settings
@@ -44,9 +41,7 @@ router = APIRouter(tags=["motion"])
         problems.DeadlineExceeded,
     ),
 )
-async def optimize(
-    request: Request, body: Annotated[OptimizeRequest, Body(openapi_examples=OPTIMIZE_EXAMPLES)]
-) -> Response:
+async def optimize(request: Request, body: OptimizeRequest) -> Response:
     """Finds the motion of least energy from rest at `start` to rest at `goal`, over every arm configuration, and
     returns it with its energy breakdown and a certificate that it holds every limit."""
     settings: Settings = request.app.state.settings

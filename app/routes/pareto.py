@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
@@ -12,7 +12,7 @@ from app.http.handlers import to_http
 from app.http.openapi import problem_responses
 from app.routes.parameters import allowed_deadline
 from app.schemas import errors as problems
-from app.schemas.pareto import PARETO_EXAMPLES, ParetoRequest, ParetoResponse
+from app.schemas.pareto import ParetoRequest, ParetoResponse
 from app.settings import Settings
 from app.store.keep import keep
 from app.tasks.pareto import ParetoTask
@@ -47,7 +47,7 @@ router = APIRouter(tags=["motion"])
         ),
     },
 )
-async def pareto(request: Request, body: Annotated[ParetoRequest, Body(openapi_examples=PARETO_EXAMPLES)]) -> Response:
+async def pareto(request: Request, body: ParetoRequest) -> Response:
     """Finds the motions of which none beats another in both duration and energy, from the fastest to the one of least
     energy, over every arm configuration. Each point refers to its whole answer, certificate included.
     `Accept: text/csv` gives the points as CSV."""

@@ -6,8 +6,9 @@ import inspect
 import re
 from functools import cache
 from html import escape
+from typing import Annotated
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 from fastapi.responses import HTMLResponse
 
 from app.exceptions import NotFound
@@ -27,7 +28,9 @@ _STYLE = "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding
     response_class=HTMLResponse,
     responses=problem_responses(problems.NotFound),
 )
-async def explain(slug: str) -> HTMLResponse:
+async def explain(
+    slug: Annotated[str, Path(description="Last part of the `type` of a problem.", examples=["validation"])],
+) -> HTMLResponse:
     """A page that explains a type of problem."""
     if slug not in _PAGES:
         raise NotFound

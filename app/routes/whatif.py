@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.engine.pool import Engine
 from app.http.disconnect import unless_disconnected
@@ -13,7 +11,6 @@ from app.http.openapi import problem_responses
 from app.routes.parameters import allowed_deadline
 from app.schemas import errors as problems
 from app.schemas.whatif import WhatifRequest, WhatifResponse
-from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from app.settings import Settings
 from app.store.keep import keep
 from app.tasks.whatif import WhatifTask
@@ -46,7 +43,7 @@ router = APIRouter(tags=["motion"])
         problems.DeadlineExceeded,
     ),
 )
-async def whatif(request: Request, body: Annotated[WhatifRequest, Body(openapi_examples=WHATIF_EXAMPLES)]) -> Response:
+async def whatif(request: Request, body: WhatifRequest) -> Response:
     """Asks one motion of an arm as it is and of changed ones: lighter links, another payload, other drives or limits.
     Each change is answered twice, as a difference from the base, part by part: for the base's own motion on the changed
     arm, and for the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""

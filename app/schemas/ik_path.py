@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from fastapi.openapi.models import Example
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
@@ -113,19 +112,3 @@ class IKPathResponse(Response):
     robot: str = described("Name of the robot.", None, "ur5e")
     trajectory: JointPath = part("The configurations that were written: the `trajectory` of `POST /evaluate`.")
     points: list[PathPoint] = part("Every point, one entry each.")
-
-
-IK_PATH_EXAMPLES: dict[str, Example] = {
-    "positions": {
-        "summary": "An arc, orientation free",
-        "value": {"t": [0.0, 0.5, 1.0], "points": _POINTS, "guess": [2.7, -1.4, 1.8, -2.0, -1.57, 0.0]},
-    },
-    "poses": {
-        "summary": "A line with the tool pointing down",
-        "value": {
-            "t": [0.0, 0.5, 1.0],
-            "poses": [{"position": point, "quaternion": [0.0, 1.0, 0.0, 0.0]} for point in _POINTS],
-            "guess": [2.7, -1.4, 1.8, -2.0, -1.57, 0.0],
-        },
-    },
-}

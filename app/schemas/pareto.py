@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi.openapi.models import Example
 from pydantic import Field
 
 from app.schemas.answers import KeptAnswer
@@ -91,29 +90,3 @@ class ParetoResponse(Response):
     points: Annotated[list[ParetoPoint], Field(min_length=1)] = part("The front, by duration.")
     dropped: list[ParetoDropped] = part("Durations that were tried and are no points of it.")
     solver: ParetoSolver = part("What it cost to compute.")
-
-
-PARETO_EXAMPLES: dict[str, Example] = {
-    "lift": {
-        "summary": "A lift with a payload",
-        "description": "From the fastest motion to the one of least energy.",
-        "value": {
-            "start": {"q": [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]},
-            "goal": {"q": _HOME},
-            "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
-            "points": 8,
-        },
-    },
-    "branch_switch": {
-        "summary": "Mechanical work, with a cheaper arm configuration that is slower to reach",
-        "description": "The objective of mechanical work needs a longest duration.",
-        "value": {
-            "start": {"q": _HOME},
-            "goal": {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
-            "objective": "mechanical",
-            "duration": {"max": 2.0},
-            "windings": False,
-            "points": 10,
-        },
-    },
-}

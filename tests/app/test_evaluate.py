@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 from app.schemas import errors as problems
 from app.schemas.errors import Problem
 from app.schemas.evaluate import EvaluateResponse
-from app.schemas.evaluate_examples import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from tests.app.requests import HOME, NEAR, move
 
 REQUESTS: dict[str, Any] = {name: example["value"] for name, example in EVALUATE_EXAMPLES.items()}
