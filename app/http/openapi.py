@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from app.schemas.errors import PROBLEMS, Internal, Problem
+from app.schemas.errors import PROBLEMS, Internal, ProblemDetails
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from app.schemas.examples import BODY_EXAMPLES
 from app.settings import Settings
@@ -17,16 +17,16 @@ from app.settings import Settings
 _REF = "#/components/schemas/{model}"
 
 
-def problem_responses(*problems: type[Problem]) -> dict[int | str, dict[str, Any]]:
+def problem_responses(*problems: type[ProblemDetails]) -> dict[int | str, dict[str, Any]]:
     """A route's `responses` for the problems that it may answer with; a 500 is always among them."""
-    by_status: defaultdict[int | str, list[type[Problem]]] = defaultdict(list)
-    every: tuple[type[Problem], ...] = (*problems, Internal)
+    by_status: defaultdict[int | str, list[type[ProblemDetails]]] = defaultdict(list)
+    every: tuple[type[ProblemDetails], ...] = (*problems, Internal)
     for problem in every:
         by_status[problem.model_fields["status"].default].append(problem)
     return {status: _response(same) for status, same in by_status.items()}
 
 
-def _response(same_status: list[type[Problem]]) -> dict[str, Any]:
+def _response(same_status: list[type[ProblemDetails]]) -> dict[str, Any]:
     references = {problem: _REF.format(model=problem.__name__) for problem in same_status}
     schema: dict[str, Any] = {"$ref": references[same_status[0]]}
     if len(same_status) > 1:

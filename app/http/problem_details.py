@@ -28,7 +28,7 @@ from app.exceptions import (
 from app.schemas import errors as problems
 from optimizer import exceptions as optimizer_errors
 
-TABLE: dict[type[Exception], type[problems.Problem]] = {
+TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
     optimizer_errors.InvalidProblem: problems.Validation,
     optimizer_errors.OutsideLimits: problems.OutsideLimits,
@@ -60,7 +60,7 @@ TABLE: dict[type[Exception], type[problems.Problem]] = {
 }
 
 
-def problem_type(error: Exception) -> type[problems.Problem]:
+def problem_type(error: Exception) -> type[problems.ProblemDetails]:
     """The type of problem that an exception is; what is not in the table is a defect."""
     return next((TABLE[cls] for cls in type(error).__mro__ if cls in TABLE), problems.Internal)
 

@@ -6,7 +6,7 @@ import orjson
 from fastapi import APIRouter, Request, Response
 
 from app.convert.arm import robot_named
-from app.convert.ik import to_arm, to_ik_response
+from app.convert.ik import to_collision_arm, to_ik_response
 from app.convert.pose import to_matrix
 from app.http.openapi import problem_responses
 from app.schemas import errors as problems
@@ -36,6 +36,6 @@ def solve(request: Request, body: IKRequest) -> Response:
     solutions = inverse_kinematics_for(robot).solve(
         to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal"
     )
-    contacts = collision_model(to_arm(body, robot)).contacts([solution.q for solution in solutions])
+    contacts = collision_model(to_collision_arm(body, robot)).contacts([solution.q for solution in solutions])
     content = to_ik_response(body, request.state.id, solutions, contacts)
     return Response(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY), media_type="application/json")

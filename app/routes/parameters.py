@@ -7,8 +7,9 @@ from typing import Annotated
 from fastapi import Header, Path, Request, Response
 
 from app.schemas.common import KEY_HEADER
+from app.schemas.examples.values import STUDY_ID
 from app.schemas.request import MotionRequest
-from app.schemas.studies import IdempotencyKey, StudySummary
+from app.schemas.studies import IdempotencyKey
 from app.schemas.whatif import WhatifRequest
 from optimizer.exceptions import InvalidProblem
 
@@ -22,7 +23,7 @@ def allowed_deadline(body: MotionRequest | WhatifRequest, most: float) -> float:
     return body.deadline
 
 
-StudyId = Annotated[str, Path(description="The study's id.", examples=[StudySummary.EXAMPLE_ID])]
+StudyId = Annotated[str, Path(description="The study's id.", examples=[STUDY_ID])]
 Key = Annotated[
     IdempotencyKey | None,
     Header(

@@ -14,7 +14,7 @@ from fastapi.responses import HTMLResponse
 from app.exceptions import NotFound
 from app.http.openapi import problem_responses
 from app.schemas import errors as problems
-from app.schemas.errors import PROBLEMS, Problem
+from app.schemas.errors import PROBLEMS, ProblemDetails
 
 router = APIRouter(prefix="/problems", tags=["problems"])
 
@@ -38,7 +38,7 @@ async def explain(
 
 
 @cache
-def _page(problem: type[Problem]) -> str:
+def _page(problem: type[ProblemDetails]) -> str:
     title, status = (problem.model_fields[name].default for name in ("title", "status"))
     explanation = inspect.cleandoc(problem.__doc__ or "")
     fields = "".join(

@@ -83,7 +83,7 @@ def _method(base: Base) -> Iterator[Proposal]:
 
 def _duration(base: Base) -> Iterator[Proposal]:
     if base.request.get("duration") is not None and base.request["objective"] == "electrical":
-        yield Proposal("duration", "Leave the duration to the optimiser.", _timed(base, None))
+        yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
     for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
         duration = min(base.duration * factor, MAX_DURATION)
         yield Proposal("duration", f"Take {abs(factor - 1):.0%} {word}.", _timed(base, duration))
@@ -94,10 +94,12 @@ def _branch(base: Base) -> Iterator[Proposal]:
     if fixed:
         pose = _poses(base, [np.zeros(3)])[0]
         request = _without(base.request, "branch", "windings") | {"goal": pose}
-        yield Proposal("branch", "Reach the same pose in whichever arm configuration is best.", request)
+        yield Proposal("branch", "Reach the same pose in the arm configuration of least energy.", request)
     elif any(name in base.request for name in ("branch", "windings")):
         yield Proposal(
-            "branch", "Allow every arm configuration and winding.", _without(base.request, "branch", "windings")
+            "branch",
+            "Allow every arm configuration and all full-turn alternatives.",
+            _without(base.request, "branch", "windings"),
         )
     seen = {_branch_name(candidate["goal"]) for candidate in base.candidates if candidate["q_goal"] == base.q_goal}
     known = [candidate for candidate in base.candidates if candidate["status"] in ("solved", "pruned", "unvisited")]
@@ -115,13 +117,14 @@ def _orientation(base: Base) -> Iterator[Proposal]:
     orientation = {"free_about": _TOOL_AXIS, "quaternion": here["pose"]["quaternion"]}
     yield Proposal(
         "orientation",
-        "Let the tool turn freely about its axis at the goal.",
+        "Let the tool rotate freely about its z axis at the goal.",
         base.request | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
     )
     tilts = [sign * _TILT * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
     yield Proposal(
         "orientation",
-        "Tilt the tool at the goal by 10 degrees: the best of four ways.",
+        "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that needs the least energy"
+        " (four directions compared).",
         base.request | {"goal": {"any_of": _poses(base, tilts)}},
     )
 
@@ -132,7 +135,7 @@ def _payload(base: Base) -> Iterator[Proposal]:
         nearer = payload | {"com": [_NEARER * part for part in payload["com"]]}
         yield Proposal(
             "payload",
-            "Grip the payload lower: its centre of mass at half the distance from the flange.",
+            "Grip the payload so that its centre of mass is at half its present distance from the flange.",
             base.request | {"payload": nearer},
         )
 

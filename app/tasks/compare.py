@@ -8,7 +8,7 @@ from typing import Any
 
 import orjson
 
-from app.convert.comparison import single, to_comparison
+from app.convert.comparison import to_compare_response, to_optimize_request
 from app.convert.request import to_problem
 from app.engine.reply import Reply
 from app.http.problem_details import problem_reply
@@ -47,7 +47,7 @@ class CompareTask:
             share = max(end - time.perf_counter(), 0.0) / len(waiting)
             method = waiting.pop(0)
             try:
-                solution = optimize(to_problem(single(self.request, method), max(share, LEAST_SHARE)))
+                solution = optimize(to_problem(to_optimize_request(self.request, method), max(share, LEAST_SHARE)))
             except JoulepathError as error:
                 replies[method] = problem_reply(error, self.request_id)
                 continue
@@ -59,4 +59,4 @@ class CompareTask:
         failed: dict[MethodName, dict[str, Any]] = {
             method: orjson.loads(reply.body) for method, reply in replies.items()
         }
-        return json_reply(to_comparison(self.request, self.request_id, found, failed))
+        return json_reply(to_compare_response(self.request, self.request_id, found, failed))

@@ -10,7 +10,7 @@ import orjson
 from pydantic import ValidationError
 
 from app.convert.arm import to_arm
-from app.convert.evaluation import _motion_of_csv, table_of, to_evaluate_response, to_motion
+from app.convert.evaluation import to_csv_motion, to_csv_table, to_evaluate_response, to_motion
 from app.convert.motion_csv import MotionCsv
 from app.engine.reply import Reply
 from app.exceptions import InvalidRequest
@@ -39,7 +39,7 @@ class EvaluateTask:
             arm = to_arm(settings)
             with Path(self.file).open("rb") as file:
                 table = MotionCsv.of(file, arm.robot.nq, settings.units)
-                result = evaluate(arm, _motion_of_csv(settings, table), settings.sample_period, deadline)
+                result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, deadline)
             robot = settings.robot
         else:
             if self.query:
@@ -49,7 +49,7 @@ class EvaluateTask:
             result = evaluate(arm, to_motion(request), request.sample_period, deadline)
             robot = request.robot
         if self.wanted == "csv":
-            return Reply(200, table_of(result).encode(), {"Content-Type": "text/csv; charset=utf-8"})
+            return Reply(200, to_csv_table(result).encode(), {"Content-Type": "text/csv; charset=utf-8"})
         return json_reply(to_evaluate_response(self.request_id, robot, result))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.convert.request import to_problem
-from app.convert.solution import to_response
+from app.convert.solution import to_optimize_response
 from app.engine.reply import Reply
 from app.schemas.request import OptimizeRequest
 from app.tasks.task import answer, json_reply
@@ -27,4 +27,4 @@ class OptimizeTask:
         solution = optimize(to_problem(self.request, deadline))
         if not solution.certificate.valid:
             raise AssertionError(f"The optimizer returned a motion that does not hold: {solution.certificate}")
-        return json_reply(to_response(self.request, self.request_id, solution))
+        return json_reply(to_optimize_response(self.request, self.request_id, solution))

@@ -11,7 +11,7 @@ import orjson
 
 from app.convert.fields import fields
 from app.convert.request import to_problem
-from app.convert.solution import to_response
+from app.convert.solution import to_optimize_response
 from app.engine.reply import Reply
 from app.schemas.pareto import ParetoRequest
 from app.tasks.stored_answers import AnswerCollector
@@ -64,7 +64,7 @@ class ParetoTask:
             **fields(point, "lower_bound", "status"),
             "certified": point.certificate.valid,
             "worst_ratio": max(point.certificate.worst_ratio.values()),
-            "answer": shelf.add(to_response(self.request, self.request_id, point)),
+            "answer": shelf.add(to_optimize_response(self.request, self.request_id, point)),
         }
 
 

@@ -13,7 +13,7 @@ from app.convert.arm import to_arm
 from app.convert.evaluation import to_evaluate_response, to_motion
 from app.convert.fields import fields
 from app.convert.request import to_problem
-from app.convert.solution import certificate_fields, to_response
+from app.convert.solution import certificate_fields, to_optimize_response
 from app.engine.reply import Reply
 from app.http.problem_details import problem_reply
 from app.schemas.evaluate import EvaluateRequest
@@ -99,7 +99,7 @@ class _Optimized(_Work):
         base = _located(lambda: optimize(first), "optimize")
         _check(base)
         content = {
-            "answer": self.shelf.add(to_response(asked, self.request_id, base)),
+            "answer": self.shelf.add(to_optimize_response(asked, self.request_id, base)),
             "status": base.status,
             "holds": True,
             **_figures(base.energy, base.duration),
@@ -142,7 +142,7 @@ class _Optimized(_Work):
             for energy in (best.energy, found.same_motion)
         ]
         outcome = {
-            "answer": self.shelf.add(to_response(_changed(asked, change), self.request_id, best)),
+            "answer": self.shelf.add(to_optimize_response(_changed(asked, change), self.request_id, best)),
             "status": best.status,
             **_against(content, best.energy, best.duration),
         }
