@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
@@ -17,7 +18,8 @@ QUATERNION_TOLERANCE = 1e-3
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
     """A field with its description, its unit (None: has no unit, "1": a plain number) and a realistic example."""
     extra: dict[str, Any] = {} if unit is None else {"x-unit": unit}
-    text = description if unit in (None, "1") else f"{description} [{unit}]"
+    # after the noun: at the end of the first clause
+    text = description if unit in (None, "1") else re.sub(r"(?=[.;:](\s|$))", f" [{unit}]", description, count=1)
     return Field(description=text, examples=[example], json_schema_extra=extra, **constraints)
 
 

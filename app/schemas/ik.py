@@ -30,12 +30,12 @@ class IKRequest(CellRequest):
 
 
 class ClosestPair(Response):
-    """The two bodies with the smallest clearance."""
+    """Two bodies and the distance between them."""
 
     pair: list[str] = described(BODIES, None, ["table", "forearm"])
     distance: float = described(
-        "Distance between the two bodies minus the obstacle's `margin`; if negative, its amount is the penetration "
-        "depth.",
+        "Distance between the two bodies minus the obstacle's `margin`; if negative, the two bodies are too close or "
+        "overlap.",
         "m",
         0.12,
     )

@@ -51,8 +51,8 @@ class IKPathRequest(Request):
     )
     guess: JointPositions = described("Initial guess of the joint positions for the first point.", "rad", HOME)
     tolerance: float = described(
-        "Largest error of a point that counts as reached: in position [m] and, for poses, in rotation [rad].",
-        "m",
+        "Largest error of a point that counts as reached. It applies to the position and, for poses, to the rotation.",
+        "m, rad",
         1e-6,
         default=1e-6,
         ge=1e-9,

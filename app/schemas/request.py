@@ -158,7 +158,7 @@ class MotionRequest(ArmRequest):
     )
     duration: Duration | None = described(
         "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective `mechanical` needs a "
-        "number, a `max` or a `cycle`, because a slower motion always needs less work. The duration is at most "
+        "number, a `max` or a `cycle`, because a slower motion needs less work. The duration is at most "
         f"{MAX_DURATION:g} s and at most {MAX_SAMPLES} times `sample_period`.",
         "s",
         {"max": 3.0},

@@ -106,7 +106,7 @@ class MechanicalEnergy(Response):
 
 
 class JointEnergy(Response):
-    """Losses and shaft work per joint."""
+    """Energies per joint, in the order from base to flange."""
 
     friction: Joints = described("Friction loss, per joint.", "J", [20.0, 15.0, 9.0, 2.0, 1.5, 0.5])
     copper: Joints = described("Copper loss in the motor windings, per joint.", "J", [4.0, 11.0, 5.0, 0.6, 0.3, 0.1])
@@ -207,8 +207,8 @@ class UnreachableTarget(Response):
 
 
 class WorstRatio(Response):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The last three are null without such a
-    limit in the request."""
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The last three are present only if the
+    request limits them."""
 
     position: float = described("Joint position: distance from the middle of the range / half of the range.", "1", 0.61)
     velocity: float = described("Joint velocity.", "1", 0.74)
@@ -236,7 +236,9 @@ class EndError(Response):
 class Clearance(Response):
     """Smallest distance between two bodies during the motion, minus the obstacle's `margin`."""
 
-    min_clearance: float = described("Proven for every instant: no two bodies are closer than this.", "m", 0.0141)
+    min_clearance: float = described(
+        "Proven smallest clearance over the whole motion: no two bodies are ever closer.", "m", 0.0141
+    )
     sampled: float = described(
         "Smallest clearance at sample points. The true value is between `min_clearance` and this.", "m", 0.0142
     )
@@ -261,7 +263,7 @@ class Certificate(Response):
 
 
 class Solver(Response):
-    """Effort of the computation."""
+    """Computing time and number of solver runs."""
 
     wall_time: float = described("Wall time.", "s", 0.41)
     iterations: int = described(

@@ -151,9 +151,9 @@ class DurationTooShort(ProblemDetails):
 
 
 class TorqueInfeasible(ProblemDetails):
-    """In every arm configuration at the start, or in every one at the goal, a joint cannot hold the load at standstill.
-    Reduce the payload, move its centre of mass closer to the flange, or widen `limits.torque` if the request sets
-    it."""
+    """A joint cannot hold the load at standstill, in any arm configuration at the start or at the goal that is
+    otherwise valid. The torque during the motion is not part of this check. Reduce the payload, move its centre of mass
+    closer to the flange, or widen `limits.torque` if the request sets it."""
 
     type: Literal["/problems/torque-infeasible"] = fixed("type", "/problems/torque-infeasible")
     title: Literal["Not enough torque"] = fixed("title", "Not enough torque")
