@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 
 from app.schemas.common import Request, Vector3, described
 from app.schemas.examples.values import BOX
-from app.schemas.orientation import Axis
+from app.schemas.orientation import Cone
 from app.schemas.scene import CarriedShape, CellRequest
 
 # with a smaller limit, a motion would exceed the largest duration
@@ -94,11 +94,9 @@ class Limits(Request):
     )
 
 
-class ToolCone(Request):
+class ToolCone(Cone):
     """An axis of the tool stays within an angle of a direction during the whole motion."""
 
-    axis: Axis = described("Axis of the tool in the TCP frame; any length except zero.", "1", [0.0, 0.0, 1.0])
-    direction: Axis = described("Direction in the base frame; any length except zero.", "1", [0.0, 0.0, -1.0])
     half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.2, ge=1e-3, le=pi)
 
 

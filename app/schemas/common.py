@@ -143,3 +143,15 @@ Pose = Annotated[
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])
 
 RobotName = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class RobotWithTcp(Request):
+    """A robot and its tool centre point (TCP)."""
+
+    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
+    tcp: Pose = described(
+        "Pose of the TCP in the flange frame.",
+        None,
+        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
+        default=IDENTITY,
+    )

@@ -9,13 +9,11 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.common import (
-    IDENTITY,
     Answer,
     JointPositions,
     Pose,
-    Request,
     Response,
-    RobotName,
+    RobotWithTcp,
     Vector3,
     described,
     part,
@@ -27,16 +25,9 @@ MAXARC = 1000
 """Largest number of points of a path."""
 
 
-class IKPathRequest(Request):
+class IKPathRequest(RobotWithTcp):
     """Positions or poses of the TCP over time, as exactly one of `points` and `poses`."""
 
-    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
-        None,
-        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
-    )
     t: Annotated[list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=1, max_length=MAXARC)] = described(
         "Time of each point; each later than the previous one by 1 µs or more.", "s", [0.0, 0.5, 1.0]
     )

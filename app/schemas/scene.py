@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import IDENTITY, Pose, Request, RobotName, Vector3, described
+from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
 from app.schemas.examples.values import BOX, TOOL, at
 
 # the library rejects more; repeated here so that the schema shows it
@@ -177,16 +177,9 @@ class Tool(Request):
     )
 
 
-class CellRequest(Request):
+class CellRequest(RobotWithTcp):
     """The robot, its tool and its surroundings."""
 
-    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
-        None,
-        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
-    )
     tool: Tool = described(
         "Shape of the tool, for collision checking.",
         None,
