@@ -1,4 +1,4 @@
-"""From what a request says of the arm to the optimizer's."""
+"""From the arm in a request to the arm of the library."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from app.convert.pose import to_matrix
-from app.convert.scene import carried, to_scene, tool_parts
+from app.convert.scene import to_attachment, to_scene, to_tool
 from app.schemas import arm as asked
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
@@ -18,35 +18,35 @@ from optimizer.problem.tool_cone import ToolCone
 
 
 def robot_named(name: str) -> Robot:
-    """The robot of that name. Raises UnknownRobot."""
+    """The robot with this name. Raises UnknownRobot."""
     if name not in robot_names():
         raise UnknownRobot(robot_names())
     return load_robot(name)
 
 
 def to_arm(request: asked.ArmRequest) -> Arm:
-    """The optimizer's arm. Raises UnknownRobot or InvalidProblem."""
+    """The arm of the library. Raises UnknownRobot or InvalidProblem."""
     robot = robot_named(request.robot)
     return Arm(
         robot=robot,
         T_flange_tcp=to_matrix(request.tcp),
-        payload=_payload(request.payload),
+        payload=_to_payload(request.payload),
         gravity=np.array(request.gravity),
-        limits=_limits(request.limits, robot),
+        limits=_to_limits(request.limits, robot),
         friction=request.friction,
         inverter=Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}),
-        bus=_bus(request.bus),
+        bus=_to_bus(request.bus),
         link_mass_scale=np.array(request.link_mass_scale),
-        tool=tool_parts(request.tool),
+        tool=to_tool(request.tool),
         scene=to_scene(request.scene),
         collisions=request.collisions,
-        tool_cone=_cone(request.tool_cone),
+        tool_cone=_to_tool_cone(request.tool_cone),
         tcp_speed=request.limits.tcp_speed,
         elbow_speed=request.limits.elbow_speed,
     )
 
 
-def _bus(bus: asked.Bus) -> Bus:
+def _to_bus(bus: asked.Bus) -> Bus:
     if isinstance(bus, asked.RecuperatingBus):
         return Bus("recuperating", efficiency=bus.efficiency)
     if isinstance(bus, asked.StorageBus):
@@ -55,20 +55,20 @@ def _bus(bus: asked.Bus) -> Bus:
     return Bus(bus.mode)
 
 
-def _cone(cone: asked.ToolCone | None) -> ToolCone | None:
+def _to_tool_cone(cone: asked.ToolCone | None) -> ToolCone | None:
     return None if cone is None else ToolCone(np.array(cone.axis), np.array(cone.direction), cone.half_angle)
 
 
-def _payload(payload: asked.Payload | None) -> Payload:
+def _to_payload(payload: asked.Payload | None) -> Payload:
     if payload is None:
         return Payload()
     ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6
     inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    shape = None if payload.shape is None else carried(payload.shape)
+    shape = None if payload.shape is None else to_attachment(payload.shape)
     return Payload(payload.mass, np.array(payload.com), inertia, shape)
 
 
-def _limits(limits: asked.Limits, robot: Robot) -> Limits:
+def _to_limits(limits: asked.Limits, robot: Robot) -> Limits:
     tighter = {
         name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq) for public, name in LIMIT_NAMES.items()
     }

@@ -1,4 +1,4 @@
-"""The answer of POST /compare."""
+"""POST /compare: from its request to those of POST /optimize, and from solutions to its answer."""
 
 from __future__ import annotations
 
@@ -6,23 +6,24 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.convert.fields import fields
-from app.convert.solution import _gap, baseline_fields, to_response
+from app.convert.solution import baseline_fields, optimality_gap, to_optimize_response
 from app.schemas import request as asked
 from app.schemas.compare import ROW_FIELDS, CompareRequest
 from optimizer.problem.problem import MethodName
 from optimizer.solution import Solution
 
 
-def to_comparison(
+def to_compare_response(
     request: CompareRequest,
     request_id: str,
     found: Mapping[MethodName, Solution],
     failed: Mapping[MethodName, dict[str, Any]],
 ) -> dict[str, Any]:
-    """The answer of `POST /compare`: what every method found, at least one, or the problem that it met."""
+    """The answer of `POST /compare`. `found` has the solution of every method that found a motion, at least one;
+    `failed` the error document of every other method."""
     energies = {method: solution.energy.of(request.objective) for method, solution in found.items()}
     best = min(energies, key=energies.__getitem__)
-    # the same candidates, so the same bound, whatever the method
+    # every method has the same candidates, and therefore the same bound
     bound = found[best].lower_bound
     rows = []
     for method in request.methods:
@@ -36,13 +37,13 @@ def to_comparison(
                 "electrical": solution.energy.electrical.total,
                 "mechanical": solution.energy.mechanical.total,
                 "excess": own / energies[best] - 1 if energies[best] > 0 else 0.0,
-                "optimality_gap": _gap(bound, own),
+                "optimality_gap": optimality_gap(bound, own),
                 **fields(solution.solver, "wall_time", "iterations", "nlp_solves"),
                 "valid": solution.certificate.valid,
                 "worst_ratio": max(solution.certificate.worst_ratio.values()),
             }
             if request.answers:
-                row["answer"] = to_response(single(request, method), request_id, solution)
+                row["answer"] = to_optimize_response(to_optimize_request(request, method), request_id, solution)
         rows.append({**row, "method": method, "problem": failed.get(method)})
     return {
         "id": request_id,
@@ -55,8 +56,8 @@ def to_comparison(
     }
 
 
-def single(request: CompareRequest, method: MethodName) -> asked.OptimizeRequest:
-    """The request to `POST /optimize` that a row of a comparison answers."""
+def to_optimize_request(request: CompareRequest, method: MethodName) -> asked.OptimizeRequest:
+    """The request of `POST /optimize` whose answer a row of the comparison has."""
     shared = {name: getattr(request, name) for name in asked.MotionRequest.model_fields}
-    # each part has been validated
+    # every field was validated with the request
     return asked.OptimizeRequest.model_construct(method=method, **shared)

@@ -21,7 +21,7 @@ def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
 
 
 def fields(source: object, *names: str) -> dict[str, Any]:
-    """Attributes by name. The JSON encoder takes arrays in C order only, and writes what is not finite as null."""
+    """Attributes by name, ready for orjson: it encodes arrays in C order only, and infinite numbers as null."""
     values = {name: getattr(source, name) for name in names}
     return {
         name: np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value for name, value in values.items()

@@ -1,4 +1,4 @@
-"""Between the schemas of POST /ik and the optimizer."""
+"""POST /ik: from its request to an arm, and from solutions to its answer."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.convert.fields import fields
-from app.convert.scene import carried, to_scene, tool_parts
+from app.convert.scene import to_attachment, to_scene, to_tool
 from app.schemas.ik import IKRequest
 from models.robot import Robot
 from optimizer.collision.model import ClosestPair
@@ -33,11 +33,11 @@ def to_ik_response(
     }
 
 
-def to_arm(request: IKRequest, robot: Robot) -> Arm:
-    """The arm as collisions know it. Raises InvalidProblem, with the field named."""
+def to_collision_arm(request: IKRequest, robot: Robot) -> Arm:
+    """The arm with its shapes, for collision checking only. Raises InvalidProblem."""
     return Arm(
         robot=robot,
-        tool=tool_parts(request.tool),
-        payload=Payload(shape=None if request.payload is None else carried(request.payload.shape)),
+        tool=to_tool(request.tool),
+        payload=Payload(shape=None if request.payload is None else to_attachment(request.payload.shape)),
         scene=to_scene(request.scene),
     )

@@ -1,4 +1,4 @@
-"""A motion as a CSV file, read a few thousand lines at a time; a bad value is found again by row and column."""
+"""Reads a motion from a CSV file, a few thousand lines at a time. Errors name row and column."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ _COLUMN = re.compile(r"t|[qva][1-9][0-9]?")
 
 @dataclass(frozen=True)
 class MotionCsv:
-    """A CSV file whose header has been read: columns t, q1 … qn, then v1 … vn, then a1 … an, or q1 … qn alone.
+    """A CSV file after its header: columns t, q1 … qn, then v1 … vn, then a1 … an; or q1 … qn alone.
 
-    `rows` are what is left to read, in blocks (k, columns) of numbers as they stand in the file.
+    `rows` are the lines that are not read yet, in blocks (k, columns) in the units of the file. `scale` converts joint
+    columns to rad, rad/s, rad/s².
     """
 
     nq: int
@@ -38,12 +39,12 @@ class MotionCsv:
 
     @property
     def has_time(self) -> bool:
-        """Whether it is a log; else it lists configurations."""
+        """Whether the file is a log. Otherwise it lists configurations."""
         return self.columns[0] == "t"
 
     @staticmethod
     def of(file: BufferedReader, nq: int, units: Literal["rad", "deg"]) -> MotionCsv:
-        """Reads the header of a file about an arm of nq joints. Raises InvalidTable, now or when rows are read."""
+        """Reads the header of a file for an arm with nq joints. Raises InvalidTable, now or when rows are read."""
         first = _line(file, 1)
         if not first:
             raise InvalidTable("The file is empty: send a header and two or more rows.")
@@ -52,7 +53,7 @@ class MotionCsv:
         return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns))
 
     def log(self) -> Iterator[LogBlock]:
-        """The rows of a log, in rad."""
+        """The rows of a log, in s, rad, rad/s, rad/s²."""
         for block in self.rows:
             parts: list[Array | None] = [
                 block[:, i : i + self.nq] * self.scale if i < len(self.columns) else None
@@ -62,10 +63,10 @@ class MotionCsv:
             yield LogBlock(block[:, 0], parts[0], *parts[1:])
 
     def configurations(self) -> Array:
-        """All rows of a list of configurations (n, nq), in rad."""
+        """All configurations (n, nq) [rad]."""
         rows = [*self.rows]
         if sum(len(block) for block in rows) < 2:
-            raise InvalidTable("A motion needs two or more rows: there is none in fewer.")
+            raise InvalidTable("The file has fewer than two rows: a motion needs two or more.")
         return np.concatenate(rows) * self.scale
 
 
@@ -74,19 +75,19 @@ def _check_header(columns: list[str], nq: int) -> None:
     q, v, a = groups["q"], groups["v"], groups["a"]
     if columns in (q, ["t", *q], ["t", *q, *v], ["t", *q, *v, *a]):
         return
-    wanted = f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} where they were logged, or q1,…,q{nq} alone"
+    wanted = f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
     if not any(_COLUMN.fullmatch(name) for name in columns):
-        raise InvalidTable(f"The first line is no header: begin the file with the columns' names, {wanted}.", 1)
-    raise InvalidTable(f"The header's columns are not those of a motion: they must be {wanted}.", 1)
+        raise InvalidTable(f"The first line is no header: begin the file with the names of the columns, {wanted}.", 1)
+    raise InvalidTable(f"The header is not that of a motion: its columns must be {wanted}.", 1)
 
 
 def _line(file: BufferedReader, row: int) -> str:
     """The next line, empty at the end of the file."""
     raw = file.readline(LONGEST_LINE + 1)
     if len(raw) > LONGEST_LINE:
-        raise InvalidTable(f"Line {row} is longer than {LONGEST_LINE} characters: this is no table of a motion.", row)
+        raise InvalidTable(f"Line {row} is longer than {LONGEST_LINE} characters: send one row per line.", row)
     if b"\0" in raw:
-        raise InvalidTable(f"Line {row} holds binary data: send CSV as plain text.", row)
+        raise InvalidTable(f"Line {row} has binary data: send CSV as plain text.", row)
     try:
         return raw.decode()
     except UnicodeDecodeError:
@@ -103,12 +104,12 @@ def _blocks(file: BufferedReader, columns: list[str]) -> Iterator[Array]:
 
 
 def _lines(file: BufferedReader, row: int) -> Iterator[str]:
-    """Lines up to the end, or to empty ones that nothing follows."""
+    """All lines up to the end of the file, without empty ones at the end."""
     while line := _line(file, row):
         if not line.strip():
             while rest := _line(file, row):
                 if rest.strip():
-                    raise InvalidTable(f"Line {row} is empty: drop it.", row)
+                    raise InvalidTable(f"Line {row} is empty: delete it.", row)
             return
         yield line
         row += 1
@@ -129,8 +130,8 @@ def _first_error(lines: list[str], first: int, columns: list[str]) -> InvalidTab
     for row, line in enumerate(lines, first):
         cells = next(csv.reader([line]), [])
         if len(cells) != len(columns):
-            hint = " Separate them by commas, with a point for decimals." if ";" in line else ""
-            message = f"Line {row} has {len(cells)} columns where the header has {len(columns)}: correct it.{hint}"
+            hint = " Separate columns by commas, and use a decimal point." if ";" in line else ""
+            message = f"Line {row} has {len(cells)} columns, but the header has {len(columns)}: correct the line.{hint}"
             return InvalidTable(message, row)
         for name, cell in zip(columns, cells, strict=True):
             try:
@@ -138,5 +139,5 @@ def _first_error(lines: list[str], first: int, columns: list[str]) -> InvalidTab
             except ValueError:
                 finite = False
             if not finite:
-                return InvalidTable(f"{name} in line {row} is no finite number: correct it or drop the row.", row, name)
-    return InvalidTable(f"The lines from {first} on cannot be read as numbers: write them plainly.", first)
+                return InvalidTable(f"{name} in line {row} is no finite number: correct or delete it.", row, name)
+    return InvalidTable(f"The lines from line {first} on cannot be read: write plain numbers.", first)

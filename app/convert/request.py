@@ -1,4 +1,4 @@
-"""From requests for a motion to the optimizer's problems."""
+"""From requests for a motion to problems of the library."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from optimizer.problem.targets import AnyOf, Single, Target
 
 
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
-    """The optimizer's problem for a request of which `deadline` [s] is left.
+    """The problem of a request, of whose time `deadline` [s] is left.
 
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
-    shortest, longest = _duration(request)
+    shortest, longest = _duration_bounds(request)
     branch = request.branch
     return Problem(
         start=to_target(request.start),
@@ -31,7 +31,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         objective=request.objective,
         duration_min=shortest,
         duration_max=longest,
-        cycle=cycle(request.cycle),
+        cycle=to_cycle(request.cycle),
         branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
         windings=request.windings,
         sample_period=request.sample_period,
@@ -39,15 +39,15 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     )
 
 
-def cycle(asked_for: asked.Cycle | None) -> Cycle | None:
-    """The optimizer's cycle. Raises InvalidProblem."""
+def to_cycle(asked_for: asked.Cycle | None) -> Cycle | None:
+    """The cycle of the library. Raises InvalidProblem."""
     if asked_for is None:
         return None
     return Cycle(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
 
 
 def to_target(target: asked.Target) -> Target:
-    """The optimizer's target."""
+    """The target of the library."""
     if isinstance(target, asked.AnyOfTarget):
         return AnyOf(tuple(_single(member) for member in target.any_of))
     return _single(target)
@@ -70,8 +70,9 @@ def _cone_oriented(pose: ConeOrientedPoseSchema) -> ConeOrientedPose:
     return ConeOrientedPose.about(to_pose(pose.position, orientation), np.array(orientation.free_about))
 
 
-def _duration(request: asked.MotionRequest) -> tuple[float | None, float | None]:
-    """Bounds on the duration. An open end is closed for the electrical objective: an answer has to end some time."""
+def _duration_bounds(request: asked.MotionRequest) -> tuple[float | None, float | None]:
+    """Smallest and largest duration [s]. If an electrical request has no largest one, the service's limits
+    apply."""
     if isinstance(request.duration, float | int):
         return request.duration, request.duration
     given = request.duration or asked.DurationRange()

@@ -1,4 +1,4 @@
-"""From the schemas of shapes and scenes to the optimizer's."""
+"""From shapes and scenes in a request to those of the library."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ Made = TypeVar("Made")
 
 
 def to_scene(scene: asked.Scene) -> Scene:
-    """The optimizer's scene. Raises InvalidProblem, with the field named."""
+    """The scene of the library. Raises InvalidProblem."""
     obstacles = []
     for k, given in enumerate(scene.obstacles):
-        shape = _named(f"scene.obstacles.{k}", partial(_shape, given))
+        shape = _named(f"scene.obstacles.{k}", partial(_to_shape, given))
         obstacles.append(Obstacle(given.name, shape, to_matrix(given.pose), given.margin))
     return Scene(obstacles)
 
 
-def tool_parts(tool: asked.Tool) -> list[Attachment]:
-    """A tool's capsules in the flange frame."""
+def to_tool(tool: asked.Tool) -> list[Attachment]:
+    """The capsules of a tool, in the flange frame."""
     return [capsule_between(np.array(c.start), np.array(c.end), c.radius) for c in tool.capsules]
 
 
-def carried(shape: asked.CarriedShape) -> Attachment:
-    """A shape fixed to the flange. Raises InvalidProblem, with the field named."""
-    return _named("payload.shape", lambda: Attachment(_shape(shape), to_matrix(shape.pose)))
+def to_attachment(shape: asked.CarriedShape) -> Attachment:
+    """The shape of a payload, fixed to the flange. Raises InvalidProblem."""
+    return _named("payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose)))
 
 
-def _shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:
+def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:
     if isinstance(given, asked.Box):
         return Box(np.array(given.size))
     if isinstance(given, asked.Sphere):
@@ -62,7 +62,7 @@ def _shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:
 
 
 def _named(field: str, make: Callable[[], Made]) -> Made:
-    """What `make` makes; its errors name where in the request the shape stands."""
+    """The result of `make`. Its errors get the path of the shape in the request."""
     try:
         return make()
     except InvalidProblem as error:

@@ -1,4 +1,4 @@
-"""Between the schemas of the contract and the optimizer's dataclasses, both ways."""
+"""POST /optimize: from a solution to its answer."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from app.schemas.response import Clearance
 from optimizer.solution import Certificate, ElectricalEnergy, Energy, Solution, StorageUse
 
 
-def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
-    """The answer as the contract lays it out: numbers, strings, lists, dicts, and C-contiguous arrays."""
+def to_optimize_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
+    """The answer of `POST /optimize`: numbers, strings, lists, dicts, and arrays in C order."""
     trajectory = solution.trajectory
     return {
         "id": request_id,
@@ -28,7 +28,7 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
         "energy": {
             **energy_fields(solution.energy),
             "lower_bound": solution.lower_bound,
-            "optimality_gap": _gap(solution.lower_bound, solution.energy.of(request.objective)),
+            "optimality_gap": optimality_gap(solution.lower_bound, solution.energy.of(request.objective)),
         },
         "baselines": baseline_fields(solution),
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
@@ -38,8 +38,8 @@ def to_response(request: asked.OptimizeRequest, request_id: str, solution: Solut
     }
 
 
-def _gap(bound: float, energy: float) -> float:
-    """1 - bound / energy; a motion that costs nothing is as good as can be."""
+def optimality_gap(bound: float, energy: float) -> float:
+    """1 - bound / energy; 0 if the energy is not positive."""
     return 1 - bound / energy if energy > 0 else 0.0
 
 
@@ -50,7 +50,7 @@ def baseline_fields(solution: Solution) -> list[dict[str, Any]]:
 
 
 def energy_fields(energy: Energy) -> dict[str, Any]:
-    """Energy as every answer lays it out."""
+    """The fields `electrical` to `mean_power` of an energy."""
     return {
         "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
         "mechanical": fields(energy.mechanical, "total", "per_joint"),
@@ -61,7 +61,7 @@ def energy_fields(energy: Energy) -> dict[str, Any]:
 
 
 def certificate_fields(certificate: Certificate) -> dict[str, Any]:
-    """A certificate as every answer lays it out."""
+    """The fields of a certificate."""
     clearance = certificate.clearance
     return {
         "worst_ratio": certificate.worst_ratio,

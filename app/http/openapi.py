@@ -10,23 +10,24 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from app.schemas.errors import PROBLEMS, Internal, Problem
+from app.schemas.errors import PROBLEMS, Internal, ProblemDetails
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
+from app.schemas.examples import BODY_EXAMPLES
 from app.settings import Settings
 
 _REF = "#/components/schemas/{model}"
 
 
-def problem_responses(*problems: type[Problem]) -> dict[int | str, dict[str, Any]]:
+def problem_responses(*problems: type[ProblemDetails]) -> dict[int | str, dict[str, Any]]:
     """The `responses` of a route for its problems; `internal` (500) is always among them."""
-    by_status: defaultdict[int | str, list[type[Problem]]] = defaultdict(list)
-    every: tuple[type[Problem], ...] = (*problems, Internal)
+    by_status: defaultdict[int | str, list[type[ProblemDetails]]] = defaultdict(list)
+    every: tuple[type[ProblemDetails], ...] = (*problems, Internal)
     for problem in every:
         by_status[problem.model_fields["status"].default].append(problem)
     return {status: _response(same) for status, same in by_status.items()}
 
 
-def _response(same_status: list[type[Problem]]) -> dict[str, Any]:
+def _response(same_status: list[type[ProblemDetails]]) -> dict[str, Any]:
     references = {problem: _REF.format(model=problem.__name__) for problem in same_status}
     schema: dict[str, Any] = {"$ref": references[same_status[0]]}
     if len(same_status) > 1:
@@ -85,6 +86,10 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
     for operation in (operation for path in document["paths"].values() for operation in path.values()):
         if "HTTPValidationError" in str(operation["responses"].get("422", "")):
             del operation["responses"]["422"]
+    # put in here, because FastAPI leaves out what is null in the examples of a route
+    for path, by_media_type in BODY_EXAMPLES.items():
+        for media_type, examples in by_media_type.items():
+            document["paths"][path]["post"]["requestBody"]["content"][media_type]["examples"] = examples
     for deadline in _deadlines(document):
         deadline["maximum"] = settings.max_deadline
         if "default" in deadline:

@@ -30,7 +30,7 @@ from app.schemas.common import KEY_HEADER
 from app.schemas.common import Request as RequestModel
 from optimizer import exceptions as optimizer_errors
 
-TABLE: dict[type[Exception], type[problems.Problem]] = {
+TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
     optimizer_errors.InvalidProblem: problems.Validation,
     optimizer_errors.OutsideLimits: problems.OutsideLimits,
@@ -66,7 +66,7 @@ MOST_ERRORS = 20
 """Errors that a `validation` problem lists at most: a body can have thousands, and the first ones suffice."""
 
 
-def problem_type(error: Exception) -> type[problems.Problem]:
+def problem_type(error: Exception) -> type[problems.ProblemDetails]:
     """The problem type of an exception. An exception that is not in the table is a defect of the service."""
     return next((TABLE[cls] for cls in type(error).__mro__ if cls in TABLE), problems.Internal)
 

@@ -13,7 +13,8 @@ from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceStore
 from app.schemas import errors as problems
-from app.schemas.answers import KeptAnswer
+from app.schemas.answers import StoredAnswer
+from app.schemas.examples.values import ANSWER_ID
 from app.store import answers
 
 router = APIRouter(prefix="/answers", tags=["answers"])
@@ -22,11 +23,11 @@ router = APIRouter(prefix="/answers", tags=["answers"])
 @router.get(
     "/{id}",
     summary="A stored answer",
-    response_model=KeptAnswer,
+    response_model=StoredAnswer,
     responses=problem_responses(problems.UnknownAnswer, problems.StoreUnavailable),
 )
 async def show(
-    id: Annotated[str, Path(description="The answer's id.", examples=[KeptAnswer.EXAMPLE_ID])], store: ServiceStore
+    id: Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])], store: ServiceStore
 ) -> Response:
     """The complete answer that another answer refers to."""
     answer, body = await store.read(partial(answers.get, answer_id=id))

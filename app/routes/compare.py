@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
@@ -13,7 +11,6 @@ from app.routes.dependencies import ServiceEngine, ServiceSettings
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas.compare import CompareRequest, CompareResponse
-from app.schemas.examples import COMPARE_EXAMPLES
 from app.tasks.compare import CompareTask
 
 router = APIRouter(tags=["motion"])
@@ -27,7 +24,7 @@ router = APIRouter(tags=["motion"])
 )
 async def compare(
     request: Request,
-    body: Annotated[CompareRequest, Body(openapi_examples=COMPARE_EXAMPLES)],
+    body: CompareRequest,
     settings: ServiceSettings,
     engine: ServiceEngine,
 ) -> Response:

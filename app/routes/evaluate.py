@@ -16,7 +16,7 @@ from app.routes.parameters import WantedFormat
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
-from app.schemas.evaluate_examples import CSV_EXAMPLES, CSV_TABLE, EVALUATE_EXAMPLES
+from app.schemas.examples.evaluate import CSV_TABLE
 from app.tasks.evaluate import EvaluateTask
 
 router = APIRouter(tags=["motion"])
@@ -43,11 +43,8 @@ def _openapi() -> dict[str, Any]:
         "requestBody": {
             "required": True,
             "content": {
-                "application/json": {
-                    "schema": {"$ref": _REF.format(model=EvaluateRequest.__name__)},
-                    "examples": EVALUATE_EXAMPLES,
-                },
-                "text/csv": {"schema": {"type": "string"}, "examples": CSV_EXAMPLES},
+                "application/json": {"schema": {"$ref": _REF.format(model=EvaluateRequest.__name__)}},
+                "text/csv": {"schema": {"type": "string"}},
             },
         },
     }

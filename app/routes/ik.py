@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from app.convert.arm import robot_named
-from app.convert.ik import to_arm, to_ik_response
+from app.convert.ik import to_collision_arm, to_ik_response
 from app.convert.pose import to_matrix
 from app.engine.result import TaskResult
 from app.http.handlers import result_response
@@ -36,5 +36,5 @@ def solve(request: Request, body: IKRequest) -> Response:
     robot = robot_named(body.robot)
     kinematics = required_inverse_kinematics(robot, "pose")
     solutions = kinematics.solve(to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal")
-    contacts = collision_model(to_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
+    contacts = collision_model(to_collision_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
     return result_response(TaskResult.of_json(to_ik_response(body, request.state.id, solutions, contacts)))

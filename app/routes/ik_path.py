@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
@@ -12,7 +10,7 @@ from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceEngine, ServiceSettings
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
-from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathRequest, IKPathResponse
+from app.schemas.ik_path import IKPathRequest, IKPathResponse
 from app.tasks.ik_path import IKPathTask
 
 router = APIRouter(tags=["motion"])
@@ -26,7 +24,7 @@ router = APIRouter(tags=["motion"])
 )
 async def follow(
     request: Request,
-    body: Annotated[IKPathRequest, Body(openapi_examples=IK_PATH_EXAMPLES)],
+    body: IKPathRequest,
     settings: ServiceSettings,
     engine: ServiceEngine,
 ) -> Response:

@@ -20,7 +20,6 @@ from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.studies import IterationDetail, IterationRequest, OptimizeStep
-from app.schemas.study_examples import ITERATION_EXAMPLES
 from app.store import studies
 from app.store.tables import Study
 from app.studies.answers import detail
@@ -56,7 +55,7 @@ async def add(
     request: Request,
     response: Response,
     id: StudyId,
-    body: Annotated[IterationRequest, Body(openapi_examples=ITERATION_EXAMPLES)],
+    body: Annotated[IterationRequest, Body()],
     settings: ServiceSettings,
     engine: ServiceEngine,
     store: ServiceStore,

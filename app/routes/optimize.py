@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
@@ -12,7 +10,6 @@ from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceEngine, ServiceSettings
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
-from app.schemas.examples import OPTIMIZE_EXAMPLES
 from app.schemas.request import OptimizeRequest
 from app.schemas.response import OptimizeResponse
 from app.tasks.optimize import OptimizeTask
@@ -28,7 +25,7 @@ router = APIRouter(tags=["motion"])
 )
 async def optimize(
     request: Request,
-    body: Annotated[OptimizeRequest, Body(openapi_examples=OPTIMIZE_EXAMPLES)],
+    body: OptimizeRequest,
     settings: ServiceSettings,
     engine: ServiceEngine,
 ) -> Response:

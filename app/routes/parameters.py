@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 from fastapi import Depends, Header, Path, Request, Response
 
 from app.schemas.common import KEY_HEADER
+from app.schemas.examples.values import STUDY_ID
 from app.schemas.request import MotionRequest
-from app.schemas.studies import IdempotencyKey, StudySummary
+from app.schemas.studies import IdempotencyKey
 from app.schemas.whatif import WhatifRequest
 from optimizer.exceptions import InvalidProblem
 
@@ -34,7 +35,7 @@ async def _wanted_format(request: Request) -> Literal["json", "csv"]:
 
 WantedFormat = Annotated[Literal["json", "csv"], Depends(_wanted_format)]
 """Format of the answer, by the header `Accept`."""
-StudyId = Annotated[str, Path(description="The study's id.", examples=[StudySummary.EXAMPLE_ID])]
+StudyId = Annotated[str, Path(description="The study's id.", examples=[STUDY_ID])]
 Key = Annotated[
     IdempotencyKey | None,
     Header(

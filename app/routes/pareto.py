@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
@@ -13,7 +11,7 @@ from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
-from app.schemas.pareto import PARETO_EXAMPLES, ParetoRequest, ParetoResponse
+from app.schemas.pareto import ParetoRequest, ParetoResponse
 from app.store.store_answers import store_answers
 from app.tasks.pareto import ParetoTask
 
@@ -31,7 +29,7 @@ router = APIRouter(tags=["motion"])
 )
 async def pareto(
     request: Request,
-    body: Annotated[ParetoRequest, Body(openapi_examples=PARETO_EXAMPLES)],
+    body: ParetoRequest,
     wanted: WantedFormat,
     settings: ServiceSettings,
     engine: ServiceEngine,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from app.schemas import errors as problems
 
-WORKER_PROBLEMS: tuple[type[problems.Problem], ...] = (
+WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Validation,
     problems.UnknownRobot,
     problems.BodyTooLarge,
@@ -14,7 +14,7 @@ WORKER_PROBLEMS: tuple[type[problems.Problem], ...] = (
 )
 """Of every request that a worker computes."""
 
-MOTION_PROBLEMS: tuple[type[problems.Problem], ...] = (
+MOTION_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     *WORKER_PROBLEMS,
     problems.UnreachablePose,
     problems.SingularPose,

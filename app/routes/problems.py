@@ -6,14 +6,15 @@ import inspect
 import re
 from functools import cache
 from html import escape
+from typing import Annotated
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 from fastapi.responses import HTMLResponse
 
 from app.exceptions import NotFound
 from app.http.openapi import problem_responses
 from app.schemas import errors as problems
-from app.schemas.errors import PROBLEMS, Problem
+from app.schemas.errors import PROBLEMS, ProblemDetails
 
 router = APIRouter(prefix="/problems", tags=["problems"])
 
@@ -27,7 +28,9 @@ _STYLE = "body{font:1rem/1.5 sans-serif;max-width:42rem;margin:3rem auto;padding
     response_class=HTMLResponse,
     responses=problem_responses(problems.NotFound),
 )
-async def explain(slug: str) -> HTMLResponse:
+async def explain(
+    slug: Annotated[str, Path(description="Last part of the `type` of a problem.", examples=["validation"])],
+) -> HTMLResponse:
     """A page that explains a type of problem."""
     if slug not in _PAGES:
         raise NotFound
@@ -35,7 +38,7 @@ async def explain(slug: str) -> HTMLResponse:
 
 
 @cache
-def _page(problem: type[Problem]) -> str:
+def _page(problem: type[ProblemDetails]) -> str:
     title, status = (problem.model_fields[name].default for name in ("title", "status"))
     explanation = inspect.cleandoc(problem.__doc__ or "")
     fields = "".join(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 
 from app.convert.arm import robot_named
 from app.http.openapi import problem_responses
@@ -38,7 +38,9 @@ def list_robots() -> RobotList:
     response_model=RobotDetail,
     responses=problem_responses(problems.UnknownRobot),
 )
-def show_robot(name: str) -> RobotDetail:
+def show_robot(
+    name: Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])],
+) -> RobotDetail:
     """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
     friction laws with their coefficients."""
     return _detail(robot_named(name).name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.exc import IntegrityError
 
 from app.convert.arm import robot_named
@@ -13,8 +13,8 @@ from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from app.schemas import errors as problems
+from app.schemas.examples.studies import STUDY_CSV
 from app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
-from app.schemas.study_examples import STUDY_CSV, STUDY_EXAMPLES
 from app.store import studies
 from app.studies.answers import as_csv, full, summary
 
@@ -40,7 +40,7 @@ router = APIRouter(prefix="/studies", tags=["studies"])
 async def create(
     request: Request,
     response: Response,
-    body: Annotated[StudyRequest, Body(openapi_examples=STUDY_EXAMPLES)],
+    body: StudyRequest,
     store: ServiceStore,
     key: Key = None,
 ) -> StudySummary:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from fastapi import APIRouter, Body, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
@@ -14,7 +12,6 @@ from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.whatif import WhatifRequest, WhatifResponse
-from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from app.store.store_answers import store_answers
 from app.tasks.whatif import WhatifTask
 
@@ -29,7 +26,7 @@ router = APIRouter(tags=["motion"])
 )
 async def whatif(
     request: Request,
-    body: Annotated[WhatifRequest, Body(openapi_examples=WHATIF_EXAMPLES)],
+    body: WhatifRequest,
     settings: ServiceSettings,
     engine: ServiceEngine,
     store: ServiceStore,

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Any, ClassVar
+from typing import Any
 
 from app.schemas.common import Response, described
+from app.schemas.examples.values import ANSWER_ID, CREATED
 
 
-class KeptAnswer(Response):
-    """An answer kept by reference."""
+class StoredAnswer(Response):
+    """A complete answer to which another answer refers."""
 
-    EXAMPLE_ID: ClassVar[str] = "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11"
-
-    id: str = described("The answer's id.", None, EXAMPLE_ID)
-    kind: str = described("The endpoint that gave it.", None, "optimize")
-    created: datetime = described("When it was given, in UTC.", None, "2025-03-14T09:26:53.589793Z")
+    id: str = described("Id of the answer.", None, ANSWER_ID)
+    kind: str = described("Endpoint of the answer: `optimize` or `evaluate`.", None, "optimize")
+    created: datetime = described("Time at which it was computed, in UTC.", None, CREATED)
     answer: dict[str, Any] = described(
-        "The answer, as that endpoint documents it.", None, {"robot": "ur5e", "duration": 1.8, "status": "optimal"}
+        "The answer, with the fields that this endpoint documents.",
+        None,
+        {"robot": "ur5e", "duration": 1.8, "status": "optimal"},
     )

@@ -1,4 +1,4 @@
-"""What every request about a motion says of the arm: what it carries, its limits, drives, bus and surroundings."""
+"""The arm in a request about a motion: payload, limits, drives, power bus, and surroundings."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.schemas.common import Request, Vector3, described
-from app.schemas.orientation import Axis
+from app.schemas.examples.values import BOX
+from app.schemas.orientation import Cone
 from app.schemas.scene import CarriedShape, CellRequest
 
-# with less, a motion would last longer than any answer may
+# with a smaller limit, a motion would exceed the largest duration
 Rate = Annotated[float, Field(ge=1e-2, le=1e6)]
 Angle = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
-def by_shape(value: Any) -> str | None:
-    """The tag of a number or a list."""
+def one_or_each(value: Any) -> str | None:
+    """Discriminator of a union of a number, tagged `one`, and a list, tagged `each`."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):
@@ -25,26 +26,27 @@ def by_shape(value: Any) -> str | None:
     return "each" if isinstance(value, list) else None
 
 
-_SHAPE = Discriminator(
-    by_shape, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
+_ONE_OR_EACH = Discriminator(
+    one_or_each, custom_error_type="one_or_each", custom_error_message="Give one number or a list with one per joint"
 )
 RatePerJoint = Annotated[
     Annotated[Rate, Tag("one")] | Annotated[Annotated[list[Rate], Field(min_length=1, max_length=16)], Tag("each")],
-    _SHAPE,
+    _ONE_OR_EACH,
 ]
 AnglePerJoint = Annotated[
     Annotated[Angle, Tag("one")] | Annotated[Annotated[list[Angle], Field(min_length=1, max_length=16)], Tag("each")],
-    _SHAPE,
+    _ONE_OR_EACH,
 ]
 
 
 class Payload(Request):
-    """A body fixed to the flange."""
+    """A body that is fixed to the flange."""
 
     mass: float = described("Mass.", "kg", 2.0, ge=0, le=1e3)
     com: Vector3 = described("Centre of mass in the flange frame.", "m", [0.0, 0.0, 0.05])
     inertia: list[float] | None = described(
-        "Inertia about the centre of mass in flange axes: ixx, ixy, ixz, iyy, iyz, izz. Null: a point mass.",
+        "Inertia about the centre of mass, in the axes of the flange frame: [ixx, ixy, ixz, iyy, iyz, izz]. Null: a "
+        "point mass.",
         "kg·m²",
         [0.004, 0.0, 0.0, 0.004, 0.0, 0.003],
         default=None,
@@ -52,32 +54,33 @@ class Payload(Request):
         max_length=6,
     )
     shape: CarriedShape | None = described(
-        "The space that it takes up, with its pose in the flange frame, for collisions. Null: none.",
+        "Shape for collision checking, with its pose in the flange frame. Null: no shape.",
         None,
-        {"shape": "box", "size": [0.1, 0.1, 0.2], "pose": {"position": [0, 0, 0.2], "rotvec": [0, 0, 0]}},
+        BOX,
         default=None,
     )
 
 
-# slower, a motion would last longer than any answer may
+# with a smaller limit, a motion would exceed the largest duration
 Speed = Annotated[float, Field(ge=1e-3, le=1e3)]
 
 
 class PositionLimits(Request):
-    """A narrower joint range. One number holds for every joint."""
+    """A narrower joint range. One number applies to every joint, a list has one per joint."""
 
-    lower: AnglePerJoint | None = described("Least joint positions.", "rad", -3.0, default=None)
-    upper: AnglePerJoint | None = described("Greatest joint positions.", "rad", 3.0, default=None)
+    lower: AnglePerJoint | None = described("Smallest joint position.", "rad", -3.0, default=None)
+    upper: AnglePerJoint | None = described("Largest joint position.", "rad", 3.0, default=None)
 
 
 class Limits(Request):
-    """Limits tighter than the robot's. One number holds for every joint, a list gives one per joint."""
+    """Limits within those of the robot. One number applies to every joint, a list has one per joint. Null: the
+    robot's."""
 
-    velocity: RatePerJoint | None = described("Greatest joint speed.", "rad/s", 2.0, default=None)
-    acceleration: RatePerJoint | None = described("Greatest joint acceleration.", "rad/s²", 5.0, default=None)
-    jerk: RatePerJoint | None = described("Greatest joint jerk.", "rad/s³", 100.0, default=None)
+    velocity: RatePerJoint | None = described("Largest absolute joint velocity.", "rad/s", 2.0, default=None)
+    acceleration: RatePerJoint | None = described("Largest absolute joint acceleration.", "rad/s²", 5.0, default=None)
+    jerk: RatePerJoint | None = described("Largest absolute joint jerk.", "rad/s³", 100.0, default=None)
     torque: RatePerJoint | None = described(
-        "Greatest motor torque at the joint: rigid body, rotor and friction together.",
+        "Largest absolute motor torque at the joint: rigid body, rotor and friction together.",
         "N·m",
         [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],
         default=None,
@@ -85,75 +88,78 @@ class Limits(Request):
     position: PositionLimits | None = described(
         "Narrower joint range.", None, {"lower": -3.0, "upper": 3.0}, default=None
     )
-    tcp_speed: Speed | None = described("Greatest speed of the TCP.", "m/s", 0.25, default=None)
+    tcp_speed: Speed | None = described("Largest speed of the TCP.", "m/s", 0.25, default=None)
     elbow_speed: Speed | None = described(
-        "Greatest speed of the elbow: of both ends of its joint's housing.", "m/s", 0.25, default=None
+        "Largest speed of the elbow: of both ends of the axis of its capsule.", "m/s", 0.25, default=None
     )
 
 
-class ToolCone(Request):
-    """An axis of the tool stays near a direction all along the motion."""
+class ToolCone(Cone):
+    """An axis of the tool stays within an angle of a direction during the whole motion."""
 
-    axis: Axis = described("Axis of the tool, in the TCP frame; any length.", "1", [0.0, 0.0, 1.0])
-    direction: Axis = described("Where it should point, in the base frame; any length.", "1", [0.0, 0.0, -1.0])
-    half_angle: float = described("How far it may be from there.", "rad", 0.2, ge=1e-3, le=pi)
+    half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.2, ge=1e-3, le=pi)
 
 
 Scale = Annotated[float, Field(ge=0.1, le=10)]
 _ScaleList = Annotated[list[Scale], Field(min_length=1, max_length=16)]
-ScalePerJoint = Annotated[Annotated[Scale, Tag("one")] | Annotated[_ScaleList, Tag("each")], _SHAPE]
+ScalePerJoint = Annotated[Annotated[Scale, Tag("one")] | Annotated[_ScaleList, Tag("each")], _ONE_OR_EACH]
 Loss = Annotated[float, Field(ge=0, le=1e3)]
 _LossList = Annotated[list[Loss], Field(min_length=1, max_length=16)]
-LossPerJoint = Annotated[Annotated[Loss, Tag("one")] | Annotated[_LossList, Tag("each")], _SHAPE]
+LossPerJoint = Annotated[Annotated[Loss, Tag("one")] | Annotated[_LossList, Tag("each")], _ONE_OR_EACH]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Inverter(Request):
-    """The inverters' loss constant + linear·|i| + quadratic·i². One number holds for every joint; null: the robot's."""
+    """Loss of an inverter at the motor current i: constant + linear·|i| + quadratic·i². One number applies to every
+    joint, a list has one per joint. Null: the robot's own parameter."""
 
-    constant: LossPerJoint | None = described("Loss at no current.", "W", 1.5, default=None)
-    linear: LossPerJoint | None = described("Loss per current.", "W/A", 0.6, default=None)
-    quadratic: LossPerJoint | None = described("Loss per current squared.", "W/A²", 0.02, default=None)
+    constant: LossPerJoint | None = described("Loss at zero current.", "W", 1.5, default=None)
+    linear: LossPerJoint | None = described("Loss per ampere.", "W/A", 0.6, default=None)
+    quadratic: LossPerJoint | None = described("Loss per ampere squared.", "W/A²", 0.02, default=None)
 
 
 class Drives(Request):
-    """Motors, gears and inverters: what may differ from the robot's figures."""
+    """Drives of the joints: motors, gears and inverters."""
 
     inverter: Inverter = described("Loss of the inverters.", None, {"constant": 1.5, "linear": 0.6}, default=Inverter())
 
 
 class SharedBus(Request):
-    """Joints exchange power; what is left over is burnt, but for the share that the robot's own supply takes back."""
+    """Joints exchange power. The brake resistor dissipates the net surplus, except the fraction `regeneration` (a
+    parameter of the robot) that the supply takes back."""
 
-    mode: Literal["shared"] = described("Surplus feeds the other joints; the rest is burnt.", None, "shared")
+    mode: Literal["shared"] = described("Surplus feeds the other joints; the rest is dissipated.", None, "shared")
 
 
 class IsolatedBus(Request):
-    """Every joint burns its own surplus."""
+    """Each joint dissipates its own surplus."""
 
-    mode: Literal["isolated"] = described("No joint's surplus feeds another.", None, "isolated")
+    mode: Literal["isolated"] = described("The surplus of a joint feeds no other joint.", None, "isolated")
 
 
 class RecuperatingBus(Request):
-    """Joints exchange power; what is left over is fed back."""
+    """Joints exchange power. The supply takes back a fraction of the net surplus."""
 
     mode: Literal["recuperating"] = described(
-        "Surplus feeds the other joints; the rest goes back.", None, "recuperating"
+        "Surplus feeds the other joints; the rest is fed back to the supply.", None, "recuperating"
     )
-    efficiency: Share = described("Share of the net surplus that is worth as much as what is drawn.", "1", 0.8)
+    efficiency: Share = described("Fraction of the net surplus that the supply takes back.", "1", 0.8)
 
 
 class StorageBus(Request):
-    """Joints exchange power; what is left over charges a capacitor or flywheel on the bus, which feeds later demand."""
+    """Joints exchange power. The net surplus charges an energy storage on the bus (capacitor or flywheel), which feeds
+    later demand. What the storage cannot take is treated as on the shared bus."""
 
-    mode: Literal["storage"] = described("Surplus feeds the other joints; the rest is stored.", None, "storage")
-    capacity: float = described("Charge that the full store can give back.", "J", 30.0, ge=0, le=1e9)
-    power: Annotated[float, Field(gt=0, le=1e9)] | None = described(
-        "Most that goes into or comes out of the store. Null: no limit.", "W", 500.0, default=None
+    mode: Literal["storage"] = described(
+        "Surplus feeds the other joints; the rest charges the energy storage.", None, "storage"
     )
-    efficiency: Share = described("Of a round trip; the loss is taken on the way in.", "1", 0.9, default=1.0)
+    capacity: float = described("Energy that the full storage can deliver.", "J", 30.0, ge=0, le=1e9)
+    power: Annotated[float, Field(gt=0, le=1e9)] | None = described(
+        "Largest charging and discharging power, at the bus. Null: no limit.", "W", 500.0, default=None
+    )
+    efficiency: Share = described("Round-trip efficiency; the loss occurs while charging.", "1", 0.9, default=1.0)
     initial: float = described(
-        "Charge at the start, at most `capacity`; what is used up of it counts as drawn.",
+        "Charge at the start, at most `capacity`. The charge that the motion uses is added to the total.",
         "J",
         0.0,
         default=0.0,
@@ -181,54 +187,58 @@ Bus = Annotated[
 
 
 class ArmRequest(CellRequest):
-    """What every request about a motion says of the arm."""
+    """The arm with its payload, limits, drives, power bus, and surroundings."""
 
     payload: Payload | None = described(
-        "What the flange carries. Null: nothing.", None, {"mass": 2.0, "com": [0.0, 0.0, 0.05]}, default=None
+        "Payload at the flange. Null: no payload.", None, {"mass": 2.0, "com": [0.0, 0.0, 0.05]}, default=None
     )
     gravity: Annotated[list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)] = described(
-        "Gravity in the base frame: turn it for a wall or ceiling mount.",
+        "Acceleration of gravity, [x, y, z] in the base frame. For a ceiling mount: [0, 0, 9.81].",
         "m/s²",
         [0.0, 0.0, -9.81],
         default=[0.0, 0.0, -9.81],
     )
     limits: Limits = described(
-        "Limits to keep besides the robot's own; they may only tighten these.",
+        "Limits of this request. They may only tighten the robot's limits.",
         None,
         {"velocity": 2.0},
         default=Limits(),
     )
     friction: Annotated[str, Field(min_length=1, max_length=64)] | None = described(
-        "Name of one of the robot's friction laws, from `GET /robots/{name}`. Null: its default.",
+        "Name of one of the robot's friction models, from `GET /robots/{name}`. Null: its default model.",
         None,
         "curved",
         default=None,
     )
     drives: Drives = described(
-        "Figures of the drives in place of the robot's own.", None, {"inverter": {"constant": 1.5}}, default=Drives()
+        "Parameters of the drives that replace the robot's own.",
+        None,
+        {"inverter": {"constant": 1.5}},
+        default=Drives(),
     )
     bus: Bus = described(
-        "Where the joints' surplus power goes.",
+        "What happens to the surplus power of the joints.",
         None,
         {"mode": "storage", "capacity": 30.0, "power": 500.0, "efficiency": 0.9},
         default=SharedBus(mode="shared"),
     )
     link_mass_scale: ScalePerJoint = described(
-        "Factor on mass and inertia of the moving links, payload and rotors apart: one number, or one per joint for "
-        "the link that it moves.",
+        "Factor on mass and inertia of the link that a joint moves: one number, or one per joint. Payload and rotors "
+        "do not change.",
         "1",
         0.8,
         default=1.0,
     )
     collisions: bool = described(
-        "Whether the arm is kept from hitting itself and the scene. False: nothing is compared, whatever `tool`, "
-        "`scene` and `payload.shape` say; for motions known to be free where the links' capsules are too coarse.",
+        "Whether collisions are checked. If false, `tool`, `payload.shape` and `scene` have no effect. Use false for "
+        "motions that are known to be collision-free but that the capsules of the links are too coarse to allow.",
         None,
         True,
         default=True,
     )
     tool_cone: ToolCone | None = described(
-        "Keep an axis of the tool near a direction all along: a glass upright. Null: it may point anywhere.",
+        "Limits the angle between an axis of the tool and a direction during the whole motion, for example for an open "
+        "glass. Null: no limit.",
         None,
         {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.2},
         default=None,

@@ -1,53 +1,64 @@
-"""What several schemas share: the base models, vectors and poses."""
+"""Base models, field helpers, vectors and poses that several schemas share."""
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from app.schemas.examples.values import REQUEST_ID
+
 KEY_HEADER = "Idempotency-Key"
 QUATERNION_TOLERANCE = 1e-3
-"""How far a quaternion's norm may be from 1 before it is refused."""
+"""Largest difference of a quaternion's norm from 1 that is accepted."""
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
-    """A field with its description, its unit (None where it has none) and a realistic example."""
+    """A field with its description, its unit (None: has no unit, "1": a plain number) and a realistic example."""
     extra: dict[str, Any] = {} if unit is None else {"x-unit": unit}
-    text = description if unit in (None, "1") else f"{description} [{unit}]"
+    # after the noun: at the end of the first clause
+    text = description if unit in (None, "1") else re.sub(r"(?=[.;:](\s|$))", f" [{unit}]", description, count=1)
     return Field(description=text, examples=[example], json_schema_extra=extra, **constraints)
 
 
 def part(description: str) -> Any:
-    """A field of an answer that is a model, or a list or dict of one, whose own fields show what it looks like."""
+    """A field of an answer whose value is a model, or a list or dict of models: their fields have the examples."""
     return Field(description=description)
 
 
 class Request(BaseModel):
-    """A part of a request: JSON types as they are, no NaN or infinity, no unknown fields."""
+    """A part of a request: no conversion of JSON types, no NaN or infinity, no unknown fields."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_fields(cls, data: Any) -> Any:
-        # ahead of `extra="forbid"`, whose error repeats the unknown name: nothing of the caller's input goes back
+        # before `extra="forbid"`, whose error repeats the unknown name: no answer echoes the caller's input
         if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
             raise PydanticCustomError(
-                "unknown_field", "There is an unknown field: use only {known}", {"known": ", ".join(cls.model_fields)}
+                "unknown_field", "Unknown field: use only {known}", {"known": ", ".join(cls.model_fields)}
             )
         return data
 
 
 class Response(BaseModel):
-    """A part of an answer: every field is always there."""
+    """A part of an answer: every field is always present."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
+class Answer(Response):
+    """The fields of every answer about a robot."""
+
+    id: str = described("Id of the request, as in the header `X-Request-ID`.", None, REQUEST_ID)
+    robot: str = described("Name of the robot.", None, "ur5e")
+
+
 def by_field(*names: str) -> Discriminator:
-    """Chooses a union's member by which one of `names` the object has, for members tagged `by <name>`."""
+    """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one field of `names`."""
 
     def choose(value: Any) -> str | None:
         present = [name for name in names if (name in value if isinstance(value, dict) else hasattr(value, name))]
@@ -63,7 +74,7 @@ def by_field(*names: str) -> Discriminator:
 def _is_unit(quaternion: list[float]) -> list[float]:
     norm = sum(part * part for part in quaternion) ** 0.5
     if abs(norm - 1) > QUATERNION_TOLERANCE:
-        raise PydanticCustomError("not_unit", "The quaternion must have norm 1, to within 0.001")
+        raise PydanticCustomError("not_unit", "The norm of the quaternion must be within 0.001 of 1")
     return quaternion
 
 
@@ -75,16 +86,16 @@ JointPositions = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field
 
 
 class Positioned(Request):
-    """The place of a frame."""
+    """The position of a frame."""
 
-    position: Vector3 = described("Origin of the frame: x, y, z.", "m", [0.4, -0.2, 0.3])
+    position: Vector3 = described("Origin of the frame: [x, y, z].", "m", [0.4, -0.2, 0.3])
 
 
 class WithQuaternion(Request):
     """An orientation as a quaternion."""
 
     quaternion: Quaternion = described(
-        "Orientation as a quaternion x, y, z, w: normalised if its norm is within 0.001 of 1, else refused.",
+        "Orientation as a quaternion [x, y, z, w]. Its norm must be within 0.001 of 1; it is then normalised.",
         "1",
         [0.0, 1.0, 0.0, 0.0],
     )
@@ -94,7 +105,9 @@ class WithRpy(Request):
     """An orientation as roll, pitch, yaw."""
 
     rpy: Vector3 = described(
-        "Orientation as roll, pitch, yaw about the fixed axes x, y, z, in this order.", "rad", [3.14159, 0.0, 1.5708]
+        "Orientation as [roll, pitch, yaw]: rotations about the fixed axes x, y, z, in this order.",
+        "rad",
+        [3.14159, 0.0, 1.5708],
     )
 
 
@@ -102,7 +115,9 @@ class WithRotvec(Request):
     """An orientation as a rotation vector."""
 
     rotvec: Vector3 = described(
-        "Orientation as a rotation vector: axis times angle, as on the teach pendant.", "rad", [0.0, 3.14159, 0.0]
+        "Orientation as a rotation vector [rx, ry, rz]: axis times angle, as on the teach pendant.",
+        "rad",
+        [0.0, 3.14159, 0.0],
     )
 
 
@@ -115,7 +130,7 @@ class RpyPose(WithRpy, Positioned):
 
 
 class RotvecPose(WithRotvec, Positioned):
-    """Position and rotation vector, as the teach pendant shows it."""
+    """Position and rotation vector, as on the teach pendant."""
 
 
 Pose = Annotated[
@@ -128,3 +143,15 @@ Pose = Annotated[
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])
 
 RobotName = Annotated[str, Field(min_length=1, max_length=64)]
+
+
+class RobotWithTcp(Request):
+    """A robot and its tool centre point (TCP)."""
+
+    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
+    tcp: Pose = described(
+        "Pose of the TCP in the flange frame.",
+        None,
+        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
+        default=IDENTITY,
+    )

@@ -8,13 +8,13 @@ from app.schemas.common import Response, described
 
 
 class Alive(Response):
-    """The process answers."""
+    """The process is alive."""
 
     status: Literal["alive"] = described("Always `alive`.", None, "alive")
 
 
 class Ready(Response):
-    """The workers are warm."""
+    """All workers are warm: started, with the kernel loaded."""
 
     status: Literal["ready"] = described("Always `ready`.", None, "ready")
-    workers: int = described("Warm workers.", "1", 2)
+    workers: int = described("Number of warm workers.", "1", 2)

@@ -2,58 +2,62 @@
 
 from __future__ import annotations
 
-from app.schemas.common import Pose, Response, described, part
-from app.schemas.scene import Carried, CellRequest
-
-_Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+from app.schemas.common import Answer, Pose, Response, described, part
+from app.schemas.examples.values import BOX, HOME, LABEL
+from app.schemas.response import BODIES
+from app.schemas.scene import CarriedBody, CellRequest
 
 
 class IKRequest(CellRequest):
-    """A pose whose arm configurations are wanted."""
+    """A pose of the TCP."""
 
     pose: Pose = described(
         "Pose of the TCP in the robot's base frame.", None, {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
     )
     windings: bool = described(
-        "Whether to also give solutions a full turn away, where the joint range allows.", None, True, default=True
-    )
-    payload: Carried | None = described(
-        "What the flange carries, for collisions. Null: nothing.",
+        "Whether to return all full-turn alternatives q + 2πk within the joint range. If false: one solution per "
+        "branch, the one nearest to zero.",
         None,
-        {"shape": {"shape": "box", "size": [0.1, 0.1, 0.2]}},
+        True,
+        default=True,
+    )
+    payload: CarriedBody | None = described(
+        "Payload at the flange, for collision checking. Null: no payload.",
+        None,
+        {"shape": BOX},
         default=None,
     )
 
 
-class Contact(Response):
-    """The two bodies that are nearest to each other: links, `tool`, `payload`, or an obstacle by its name."""
+class ClosestPair(Response):
+    """Two bodies and the distance between them."""
 
-    pair: list[str] = described("Their names.", None, ["table", "forearm"])
+    pair: list[str] = described(BODIES, None, ["table", "forearm"])
     distance: float = described(
-        "Distance between them, less the obstacle's margin; below zero they overlap by that much.", "m", 0.12
+        "Distance between the two bodies minus the obstacle's `margin`; if negative, the two bodies are too close or "
+        "overlap.",
+        "m",
+        0.12,
     )
 
 
 class IKSolution(Response):
     """One arm configuration that reaches the pose."""
 
-    q: list[float] = described("Joint positions.", "rad", _Q)
-    label: str = described(
-        "Branch: shoulder/elbow/wrist, and the windings where there are any.", None, "left/up/no_flip"
-    )
-    limit_distance: float = described("Least distance of a joint from an end of its range.", "rad", 1.57)
+    q: list[float] = described("Joint positions.", "rad", HOME)
+    label: str = described("Branch: shoulder/elbow/wrist. Full turns of a joint do not change it.", None, LABEL)
+    limit_distance: float = described("Smallest distance of a joint from an end of its range.", "rad", 1.57)
     smallest_singular_value: float = described(
-        "Of the Jacobian in metres and radians: near zero, the configuration is nearly singular.", "1", 0.12
+        "Smallest singular value of the Jacobian in metres and radians; near zero, the configuration is nearly "
+        "singular.",
+        "1",
+        0.12,
     )
-    collides: bool = described("Whether the arm hits itself or an obstacle there.", None, False)
-    nearest: Contact = part("What is nearest to what, or deepest inside it.")
+    collides: bool = described("Whether `nearest.distance` is negative.", None, False)
+    nearest: ClosestPair = part("The two bodies with the smallest clearance.")
 
 
-class IKResponse(Response):
-    """Every solution within the joint range."""
+class IKResponse(Answer):
+    """All arm configurations within the joint range that reach the pose."""
 
-    id: str = described(
-        "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
-    )
-    robot: str = described("Name of the robot.", None, "ur5e")
-    solutions: list[IKSolution] = part("Solutions, one entry each.")
+    solutions: list[IKSolution] = part("One entry per configuration.")

@@ -5,61 +5,52 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
-from fastapi.openapi.models import Example
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.common import (
-    IDENTITY,
+    Answer,
     JointPositions,
     Pose,
-    Request,
     Response,
-    RobotName,
+    RobotWithTcp,
     Vector3,
     described,
     part,
 )
+from app.schemas.examples.ik import ARC
+from app.schemas.examples.values import HOME
 
-MAX_POINTS = 1000
-"""Most points of a path."""
-_Q = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
-_POINTS = [[0.45, -0.15, 0.35], [0.45, 0.0, 0.4], [0.45, 0.15, 0.35]]
+MAXARC = 1000
+"""Largest number of points of a path."""
 
 
-class IKPathRequest(Request):
-    """A path of the TCP over time: exactly one of `points` and `poses`."""
+class IKPathRequest(RobotWithTcp):
+    """Positions or poses of the TCP over time, as exactly one of `points` and `poses`."""
 
-    robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
-        None,
-        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
+    t: Annotated[list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=1, max_length=MAXARC)] = described(
+        "Time of each point; each later than the previous one by 1 µs or more.", "s", [0.0, 0.5, 1.0]
     )
-    t: Annotated[list[Annotated[float, Field(ge=0, le=1e6)]], Field(min_length=1, max_length=MAX_POINTS)] = described(
-        "When the TCP is to be at each point: each later than the one before.", "s", [0.0, 0.5, 1.0]
+    points: Annotated[list[Vector3], Field(min_length=1, max_length=MAXARC)] | None = described(
+        "Positions [x, y, z] of the TCP in the robot's base frame. The orientation is free.", "m", ARC, default=None
     )
-    points: Annotated[list[Vector3], Field(min_length=1, max_length=MAX_POINTS)] | None = described(
-        "Positions of the TCP in the robot's base frame; its orientation is free.", "m", _POINTS, default=None
-    )
-    poses: Annotated[list[Pose], Field(min_length=1, max_length=MAX_POINTS)] | None = described(
+    poses: Annotated[list[Pose], Field(min_length=1, max_length=MAXARC)] | None = described(
         "Poses of the TCP in the robot's base frame.",
         None,
         [{"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
         default=None,
     )
-    guess: JointPositions = described("Joint positions from which the search for the first point starts.", "rad", _Q)
+    guess: JointPositions = described("Initial guess of the joint positions for the first point.", "rad", HOME)
     tolerance: float = described(
-        "A point is reached within this, in position [m] and, for poses, rotation [rad].",
-        "m",
+        "Largest error of a point that counts as reached. It applies to the position and, for poses, to the rotation.",
+        "m, rad",
         1e-6,
         default=1e-6,
         ge=1e-9,
         le=0.1,
     )
     near_singular: float = described(
-        "Configurations whose Jacobian has a smaller smallest singular value are left out.",
+        "A configuration is left out if the smallest singular value of the TCP's Jacobian is below this.",
         "1",
         0.01,
         default=0.01,
@@ -74,58 +65,43 @@ class IKPathRequest(Request):
         if len(self.t) != len(self.points or self.poses or []):
             raise PydanticCustomError("lengths", "`t` must have one time per point")
         if any(later - earlier < 1e-6 for earlier, later in pairwise(self.t)):
-            raise PydanticCustomError("order", "`t` must increase from point to point by a microsecond or more")
+            raise PydanticCustomError("order", "`t` must increase by 1 µs or more from point to point")
         return self
 
 
 class PathPoint(Response):
-    """What became of a point of the path."""
+    """Result for one point of the path."""
 
-    t: float = described("Its time.", "s", 0.5)
-    q: list[float] = described("The nearest configuration found.", "rad", _Q)
-    position_error: float = described("How far from the point the TCP is there.", "m", 1e-14)
-    rotation_error: float | None = described("How far it is turned from the pose; null for positions.", "rad", None)
+    t: float = described("Time of the point.", "s", 0.5)
+    q: list[float] = described("Joint positions of the configuration found with the smallest error.", "rad", HOME)
+    position_error: float = described("Distance of the TCP from the point.", "m", 1e-14)
+    rotation_error: float | None = described(
+        "Angle of the TCP to the orientation of the pose; null for positions.", "rad", None
+    )
     smallest_singular_value: float = described(
-        "Of the TCP's Jacobian: its translational rows for a position, all rows, in metres and radians, for a pose.",
+        "Smallest singular value of the TCP's Jacobian in metres and radians: of its translational rows for a "
+        "position, of all rows for a pose.",
         "1",
         0.21,
     )
     reached: bool = described("Whether the errors are within `tolerance`.", None, True)
     written: bool = described("Whether the configuration is part of `trajectory`.", None, True)
     reason: Literal["unreachable", "near_singular", "outside_limits"] | None = described(
-        "Why it is not; null where it is.", None, "near_singular"
+        "Why it is not part of `trajectory`; null if it is.", None, "near_singular"
     )
 
 
 class JointPath(Response):
-    """A trajectory as `POST /evaluate` takes it."""
+    """A trajectory in the form that `POST /evaluate` takes."""
 
-    t: list[float] = described("Times.", "s", [0.0, 0.5, 1.0])
-    q: list[list[float]] = described("Joint positions, [sample][joint].", "rad", [_Q, _Q, _Q])
+    t: list[float] = described("Time of each sample.", "s", [0.0, 0.5, 1.0])
+    q: list[list[float]] = described("Joint positions, [sample][joint].", "rad", [HOME, HOME, HOME])
 
 
-class IKPathResponse(Response):
+class IKPathResponse(Answer):
     """Configurations along the path."""
 
-    id: str = described(
-        "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
+    trajectory: JointPath = part(
+        "Configurations of all points that are reached, not nearly singular and within the joint range."
     )
-    robot: str = described("Name of the robot.", None, "ur5e")
-    trajectory: JointPath = part("The configurations that were written: the `trajectory` of `POST /evaluate`.")
-    points: list[PathPoint] = part("Every point, one entry each.")
-
-
-IK_PATH_EXAMPLES: dict[str, Example] = {
-    "positions": {
-        "summary": "An arc, orientation free",
-        "value": {"t": [0.0, 0.5, 1.0], "points": _POINTS, "guess": [2.7, -1.4, 1.8, -2.0, -1.57, 0.0]},
-    },
-    "poses": {
-        "summary": "A line with the tool pointing down",
-        "value": {
-            "t": [0.0, 0.5, 1.0],
-            "poses": [{"position": point, "quaternion": [0.0, 1.0, 0.0, 0.0]} for point in _POINTS],
-            "guess": [2.7, -1.4, 1.8, -2.0, -1.57, 0.0],
-        },
-    },
-}
+    points: list[PathPoint] = part("One entry per point.")

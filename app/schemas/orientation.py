@@ -1,4 +1,4 @@
-"""Poses whose orientation is free in part: what a goal may be beside a full pose."""
+"""Poses with an orientation tolerance: allowed as a goal, beside full poses."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from app.schemas.common import (
 )
 
 SHORTEST_AXIS = 1e-6
-"""Length below which an axis is refused."""
+"""Smallest length of an axis."""
 
 
 def _has_direction(axis: list[float]) -> list[float]:
     if sum(part * part for part in axis) ** 0.5 < SHORTEST_AXIS:
-        raise PydanticCustomError("zero_axis", "The axis must not be zero")
+        raise PydanticCustomError("zero_axis", "The axis must not have length zero")
     return axis
 
 
@@ -37,35 +37,39 @@ Axis = Annotated[Vector3, AfterValidator(_has_direction)]
 
 class _FreeAbout(Request):
     free_about: Axis = described(
-        "Axis of the tool, in the TCP frame, about which it may turn freely; any length.", "1", [0.0, 0.0, 1.0]
+        "Axis of the tool in the TCP frame about which it may rotate freely; any length except zero.",
+        "1",
+        [0.0, 0.0, 1.0],
     )
 
 
 class QuaternionFreeAbout(WithQuaternion, _FreeAbout):
-    """One orientation, as a quaternion, and all that turning about the axis makes of it."""
+    """An orientation, as a quaternion, rotated by any angle about an axis of the tool."""
 
 
 class RpyFreeAbout(WithRpy, _FreeAbout):
-    """One orientation, as roll, pitch, yaw, and all that turning about the axis makes of it."""
+    """An orientation, as roll, pitch, yaw, rotated by any angle about an axis of the tool."""
 
 
 class RotvecFreeAbout(WithRotvec, _FreeAbout):
-    """One orientation, as a rotation vector, and all that turning about the axis makes of it."""
+    """An orientation, as a rotation vector, rotated by any angle about an axis of the tool."""
 
 
 class Cone(Request):
-    """How far an axis of the tool may tilt; about the axis the tool turns freely."""
+    """All orientations with an axis of the tool within an angle of a direction. The tool may rotate about that axis."""
 
-    axis: Axis = described("Axis of the tool, in the TCP frame; any length.", "1", [0.0, 0.0, 1.0])
-    direction: Axis = described("Where it should point, in the base frame; any length.", "1", [0.0, 0.0, -1.0])
-    half_angle: float = described("How far it may be from there.", "rad", 0.35, ge=0, le=pi)
+    axis: Axis = described("Axis of the tool in the TCP frame; any length except zero.", "1", [0.0, 0.0, 1.0])
+    direction: Axis = described("Direction in the base frame; any length except zero.", "1", [0.0, 0.0, -1.0])
+    half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.35, ge=0, le=pi)
 
 
 class InCone(Request):
-    """Every orientation that keeps an axis of the tool within a cone."""
+    """An orientation that is free within a cone."""
 
     cone: Cone = described(
-        "The cone.", None, {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.35}
+        "Allowed directions of an axis of the tool.",
+        None,
+        {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.35},
     )
 
 
@@ -98,11 +102,11 @@ Orientation = Annotated[
 
 
 class ConeOrientedPose(Positioned):
-    """A position, and an orientation that is free in part."""
+    """A position with an orientation that is free in part."""
 
     orientation: Orientation = described(
-        '"free": any. `free_about`: turned freely about an axis of the tool. `cone`: an axis of the tool within an '
-        "angle of a direction.",
+        '"free": any orientation. `free_about`: a given orientation, rotated by any angle about an axis of the tool. '
+        "`cone`: an axis of the tool within an angle of a direction, and any rotation about this axis.",
         None,
         {"cone": {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.35}},
     )

@@ -4,30 +4,30 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi.openapi.models import Example
 from pydantic import Field
 
-from app.schemas.answers import KeptAnswer
-from app.schemas.common import Response, described, part
+from app.schemas.common import Answer, Response, described, part
+from app.schemas.examples.values import ANSWER_PATH, LABEL
 from app.schemas.request import MAX_DURATION, DurationRange, OptimizeRequest
+from app.schemas.response import OBJECTIVE
 from optimizer.problem.problem import MethodName
-
-_HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
-_LABEL = "left/up/no_flip"
+from optimizer.solution import Objective
 
 
 class ParetoRequest(OptimizeRequest):
-    """A motion whose energy is wanted over its duration."""
+    """A motion whose Pareto front of duration and energy is requested."""
 
-    points: int = described("Durations to solve for, at most.", "1", 12, default=12, ge=2, le=100)
+    points: int = described("Largest number of durations to solve.", "1", 12, default=12, ge=2, le=100)
     duration: DurationRange | None = described(
-        "Bounds on the durations. Null: from the shortest to the one of least energy (`mechanical` needs a `max`).",
+        "Bounds on the durations of the front. Null: from the shortest feasible duration to the duration of least "
+        "energy. The objective `mechanical` needs a `max` or a `cycle`.",
         "s",
         {"max": 3.0},
         default=None,
     )
     deadline: float = described(
-        "Wall time, waiting included, after which the front found so far is returned.",
+        "Wall time for the whole front, including the wait for a worker. When it passes, the service returns the front "
+        "found so far.",
         "s",
         30.0,
         default=30.0,
@@ -37,83 +37,58 @@ class ParetoRequest(OptimizeRequest):
 
 
 class ParetoPoint(Response):
-    """A motion that none beats in both duration and energy."""
+    """A motion of the front: no other motion found is better in both duration and energy."""
 
-    duration: float = described("Its duration.", "s", 0.7462)
-    energy: float = described("Its energy, of the objective.", "J", 45.5)
-    start: str = described("Branch at the start.", None, _LABEL)
-    goal: str = described("Branch at the goal.", None, _LABEL)
+    duration: float = described("Duration of the motion.", "s", 0.7462)
+    energy: float = described("Energy of the motion, of the objective.", "J", 45.5)
+    start: str = described("Branch at the start.", None, LABEL)
+    goal: str = described("Branch at the goal.", None, LABEL)
     electrical: float = described("Energy drawn from the supply.", "J", 45.5)
-    mechanical: float = described("Absolute mechanical work.", "J", 21.3)
-    mean_power: float = described("Mean power drawn from the bus.", "W", 61.0)
-    peak_power: float = described("Greatest power drawn from the bus.", "W", 183.0)
-    lower_bound: float = described("What no motion of this duration can go below, of the objective.", "J", 39.8)
+    mechanical: float = described("Mechanical work.", "J", 21.3)
+    mean_power: float = described("Mean power drawn from the supply.", "W", 61.0)
+    peak_power: float = described("Largest power drawn from the supply.", "W", 183.0)
+    lower_bound: float = described("Lower bound of the objective: no motion of this duration needs less.", "J", 39.8)
     status: Literal["optimal", "feasible"] = described(
-        "`optimal`: converged, every other candidate solved or ruled out for this duration.", None, "optimal"
+        "Status as `POST /optimize` returns it for this duration.", None, "optimal"
     )
-    certified: bool = described("Whether its certificate holds: always, or it would not be here.", None, True)
-    worst_ratio: float = described("Worst value / limit over all limits.", "1", 0.9999)
-    answer: str = described(
-        "Path of the whole answer, as of `POST /optimize`.", None, f"/answers/{KeptAnswer.EXAMPLE_ID}"
+    certified: bool = described(
+        "Whether the certificate is valid: always true, because other motions are not returned.", None, True
     )
+    worst_ratio: float = described("Largest value / limit over all limits.", "1", 0.9999)
+    answer: str = described("Path of the complete answer of `POST /optimize`.", None, ANSWER_PATH)
 
 
 class ParetoDropped(Response):
-    """A duration that was tried and is no point of the front."""
+    """A duration that was solved and is not a point of the front."""
 
     duration: float = described("The duration.", "s", 0.787)
-    energy: float | None = described("Energy of the motion found, of the objective; null if none was.", "J", 45.98)
-    reason: str = described("Why.", None, "the motion of 0.7765 s is no slower and needs no more")
+    energy: float | None = described(
+        "Energy of the motion found, of the objective; null if none was found.", "J", 45.98
+    )
+    reason: str = described(
+        "Why it is not a point.", None, "dominated: the motion of 0.7765 s is no slower and needs no more energy"
+    )
 
 
 class ParetoSolver(Response):
-    """What the front cost to compute."""
+    """Effort of the computation of the whole front."""
 
     wall_time: float = described("Wall time.", "s", 2.4)
-    nlp_solves: int = described("Nonlinear programmes solved.", "1", 49)
+    nlp_solves: int = described("Nonlinear programs solved.", "1", 49)
 
 
-class ParetoResponse(Response):
-    """Energy over duration: the motions of which none beats another, fastest first."""
+class ParetoResponse(Answer):
+    """The Pareto front of duration and energy."""
 
-    id: str = described(
-        "The request's id, as in the `X-Request-ID` header.", None, "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
-    )
-    robot: str = described("Name of the robot.", None, "ur5e")
     method: MethodName = described("How the motions are parametrised.", None, "bspline")
-    objective: Literal["electrical", "mechanical"] = described("Whose energy it is.", None, "electrical")
+    objective: Objective = described(OBJECTIVE, None, "electrical")
     status: Literal["optimal", "feasible"] = described(
-        "`optimal`: every duration chosen was solved, every point is optimal. `feasible`: verified, but cut short.",
+        "`optimal`: every chosen duration was solved, and every point is `optimal`. `feasible`: every point is "
+        "certified, but the deadline passed or some point is not `optimal`.",
         None,
         "optimal",
     )
-    shortest: float = described("The least feasible duration, over all candidates.", "s", 0.7462)
-    points: Annotated[list[ParetoPoint], Field(min_length=1)] = part("The front, by duration.")
-    dropped: list[ParetoDropped] = part("Durations that were tried and are no points of it.")
-    solver: ParetoSolver = part("What it cost to compute.")
-
-
-PARETO_EXAMPLES: dict[str, Example] = {
-    "lift": {
-        "summary": "A lift with a payload",
-        "description": "From the fastest motion to the one of least energy.",
-        "value": {
-            "start": {"q": [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]},
-            "goal": {"q": _HOME},
-            "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
-            "points": 8,
-        },
-    },
-    "branch_switch": {
-        "summary": "Mechanical work, with a cheaper arm configuration that is slower to reach",
-        "description": "The objective of mechanical work needs a longest duration.",
-        "value": {
-            "start": {"q": _HOME},
-            "goal": {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
-            "objective": "mechanical",
-            "duration": {"max": 2.0},
-            "windings": False,
-            "points": 10,
-        },
-    },
-}
+    shortest: float = described("Shortest feasible duration found, over all candidates.", "s", 0.7462)
+    points: Annotated[list[ParetoPoint], Field(min_length=1)] = part("Points of the front, in order of duration.")
+    dropped: list[ParetoDropped] = part("Durations that were solved and are not points of the front.")
+    solver: ParetoSolver = part("Effort of the computation.")

@@ -1,4 +1,4 @@
-"""A motion that is asked for: what `POST /optimize` takes."""
+"""The request of `POST /optimize`, and the fields that other requests for a motion share."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
 from optimizer.problem.problem import MethodName
+from optimizer.solution import Objective
 
 MAX_DURATION = 600.0
-"""Longest motion [s]."""
+"""Largest duration of a motion [s]."""
 MAX_SAMPLES = 100_000
-"""Most samples that an answer holds."""
+"""Largest number of samples in an answer."""
 
 Seconds = Annotated[float, Field(ge=1e-3, le=MAX_DURATION)]
 
 
 class JointTarget(Request):
-    """A target in joint space."""
+    """A target as joint positions."""
 
-    q: JointPositions = described("Joint positions from base to flange.", "rad", [0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+    q: JointPositions = described("Joint positions, from base to flange.", "rad", [0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 
 
 class PoseTarget(Request):
-    """A target in space: every arm configuration that reaches it is a candidate."""
+    """A target as a pose of the TCP. Every arm configuration that reaches it is a candidate."""
 
     pose: TargetPose = described(
-        "Pose of the TCP in the robot's base frame. A goal's orientation may be free in part.",
+        "Pose of the TCP in the robot's base frame. The orientation of a goal may be free in part.",
         None,
         {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )
@@ -42,10 +43,10 @@ SingleTarget = Annotated[
 
 
 class AnyOfTarget(Request):
-    """Several targets: the one that costs least is taken."""
+    """Several targets. The answer moves to the one that needs the least energy."""
 
     any_of: list[SingleTarget] = described(
-        "The targets, joints or poses, in any mixture. Those out of reach are listed in the answer's `unreachable`.",
+        "Joint positions and poses, mixed. Targets that the arm cannot reach are in `unreachable` of the answer.",
         None,
         [
             {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
@@ -65,10 +66,10 @@ Target = Annotated[
 
 
 class DurationRange(Request):
-    """Bounds on the duration; either may be left out."""
+    """Bounds on the duration; each is optional."""
 
-    min: Seconds | None = described("Shortest duration.", "s", 1.0, default=None)
-    max: Seconds | None = described("Longest duration.", "s", 3.0, default=None)
+    min: Seconds | None = described("Smallest duration. Null: no bound.", "s", 1.0, default=None)
+    max: Seconds | None = described("Largest duration. Null: no bound.", "s", 3.0, default=None)
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -96,32 +97,40 @@ Duration = Annotated[
 
 
 class Branch(Request):
-    """Arm configurations to keep to; a part left out is free."""
+    """Allowed branches. A part that is null may have any value."""
 
     shoulder: Literal["left", "right"] | None = described(
-        "Side of the shoulder that the arm is on.", None, "left", default=None
+        "Side of the first axis on which the plane of the arm lies, seen along the reach.", None, "left", default=None
     )
-    elbow: Literal["up", "down"] | None = described("Elbow above or below.", None, "up", default=None)
-    wrist: Literal["flip", "no_flip"] | None = described("Wrist flipped or not.", None, "no_flip", default=None)
+    elbow: Literal["up", "down"] | None = described(
+        "`up`: the elbow is above the line from shoulder to wrist, if the arm reaches forward.",
+        None,
+        "up",
+        default=None,
+    )
+    wrist: Literal["flip", "no_flip"] | None = described(
+        "`no_flip`: sin(q5) < 0, as with the tool pointing down in a usual posture.", None, "no_flip", default=None
+    )
 
 
 class Cycle(Request):
-    """When the arm is needed again after the motion's start, and how it is held still until then."""
+    """The wait at the goal: when the arm is needed again, and what holds it until then."""
 
     time: Seconds = described(
-        "From the start of the motion to the end of the wait: the motion takes no longer.", "s", 6.0
+        "Time from the start of the motion until the arm is needed again. The motion takes no longer.", "s", 6.0
     )
     hold: Literal["motors", "brakes"] = described(
-        "Whether the motors hold the arm all the time, or the brakes after `brake_delay`.",
+        "`motors`: the motors hold the arm until the end of the cycle. `brakes`: the motors hold it for "
+        "`brake_delay`, then the brakes.",
         None,
         "brakes",
         default="motors",
     )
     brake_delay: float = described(
-        "Time from the motion's end until the brakes hold.", "s", 0.5, default=0.0, ge=0, le=MAX_DURATION
+        "Time between the end of the motion and the brakes.", "s", 0.5, default=0.0, ge=0, le=MAX_DURATION
     )
     brake_power: Annotated[float, Field(ge=0, le=1e4)] | None = described(
-        "What the arm draws on its brakes, electronics included. Null: what the electronics draw.",
+        "Power drawn while the brakes hold, electronics included. Null: the power of the electronics.",
         "W",
         20.0,
         default=None,
@@ -129,51 +138,62 @@ class Cycle(Request):
 
 
 class MotionRequest(ArmRequest):
-    """A motion from rest at `start` to rest at `goal`."""
+    """A motion from standstill at `start` to standstill at `goal`."""
 
     start: Target = described(
-        "Where the motion starts: joints, a pose, or any of several.",
+        "Start of the motion: joint positions, a pose of the TCP, or one of several targets.",
         None,
         {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     )
     goal: Target = described(
-        "Where it ends: joints, a pose, or any of several.",
+        "End of the motion: joint positions, a pose of the TCP, or one of several targets.",
         None,
         {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
     )
-    objective: Literal["electrical", "mechanical"] = described(
-        "What is minimised: energy drawn from the bus, or the joints' absolute mechanical work.",
+    objective: Objective = described(
+        "Energy that is minimised. `electrical`: energy drawn from the supply. `mechanical`: work of the joints "
+        "without friction, ∫ Σ_j |tau_j v_j| dt.",
         None,
         "electrical",
         default="electrical",
     )
     duration: Duration | None = described(
-        "Duration, or its bounds. Null lets the optimiser choose (`mechanical` then needs a number or a `max`: it has "
-        f"no best duration of its own). At most {MAX_DURATION:g} s, and {MAX_SAMPLES} times `sample_period`.",
+        "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective `mechanical` needs a "
+        "number, a `max` or a `cycle`, because a slower motion needs less work. The duration is at most "
+        f"{MAX_DURATION:g} s and at most {MAX_SAMPLES} times `sample_period`.",
         "s",
         {"max": 3.0},
         default=None,
     )
     cycle: Cycle | None = described(
-        "Wait at the goal until the cycle is over; the energy then includes the wait. Null: the motion alone.",
+        "The arm waits at the goal until the end of the cycle, and the energy includes the wait. Null: no wait.",
         None,
         {"time": 6.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 20.0},
         default=None,
     )
     branch: Branch | None = described(
-        "Arm configurations to keep to. Null: try them all.",
+        "Allowed branches of the arm configurations that reach a pose, at both ends. Null: all branches.",
         None,
         {"shoulder": "left", "elbow": "up", "wrist": "no_flip"},
         default=None,
     )
     windings: bool = described(
-        "Whether to also try goals a full turn away, where the joint range allows.", None, True, default=True
+        "Whether full-turn alternatives q + 2πk within the joint range are candidates of their own.",
+        None,
+        True,
+        default=True,
     )
     sample_period: float = described(
-        "Time between the returned samples; the last sample lies on the end.", "s", 0.008, default=0.008, ge=1e-4, le=1
+        "Time between the returned samples. The last sample is at the end of the motion.",
+        "s",
+        0.008,
+        default=0.008,
+        ge=1e-4,
+        le=1,
     )
     deadline: float = described(
-        "Wall time, waiting included, after which the best verified result so far is returned.",
+        "Wall time from the arrival of the request, including the wait for a worker. When it passes, the service "
+        "returns the best certified motion found so far.",
         "s",
         10.0,
         default=10.0,
@@ -194,13 +214,14 @@ class MotionRequest(ArmRequest):
 
 
 class OptimizeRequest(MotionRequest):
-    """A motion from rest at `start` to rest at `goal`, by one method."""
+    """A motion from standstill at `start` to standstill at `goal`, by one method."""
 
     method: MethodName = described(
-        "How the motion is parametrised. `bspline`: every joint a free B-spline. `time_scaling`: the straight line in "
-        "joint space with an optimised time law. `lagrange`: every joint one polynomial, by its values at Chebyshev "
-        "nodes. `uniform_scaling`: the time-optimal motion slowed evenly. `polynomial_ga`: one polynomial each, bred "
-        "by a genetic algorithm over the three likeliest candidates: seconds, and never `optimal`.",
+        "How the motion is parametrised. `bspline`: one B-spline per joint. `time_scaling`: the straight line in joint "
+        "space with an optimised time scaling. `lagrange`: one polynomial per joint, given by its values at Chebyshev "
+        "nodes. `uniform_scaling`: the time-optimal motion, uniformly slowed down. `polynomial_ga`: one polynomial per "
+        "joint, found by a genetic algorithm for at most three candidates; it takes seconds, and its `status` is never "
+        "`optimal`.",
         None,
         "bspline",
         default="bspline",

@@ -7,67 +7,71 @@ from typing import Literal
 from app.schemas.common import Response, described, part
 
 
-class Figure(Response):
-    """One figure of a robot; lists run over the joints from base to flange."""
+class Parameter(Response):
+    """One parameter of a robot. A list has one entry per joint or link, from base to flange."""
 
     value: float | list[float] | list[list[float]] = described(
-        "The figure.", None, [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
+        "Value of the parameter.", None, [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
     )
-    unit: str = described("Its unit; `1` where it has none.", None, "N·m")
+    unit: str = described("Unit; `1` if it has none.", None, "N·m")
     source: str = described(
-        "Where it comes from.", None, "github.com/UniversalRobots/Universal_Robots_ROS2_Description"
+        "Source of the value.", None, "github.com/UniversalRobots/Universal_Robots_ROS2_Description"
     )
-    trust: Literal["A", "B", "C", "T", "E"] = described("How far to trust it: see `trust`.", None, "A")
-    note: str = described("What else to know.", None, "Of the motor at the joint.")
+    trust: Literal["A", "B", "C", "T", "E"] = described("Quality of the source: see `trust` of the robot.", None, "A")
+    note: str = described("Remarks.", None, "Of the motor at the joint.")
 
 
-Figures = dict[str, Figure]
+Parameters = dict[str, Parameter]
 
 
 class FrictionLaw(Response):
-    """One friction law: torque over joint speed."""
+    """A friction model: friction torque as a function of joint velocity."""
 
-    name: str = described("Its name, for a request's `friction`.", None, "curved")
-    default: bool = described("Whether it holds when a request names none.", None, True)
+    name: str = described("Name, for the field `friction` of a request.", None, "curved")
+    default: bool = described("Whether requests without `friction` use it.", None, True)
     formula: str = described(
-        "Torque at joint speed v.", None, "coulomb v / sqrt(v² + knee²) + curved asinh(v / speed) + viscous v"
+        "Friction torque at joint velocity v.",
+        None,
+        "coulomb v / sqrt(v² + knee²) + curved asinh(v / speed) + viscous v",
     )
-    coefficients: Figures = part("The formula's coefficients.")
+    coefficients: Parameters = part("Coefficients of the formula.")
 
 
 class Friction(Response):
-    """Joint friction: what was measured, and the laws fitted to it."""
+    """Joint friction: measurements, and the models fitted to them."""
 
-    table: Figures = part("Measurements.")
-    laws: list[FrictionLaw] = part("The laws, the default one first.")
+    table: Parameters = part("Measured friction torques and their joint velocities.")
+    laws: list[FrictionLaw] = part("Friction models, the default one first.")
 
 
 class RobotSummary(Response):
-    """A robot in a list."""
+    """A robot."""
 
-    name: str = described("Its name in requests.", None, "ur5e")
-    title: str = described("Its maker and model.", None, "Universal Robots UR5e")
-    joints: list[str] = described("Joints from base to flange.", None, ["shoulder_pan_joint", "shoulder_lift_joint"])
+    name: str = described("Name in requests.", None, "ur5e")
+    title: str = described("Manufacturer and model.", None, "Universal Robots UR5e")
+    joints: list[str] = described(
+        "Names of the joints, from base to flange.", None, ["shoulder_pan_joint", "shoulder_lift_joint"]
+    )
 
 
 class RobotList(Response):
-    """Every robot there is."""
+    """All robots."""
 
     robots: list[RobotSummary] = part("The robots.")
 
 
 class RobotDetail(RobotSummary):
-    """All that is known of a robot, each figure with its source and trust."""
+    """The parameters of a robot, each with its source and trust letter."""
 
-    trust: dict[str, str] = described("What the trust letters mean.", None, {"A": "maker's own file or data packet"})
-    kinematics: Figures = part("Geometry.")
-    inertials: Figures = part("Masses and inertias of the links.")
-    limits: Figures = part("Limits and rated payload.")
-    collision: Figures = part(
-        "Capsules that each link lies within (rows of x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, and "
-        "radius), the link that carries the elbow, and the pairs of links that never collide."
+    trust: dict[str, str] = described("Meaning of the trust letters.", None, {"A": "maker's own file or data packet"})
+    kinematics: Parameters = part("Geometry.")
+    inertials: Parameters = part("Masses, centres of mass and inertias of the links.")
+    limits: Parameters = part("Limits and rated payload.")
+    collision: Parameters = part(
+        "Capsules that enclose each link, the link that carries the elbow, and pairs of links that are never in "
+        "collision. A capsule is [x1, y1, z1, x2, y2, z2, radius]: both ends of its axis in the link frame."
     )
-    drives: Figures = part("Motors, gears and inverters.")
-    electronics: Figures = part("What the arm draws besides its motors.")
+    drives: Parameters = part("Motors, gears and inverters.")
+    electronics: Parameters = part("Power that the electronics draw, and what the supply takes back.")
     friction: Friction = part("Joint friction.")
-    default_motion: Figures = part("How the robot's own controller moves when it is told nothing.")
+    default_motion: Parameters = part("Default speed and acceleration of the robot's own controller.")

@@ -1,4 +1,4 @@
-"""What stands around the arm and what is fixed to its flange: shapes with their poses."""
+"""Shapes for collision checking: obstacles around the arm, and the tool at its flange."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import IDENTITY, Pose, Request, RobotName, Vector3, described
+from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
+from app.schemas.examples.values import BOX, TOOL, at
 
-# the optimizer refuses more; here so that the schema says so
+# the library rejects more; repeated here so that the schema shows it
 MOST_OBSTACLES, MOST_VERTICES, MOST_CAPSULES = 64, 256, 16
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
-_POSE_TEXT = "Pose of the shape: in the base frame for an obstacle, in the flange frame for what the arm carries."
+_POSE_TEXT = "Pose of the shape: of an obstacle in the base frame, of a payload in the flange frame."
 Size = Annotated[float, Field(ge=1e-4, le=100)]
 
 
@@ -20,23 +21,23 @@ class _Shape(Request):
 
 
 class Box(_Shape):
-    """A box about its pose's origin."""
+    """A box, centred at the origin of its pose."""
 
     shape: Literal["box"] = described("Kind of shape.", None, "box")
     size: Annotated[list[Size], Field(min_length=3, max_length=3)] = described(
-        "Edges along the pose's axes.", "m", [0.4, 0.3, 0.2]
+        "Lengths of the edges along the axes x, y, z of the pose.", "m", [0.4, 0.3, 0.2]
     )
 
 
 class Sphere(_Shape):
-    """A ball about its pose's origin."""
+    """A sphere, centred at the origin of its pose."""
 
     shape: Literal["sphere"] = described("Kind of shape.", None, "sphere")
     radius: Size = described("Radius.", "m", 0.08)
 
 
 class Cylinder(_Shape):
-    """A cylinder along its pose's z axis, the origin in its middle."""
+    """A cylinder along the z axis of its pose, centred at the origin."""
 
     shape: Literal["cylinder"] = described("Kind of shape.", None, "cylinder")
     radius: Size = described("Radius.", "m", 0.05)
@@ -44,63 +45,65 @@ class Cylinder(_Shape):
 
 
 class Capsule(_Shape):
-    """A segment along its pose's z axis, grown by a radius; the origin is in its middle."""
+    """A capsule along the z axis of its pose, centred at the origin."""
 
     shape: Literal["capsule"] = described("Kind of shape.", None, "capsule")
     radius: Size = described("Radius.", "m", 0.05)
-    length: Size = described("Length of the segment, without the round ends.", "m", 0.4)
+    length: Size = described("Length without the round ends.", "m", 0.4)
 
 
 class Mesh(_Shape):
-    """The convex hull of points: a body that is not convex is given as several."""
+    """The convex hull of points. Give a body that is not convex as several meshes."""
 
     shape: Literal["mesh"] = described("Kind of shape.", None, "mesh")
     vertices: Annotated[list[Vector3], Field(min_length=4, max_length=MOST_VERTICES)] = described(
-        "Points whose hull it is; they must span a body.",
+        "Points [x, y, z] in the frame of the pose. Their convex hull must have a volume.",
         "m",
         [[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.2]],
     )
 
 
 class HalfSpace(_Shape):
-    """All that lies below its pose's xy plane: a floor, or a wall whose z axis points at the arm."""
+    """All points below the xy plane of its pose: a floor, or a wall whose z axis points to the arm."""
 
     shape: Literal["half_space"] = described("Kind of shape.", None, "half_space")
 
 
 class _Obstacle(Request):
     name: Annotated[str, Field(min_length=1, max_length=64)] = described(
-        "Its name in answers, unlike any other's.", None, "table"
+        "Name of the obstacle in answers; each name is used once.", None, "table"
     )
-    margin: float = described("How far the arm keeps away from it.", "m", 0.02, default=0.0, ge=0, le=1)
+    margin: float = described(
+        "Required clearance between the arm and this obstacle.", "m", 0.02, default=0.0, ge=0, le=1
+    )
 
 
 class BoxObstacle(Box, _Obstacle):
-    """A box in the arm's surroundings."""
+    """An obstacle in the shape of a box."""
 
 
 class SphereObstacle(Sphere, _Obstacle):
-    """A ball in the arm's surroundings."""
+    """An obstacle in the shape of a sphere."""
 
 
 class CylinderObstacle(Cylinder, _Obstacle):
-    """A cylinder in the arm's surroundings."""
+    """An obstacle in the shape of a cylinder."""
 
 
 class CapsuleObstacle(Capsule, _Obstacle):
-    """A capsule in the arm's surroundings."""
+    """An obstacle in the shape of a capsule."""
 
 
 class MeshObstacle(Mesh, _Obstacle):
-    """A convex body in the arm's surroundings."""
+    """An obstacle in the shape of a convex mesh."""
 
 
 class HalfSpaceObstacle(HalfSpace, _Obstacle):
-    """A floor or a wall."""
+    """An obstacle that is a floor or a wall."""
 
 
 def _by_shape(*known: str) -> Discriminator:
-    """Chooses a union's member by its `shape`, without repeating what is not known."""
+    """Discriminator of a union by the field `shape`; its error does not echo an unknown one."""
 
     def choose(value: Any) -> str | None:
         shape = value.get("shape") if isinstance(value, dict) else getattr(value, "shape", None)
@@ -123,13 +126,13 @@ CarriedShape = Annotated[
 ]
 
 
-class Carried(Request):
-    """The space that a carried body takes up."""
+class CarriedBody(Request):
+    """A payload for collision checking, without a mass."""
 
     shape: CarriedShape = described(
-        "Its shape, with its pose in the flange frame.",
+        "Shape of the payload, with its pose in the flange frame.",
         None,
-        {"shape": "box", "size": [0.1, 0.1, 0.2], "pose": {"position": [0, 0, 0.2], "rotvec": [0, 0, 0]}},
+        BOX,
     )
 
 
@@ -145,54 +148,51 @@ Obstacle = Annotated[
 
 
 class Scene(Request):
-    """What surrounds the arm, in its base frame."""
+    """The surroundings of the arm."""
 
     obstacles: Annotated[list[Obstacle], Field(max_length=MOST_OBSTACLES)] = described(
-        "The obstacles.",
+        "Obstacles around the arm.",
         None,
-        [{"name": "floor", "shape": "half_space", "pose": {"position": [0, 0, -0.1], "rotvec": [0, 0, 0]}}],
+        [{"name": "floor", "shape": "half_space", "pose": at(0.0, 0.0, -0.1)}],
         default=[],
     )
 
 
 class ToolCapsule(Request):
-    """A segment in the flange frame, grown by a radius."""
+    """A capsule in the flange frame."""
 
-    start: Vector3 = described("One end of the segment, in the flange frame.", "m", [0.0, 0.0, 0.03])
-    end: Vector3 = described("Its other end.", "m", [0.0, 0.0, 0.12])
+    start: Vector3 = described("First end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.03])
+    end: Vector3 = described("Second end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.12])
     radius: Size = described("Radius.", "m", 0.04)
 
 
 class Tool(Request):
-    """What the flange bears, for collisions."""
+    """The shape of the tool, for collision checking."""
 
     capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_CAPSULES)] = described(
-        "Capsules that the tool lies within.",
+        "Capsules that enclose the tool.",
         None,
-        [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}],
+        TOOL["capsules"],
         default=[],
     )
 
 
-class CellRequest(Request):
-    """The robot, its tool, and what surrounds it."""
+class CellRequest(RobotWithTcp):
+    """The robot, its tool and its surroundings."""
 
-    robot: RobotName = described("A name from `GET /robots`.", None, "ur5e", default="ur5e")
-    tcp: Pose = described(
-        "Pose of the TCP in the flange frame.",
-        None,
-        {"position": [0.0, 0.0, 0.12], "rpy": [0.0, 0.0, 0.0]},
-        default=IDENTITY,
-    )
     tool: Tool = described(
-        "The tool at the flange, for collisions with it.",
+        "Shape of the tool, for collision checking.",
         None,
-        {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]},
+        TOOL,
         default=Tool(),
     )
     scene: Scene = described(
-        "What surrounds the arm.",
+        "Obstacles around the arm.",
         None,
-        {"obstacles": [{"name": "post", "shape": "cylinder", "radius": 0.05, "length": 1.0}]},
+        {
+            "obstacles": [
+                {"name": "post", "shape": "cylinder", "radius": 0.05, "length": 1.0, "pose": at(0.6, 0.3, 0.5)}
+            ]
+        },
         default=Scene(),
     )

@@ -5,27 +5,21 @@ from __future__ import annotations
 from typing import Any, ClassVar, Literal
 
 from app.schemas.common import Response, described, part
-from app.schemas.studies import Query, Reached, StudySummary
-
-_REQUEST = {
-    "optimize": {
-        "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
-        "goal": {"pose": {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
-    }
-}
+from app.schemas.examples.values import OPTIMIZE, STUDY_ID
+from app.schemas.studies import IterationEnergy, Query
 
 
 class SuggestQuery(Query):
-    """From where to go on, and how long to think."""
+    """The iteration to start from, and the time for the computation."""
 
     DEFAULT_DEADLINE: ClassVar[float] = 10.0
 
     base: Literal["best", "last"] = described(
-        "The iteration to start from: the one of least energy, or the last.", None, "best", default="best"
+        "Iteration to start from: the one of least energy, or the last one.", None, "best", default="best"
     )
     deadline: float | None = described(
-        "Wall time for all suggestions; what is not computed by then is listed as such. Null: "
-        f"{DEFAULT_DEADLINE:g} s, or the service's longest deadline if that is shorter.",
+        "Wall time for all suggestions together; those without a result by then are in `not_computed`. Null: "
+        f"{DEFAULT_DEADLINE:g} s, or the service's largest deadline if that is shorter.",
         "s",
         10.0,
         default=None,
@@ -36,40 +30,44 @@ class SuggestQuery(Query):
 
 class _Proposal(Response):
     step: Literal["method", "branch", "orientation", "duration", "payload"] = described(
-        "What it changes.", None, "branch"
+        "Property of the motion that is changed.", None, "branch"
     )
     summary: str = described(
-        "The change in words.", None, "Reach the same pose in whichever arm configuration is best."
+        "The change in words.", None, "Reach the same pose in the arm configuration of least energy."
     )
-    request: dict[str, Any] = described("Body for `POST /studies/{id}/iterations`.", None, _REQUEST)
+    request: dict[str, Any] = described("Body for `POST /studies/{id}/iterations`.", None, {"optimize": OPTIMIZE})
 
 
 class Suggestion(_Proposal):
-    """A step that was computed."""
+    """A change whose best motion was computed."""
 
-    energy: float = described("Its energy, in the study's objective: what the request will come to.", "J", 57.5)
-    gain: float = described("Energy of the base less its own: below zero, it costs more.", "J", 38.6)
-    duration: float = described("Length of the motion.", "s", 1.33)
+    energy: float = described("Energy of the motion found for `request`, of the study's objective.", "J", 57.5)
+    gain: float = described("Energy of the base minus `energy`; a positive value is a saving.", "J", 38.6)
+    duration: float = described("Duration of the motion.", "s", 1.33)
     status: Literal["optimal", "feasible"] = described(
-        "`feasible`: not everything was searched, and the request may come to less.", None, "optimal"
+        "`optimal`: posting `request` gives the same energy. `feasible`: the search was not complete; posting "
+        "`request` with more time may give less energy.",
+        None,
+        "optimal",
     )
-    threshold_met: bool = described("Whether it meets the study's threshold.", None, True)
+    threshold_met: bool = described("Whether `energy` is at most the threshold of the study.", None, True)
 
 
 class NotComputed(_Proposal):
-    """A step without an answer."""
+    """A change without a motion."""
 
     problem: str = described(
-        "The type of problem: `deadline-exceeded` and `busy` where time or workers ran out, else why it cannot be.",
+        "Type of the error. `deadline-exceeded` and `busy`: no time or no free worker was left. Other types: the "
+        "change is impossible.",
         None,
         "duration-too-short",
     )
 
 
 class Suggestions(Response):
-    """What to try next, ranked by gain."""
+    """Changes to try next, in order of `gain`."""
 
-    study: str = described("The study's id.", None, StudySummary.EXAMPLE_ID)
-    base: Reached = part("The iteration that they start from.")
-    suggestions: list[Suggestion] = part("Computed steps, the greatest gain first; those that cost more come last.")
-    not_computed: list[NotComputed] = part("Steps without an answer, and why.")
+    study: str = described("Id of the study.", None, STUDY_ID)
+    base: IterationEnergy = part("The iteration that the suggestions start from.")
+    suggestions: list[Suggestion] = part("Computed changes, the largest `gain` first; negative gains come last.")
+    not_computed: list[NotComputed] = part("Changes without a motion, each with the type of its error.")

@@ -84,7 +84,7 @@ def _columns_of(iteration: Iteration) -> dict[str, Any]:
     return {name: getattr(iteration, name) for name in names} | {"answer": iteration.answer_id}
 
 
-def _reached(history: History, index: int | None) -> schemas.Reached | None:
+def _reached(history: History, index: int | None) -> schemas.IterationEnergy | None:
     if index is None:
         return None
-    return schemas.Reached(number=history.iterations[index].number, energy=history.energies[index])
+    return schemas.IterationEnergy(number=history.iterations[index].number, energy=history.energies[index])

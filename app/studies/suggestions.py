@@ -103,11 +103,11 @@ def _branch(base: Base) -> Iterator[Proposal]:
     if fixed:
         pose = _poses(base, [np.zeros(3)])[0]
         request = _without(base.request, "branch", "windings") | {"goal": pose}
-        yield Proposal("branch", "Reach the same pose in the best arm configuration.", request)
+        yield Proposal("branch", "Reach the same pose in the arm configuration of least energy.", request)
     elif any(name in base.request for name in ("branch", "windings")):
         yield Proposal(
             "branch",
-            "Allow all arm configurations and full-turn alternatives.",
+            "Allow every arm configuration and all full-turn alternatives.",
             _without(base.request, "branch", "windings"),
         )
     seen = {_branch_name(candidate["goal"]) for candidate in base.candidates if candidate["q_goal"] == base.q_goal}
@@ -132,8 +132,8 @@ def _orientation(base: Base) -> Iterator[Proposal]:
     tilts = [sign * _TILT * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
     yield Proposal(
         "orientation",
-        "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that needs the least energy "
-        "(four directions compared).",
+        "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that needs the least energy"
+        " (four directions compared).",
         base.request | {"goal": {"any_of": _poses(base, tilts)}},
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from app.convert.comparison import single, to_comparison
+from app.convert.comparison import to_compare_response, to_optimize_request
 from app.convert.request import to_problem
 from app.engine.result import TaskResult
 from app.http.problem_details import problem_content
@@ -37,7 +37,7 @@ class CompareTask:
         shares = DeadlineShares(Deadline.after(deadline), len(methods))
         for method in methods:
             try:
-                solution = optimize(to_problem(single(self.request, method), shares.next()))
+                solution = optimize(to_problem(to_optimize_request(self.request, method), shares.next()))
             except JoulepathError as error:
                 errors[method] = error
             else:
@@ -45,4 +45,4 @@ class CompareTask:
         if not found:
             raise errors[self.request.methods[0]]
         problems = {method: problem_content(error, self.request_id) for method, error in errors.items()}
-        return TaskResult.of_json(to_comparison(self.request, self.request_id, found, problems))
+        return TaskResult.of_json(to_compare_response(self.request, self.request_id, found, problems))

@@ -11,7 +11,7 @@ import orjson
 from pydantic import ValidationError
 
 from app.convert.arm import to_arm
-from app.convert.evaluation import _motion_of_csv, table_of, to_evaluate_response, to_motion
+from app.convert.evaluation import to_csv_motion, to_csv_table, to_evaluate_response, to_motion
 from app.convert.motion_csv import MotionCsv
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
@@ -36,7 +36,7 @@ class EvaluateTask:
         """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
         robot, result = self._evaluate_csv(deadline) if self.kind == "csv" else self._evaluate_json(deadline)
         if self.wanted == "csv":
-            return TaskResult.of_csv(table_of(result))
+            return TaskResult.of_csv(to_csv_table(result))
         return TaskResult.of_json(to_evaluate_response(self.request_id, robot, result))
 
     def _evaluate_csv(self, deadline: float) -> tuple[str, Evaluation]:
@@ -44,7 +44,7 @@ class EvaluateTask:
         arm = to_arm(settings)
         with Path(self.file).open("rb") as file:
             table = MotionCsv.of(file, arm.robot.nq, settings.units)
-            result = evaluate(arm, _motion_of_csv(settings, table), settings.sample_period, deadline)
+            result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, deadline)
         return settings.robot, result
 
     def _evaluate_json(self, deadline: float) -> tuple[str, Evaluation]:

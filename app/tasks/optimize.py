@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from app.convert.request import to_problem
-from app.convert.solution import to_response
+from app.convert.solution import to_optimize_response
 from app.engine.result import TaskResult
 from app.schemas.request import OptimizeRequest
 from app.tasks.certified import certified
@@ -22,4 +22,4 @@ class OptimizeTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
         solution = certified(optimize(to_problem(self.request, deadline)))
-        return TaskResult.of_json(to_response(self.request, self.request_id, solution))
+        return TaskResult.of_json(to_optimize_response(self.request, self.request_id, solution))

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from app.convert.fields import fields
 from app.convert.request import to_problem
-from app.convert.solution import to_response
+from app.convert.solution import to_optimize_response
 from app.engine.result import TaskResult
 from app.schemas.pareto import ParetoRequest
 from app.tasks.answer_collector import AnswerCollector
@@ -57,7 +57,7 @@ class ParetoTask:
             **fields(point, "lower_bound", "status"),
             "certified": point.certificate.valid,
             "worst_ratio": max(point.certificate.worst_ratio.values()),
-            "answer": collector.add(to_response(self.request, self.request_id, point)),
+            "answer": collector.add(to_optimize_response(self.request, self.request_id, point)),
         }
 
 

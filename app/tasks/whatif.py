@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from app.convert.arm import to_arm
 from app.convert.evaluation import to_evaluate_response, to_motion
 from app.convert.request import to_problem
-from app.convert.solution import certificate_fields, to_response
+from app.convert.solution import certificate_fields, to_optimize_response
 from app.engine.result import TaskResult
 from app.http.problem_details import problem_content
 from app.schemas.evaluate import EvaluateRequest
@@ -88,7 +88,7 @@ class _Optimized(_Work):
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
         base = certified(_located(lambda: optimize(first), "optimize"))
         content = {
-            "answer": self.collector.add(to_response(asked, self.request_id, base)),
+            "answer": self.collector.add(to_optimize_response(asked, self.request_id, base)),
             "status": base.status,
             "holds": True,
             **quantities(base.energy, base.duration),
@@ -127,7 +127,7 @@ class _Optimized(_Work):
     ) -> dict[str, Any]:
         change_of_energy = best.energy.of(asked.objective) - found.same_motion.of(asked.objective)
         outcome = {
-            "answer": self.collector.add(to_response(_changed(asked, change), self.request_id, best)),
+            "answer": self.collector.add(to_optimize_response(_changed(asked, change), self.request_id, best)),
             "status": best.status,
             **differences(content, best.energy, best.duration),
         }

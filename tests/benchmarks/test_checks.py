@@ -9,7 +9,7 @@ import orjson
 import pytest
 
 from app.convert.request import to_problem
-from app.convert.solution import to_response
+from app.convert.solution import to_optimize_response
 from app.schemas.request import OptimizeRequest
 from benchmarks.checks import allowed, beats, faults
 from benchmarks.motion import SplineMotion, replay
@@ -30,7 +30,7 @@ def task() -> Ask:
 @pytest.fixture(scope="module")
 def answered(task: Ask) -> Json:
     request = OptimizeRequest.model_validate(task.body)
-    content = to_response(request, "id", optimize(to_problem(request, 10.0)))
+    content = to_optimize_response(request, "id", optimize(to_problem(request, 10.0)))
     answer: Json = orjson.loads(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
     return answer
 

@@ -98,7 +98,7 @@ def behind_a_post(height: float = 0.5) -> Problem:
     ends = []
     for side in (-0.3, 0.3):
         found = inverse_kinematics_for(ROBOT).solve(at([0.5, side, 0.15], DOWN), arm.T_flange_tcp, windings=False)
-        ends.append([each.q for each in found if collision_model(arm).distances(each.q[None])[0].min() > 0])
+        ends.append([each.q for each in found if collision_model(arm).signed_distances(each.q[None])[0].min() > 0])
     start, goal = min(((a, b) for a in ends[0] for b in ends[1]), key=lambda both: float(np.ptp(both[1] - both[0])))
     return Problem(arm=arm, start=start, goal=goal)
 
@@ -118,7 +118,7 @@ def inverse(seed: int) -> object:
     arm, found = arm_in_cell(), []
     for q in np.random.default_rng(seed).uniform(-np.pi, np.pi, (10, 6)):
         solutions = inverse_kinematics_for(ROBOT).solve(tcp_pose(q).T)
-        found.append((solutions, collision_model(arm).contacts([each.q for each in solutions])))
+        found.append((solutions, collision_model(arm).closest_pairs([each.q for each in solutions])))
     return found
 
 

@@ -52,11 +52,11 @@ def test_every_plain_field_has_an_example(document: dict[str, Any]) -> None:
 
 
 def test_every_number_has_its_unit(document: dict[str, Any]) -> None:
-    # a robot's figure brings its unit along
+    # a parameter of a robot has a field with its unit
     missing = [
         name
         for name, schema in properties(document)
-        if is_number(schema) and "x-unit" not in schema and name != "Figure.value"
+        if is_number(schema) and "x-unit" not in schema and name != "Parameter.value"
     ]
     assert missing == []
 

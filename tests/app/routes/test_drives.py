@@ -14,7 +14,7 @@ BALANCE = 1e-4  # relative; quadrature of the corners of power
 PARTS = (
     "idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered", "storage_loss", "dwell",
 )  # fmt: skip
-DOWN = EXAMPLES["store_on_the_bus"]
+DOWN = EXAMPLES["storage_on_the_bus"]
 
 
 def answered(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:

@@ -13,9 +13,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
-from app.schemas.errors import Problem
+from app.schemas.errors import ProblemDetails
 from app.schemas.evaluate import EvaluateResponse
-from app.schemas.evaluate_examples import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from tests.app.requests import HOME, NEAR, move
 
 REQUESTS: dict[str, Any] = {name: example["value"] for name, example in EVALUATE_EXAMPLES.items()}
@@ -43,7 +43,7 @@ def upload(client: TestClient, content: str | bytes, accept: str = "*/*", **quer
     return client.post("/evaluate", content=content, headers=headers, params=query)
 
 
-def refused(answer: Any, kind: type[Problem]) -> dict[str, Any]:
+def refused(answer: Any, kind: type[ProblemDetails]) -> dict[str, Any]:
     """The content of an answer that must be a problem of that kind."""
     content: dict[str, Any] = answer.json()
     assert content["type"] == kind.model_fields["type"].default, content

@@ -10,7 +10,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
-from app.schemas.ik_path import IK_PATH_EXAMPLES, IKPathResponse
+from app.schemas.examples.ik import IK_PATH_EXAMPLES
+from app.schemas.ik_path import IKPathResponse
 from models.registry import load_robot
 from tests.app.requests import HOME
 

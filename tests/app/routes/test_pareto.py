@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.pareto import PARETO_EXAMPLES, ParetoResponse
+from app.schemas.examples.pareto import PARETO_EXAMPLES
+from app.schemas.pareto import ParetoResponse
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import move
 

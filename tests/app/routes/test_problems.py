@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 from app.http.problem_details import TABLE
 from app.main import create_app
 from app.schemas import errors as problems
-from app.schemas.errors import PROBLEMS, Problem
+from app.schemas.errors import PROBLEMS, ProblemDetails
 from app.settings import Settings
 from tests.app.requests import HOME, move
 from tests.optimizer.chains import serial_chain
@@ -20,7 +20,7 @@ from tests.optimizer.chains import serial_chain
 DOWN = [0.0, 1.0, 0.0, 0.0]
 
 
-def refused(answer: Any, kind: type[Problem]) -> dict[str, Any]:
+def refused(answer: Any, kind: type[ProblemDetails]) -> dict[str, Any]:
     """The content of an answer that must be a problem of that kind."""
     assert answer.status_code == kind.model_fields["status"].default, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
@@ -169,7 +169,7 @@ def test_internal(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("kind", PROBLEMS)
-def test_has_a_page(client: TestClient, kind: type[Problem]) -> None:
+def test_has_a_page(client: TestClient, kind: type[ProblemDetails]) -> None:
     page = client.get(kind.model_fields["type"].default)
     assert page.status_code == 200
     assert page.headers["content-type"].startswith("text/html")

@@ -138,7 +138,7 @@ TIMES = {"t": [0.0, 1.0, 1.0, 2.0, 3.0], "q": [HOME, NEAR, NEAR, HOME, NEAR]}
     ],
 )
 def test_what_either_endpoint_refuses_is_documented(
-    client: TestClient, body: Any, kind: type[problems.Problem]
+    client: TestClient, body: Any, kind: type[problems.ProblemDetails]
 ) -> None:
     answer = client.post(f"{begin(client)}/iterations", json=body)
     kind.model_validate_json(answer.content)

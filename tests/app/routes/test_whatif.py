@@ -12,7 +12,6 @@ from app.exceptions import InvalidRequest
 from app.schemas.evaluate import EvaluateResponse
 from app.schemas.response import OptimizeResponse
 from app.schemas.whatif import WhatifResponse
-from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from app.tasks import answer_collector
 from app.tasks.answer_collector import AnswerCollector
 from tests.app.requests import HOME, NEAR, move
@@ -286,9 +285,3 @@ def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.Mon
     assert len(set(placeholders)) == len(collector.stored) == 2
     with pytest.raises(InvalidRequest):
         collector.add({"v": 1.5})
-
-
-@pytest.mark.parametrize("name", WHATIF_EXAMPLES)
-def test_examples_of_the_documentation(client: TestClient, name: str) -> None:
-    answer = client.post("/whatif", json=WHATIF_EXAMPLES[name]["value"])
-    WhatifResponse.model_validate_json(answer.content)

@@ -20,7 +20,7 @@ from starlette.testclient import TestClient
 
 from app.exceptions import StoreUnavailable, UnknownAnswer
 from app.schemas import errors as problems
-from app.schemas.answers import KeptAnswer
+from app.schemas.answers import StoredAnswer
 from app.store import answers
 from app.store.database import create_database_engine, migrate
 from app.store.store import Store
@@ -161,7 +161,7 @@ def test_answers_over_http(client: TestClient) -> None:
     answer_id = client.portal.call(store.write, partial(answers.put, kind="ik", body=b'{"solutions": [1.5]}'))
     answer = client.get(f"/answers/{answer_id}")
     assert answer.status_code == 200, answer.text
-    KeptAnswer.model_validate_json(answer.content)
+    StoredAnswer.model_validate_json(answer.content)
     assert answer.json()["answer"] == {"solutions": [1.5]}
 
 

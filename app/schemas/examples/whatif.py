@@ -1,20 +1,22 @@
-"""What `POST /whatif` takes, by example; each runs as it is."""
+"""Examples of POST /whatif."""
 
 from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-_HIGH = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+from app.schemas.examples.values import HOME
+
 _LOW = [0.5, -2.57, 2.57, -1.07, -1.07, 0.5]
 
 WHATIF_EXAMPLES: dict[str, Example] = {
     "lighter_arm": {
-        "summary": "A lift with lighter links, a lighter and a heavier payload",
-        "description": "Every change is optimised anew, and the base's own motion is held against it, too.",
+        "summary": "A lift with lighter links, without payload, and with a heavier payload",
+        "description": "For each change the answer has two motions: the motion of the base on the changed arm, and the "
+        "best motion found for the changed arm.",
         "value": {
             "optimize": {
                 "start": {"q": _LOW},
-                "goal": {"q": _HIGH},
+                "goal": {"q": HOME},
                 "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
             },
             "changes": [
@@ -25,10 +27,10 @@ WHATIF_EXAMPLES: dict[str, Example] = {
         },
     },
     "given_motion": {
-        "summary": "A given motion, on the ceiling and with a bus that feeds back",
-        "description": "Nothing is optimised: the same motion is evaluated on each arm.",
+        "summary": "A given motion, on the ceiling and with a recuperating bus",
+        "description": "The same motion is evaluated on each changed arm. Nothing is optimised.",
         "value": {
-            "evaluate": {"configurations": [_HIGH, _LOW, _HIGH], "time_per_segment": 0.8},
+            "evaluate": {"configurations": [HOME, _LOW, HOME], "time_per_segment": 0.8},
             "changes": [
                 {"name": "ceiling mount", "arm": {"gravity": [0.0, 0.0, 9.81]}},
                 {"name": "recuperating bus", "arm": {"bus": {"mode": "recuperating", "efficiency": 0.8}}},

@@ -1,0 +1,206 @@
+"""Types of error about a motion, its targets, its limits or its robot. A docstring is the text of the type's page."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from app.schemas.common import Response, described, part
+from app.schemas.errors.problem_details import ProblemDetails, fixed
+from app.schemas.examples.values import HOME, LABEL
+from app.schemas.response import BODIES, Candidate, UnreachableTarget
+
+
+class UnknownRobot(ProblemDetails):
+    """No robot has this name. Use one of the names in `known`, which `GET /robots` lists too."""
+
+    type: Literal["/problems/unknown-robot"] = fixed("type", "/problems/unknown-robot")
+    title: Literal["Unknown robot"] = fixed("title", "Unknown robot")
+    status: Literal[404] = fixed("status", 404)
+    known: list[str] = described("Names of all robots.", None, ["ur5e"])
+
+
+class _TargetError(ProblemDetails):
+    target: Literal["start", "goal"] = described("Target at fault; `goal` for the pose of `POST /ik`.", None, "goal")
+
+
+class UnreachablePose(_TargetError):
+    """No arm configuration within the joint range reaches the pose, or the requested `branch` does not reach it. Check
+    that `position` is in metres and in the robot's base frame, and that `tcp` is right. Move the pose closer, or leave
+    `branch` out."""
+
+    type: Literal["/problems/unreachable-pose"] = fixed("type", "/problems/unreachable-pose")
+    title: Literal["Unreachable pose"] = fixed("title", "Unreachable pose")
+    status: Literal[422] = fixed("status", 422)
+    distance: float | None = described(
+        "Distance from the wrist centre of the pose to the nearest position that it can reach. Null if a joint range "
+        "or `branch` is the cause.",
+        "m",
+        0.12,
+    )
+
+
+class SingularPose(_TargetError):
+    """Every arm configuration that reaches the pose is singular: the TCP cannot move in some direction there. Move the
+    pose by a few millimetres, tilt it by a degree, or give joint positions."""
+
+    type: Literal["/problems/singular-pose"] = fixed("type", "/problems/singular-pose")
+    title: Literal["Singular pose"] = fixed("title", "Singular pose")
+    status: Literal[422] = fixed("status", 422)
+    smallest_singular_value: float = described(
+        "Smallest singular value of the Jacobian in metres and radians, of the configuration that is least singular.",
+        "1",
+        1e-9,
+    )
+
+
+class UnreachableTargets(_TargetError):
+    """The arm can reach no target of an `any_of`. For each target, `unreachable` gives the cause: the pose is out of
+    reach or singular, or joint positions are outside their range. Correct at least one target."""
+
+    type: Literal["/problems/unreachable-targets"] = fixed("type", "/problems/unreachable-targets")
+    title: Literal["No reachable target"] = fixed("title", "No reachable target")
+    status: Literal[422] = fixed("status", 422)
+    unreachable: list[UnreachableTarget] = part("All targets of the `any_of`, each with the cause.")
+
+
+class OutsideLimits(ProblemDetails):
+    """A joint position at the start or the goal is outside the joint range: that of the robot, or the narrower one of
+    `limits.position`. Give a value between `lower` and `upper`."""
+
+    type: Literal["/problems/outside-limits"] = fixed("type", "/problems/outside-limits")
+    title: Literal["Joint position outside its limits"] = fixed("title", "Joint position outside its limits")
+    status: Literal[422] = fixed("status", 422)
+    joint: str = described("Name of the joint.", None, "elbow_joint")
+    value: float = described("Joint position in the request.", "rad", 3.5)
+    lower: float = described("Smallest allowed joint position.", "rad", -3.1416)
+    upper: float = described("Largest allowed joint position.", "rad", 3.1416)
+
+
+class InvalidTable(ProblemDetails):
+    """The samples of a given motion cannot be read. Possible causes: a value is no finite number, or looks like
+    degrees; the times do not increase; a line has too few or too many columns; the header is missing or unknown; the
+    file is no CSV. Correct the place that `row` and `column` name."""
+
+    type: Literal["/problems/invalid-table"] = fixed("type", "/problems/invalid-table")
+    title: Literal["Invalid motion table"] = fixed("title", "Invalid motion table")
+    status: Literal[422] = fixed("status", 422)
+    row: int | None = described(
+        "CSV: number of the line; the header is line 1. JSON: index into the list, from 0. Null if no single row is at "
+        "fault.",
+        "1",
+        17,
+    )
+    column: str | None = described(
+        "Name of the column, as in the header of a CSV file. Null if no single column is at fault.", None, "q3"
+    )
+
+
+_DEPTH = "Missing clearance: if the two bodies were this much farther apart, the pair would be allowed."
+
+
+class CollidingBranch(Response):
+    """An arm configuration that collides."""
+
+    label: str = described("Branch: shoulder/elbow/wrist.", None, LABEL)
+    target: int = described("Index in `any_of` of the target that it reaches, from 0; 0 for a single target.", None, 0)
+    q: list[float] = described("Joint positions.", "rad", HOME)
+    pair: list[str] = described(BODIES, None, ["table", "forearm"])
+    depth: float = described(_DEPTH, "m", 0.031)
+
+
+class _InCollision(ProblemDetails):
+    pair: list[str] = described(
+        f"{BODIES} They belong to the configuration with the smallest `depth`.", None, ["table", "forearm"]
+    )
+    depth: float = described(f"{_DEPTH} The smallest of all configurations.", "m", 0.031)
+    branches: list[CollidingBranch] = part("Arm configurations that collide, smallest `depth` first; at most 64.")
+
+
+class StartInCollision(_InCollision):
+    """Every arm configuration at the start is invalid, at least one because it collides: the arm, its tool or its
+    payload touches a link or an obstacle, or is closer to an obstacle than its `margin`. Move the start or the
+    obstacle. If the shapes are too coarse, set `collisions` to false."""
+
+    type: Literal["/problems/start-in-collision"] = fixed("type", "/problems/start-in-collision")
+    title: Literal["Start in collision"] = fixed("title", "Start in collision")
+    status: Literal[422] = fixed("status", 422)
+
+
+class GoalInCollision(_InCollision):
+    """Every arm configuration at the goal is invalid, at least one because it collides: the arm, its tool or its
+    payload touches a link or an obstacle, or is closer to an obstacle than its `margin`. Move the goal or the obstacle.
+    If the shapes are too coarse, set `collisions` to false."""
+
+    type: Literal["/problems/goal-in-collision"] = fixed("type", "/problems/goal-in-collision")
+    title: Literal["Goal in collision"] = fixed("title", "Goal in collision")
+    status: Literal[422] = fixed("status", 422)
+
+
+class DurationTooShort(ProblemDetails):
+    """No motion within the limits was found for the largest allowed duration: `duration`, its `max`, or the time of the
+    `cycle`. Allow at least `shortest`, or let the optimiser choose the duration."""
+
+    type: Literal["/problems/duration-too-short"] = fixed("type", "/problems/duration-too-short")
+    title: Literal["Duration too short"] = fixed("title", "Duration too short")
+    status: Literal[422] = fixed("status", 422)
+    shortest: float = described(
+        "Duration of the fastest motion found. If none was found: a lower bound on the duration of every motion.",
+        "s",
+        0.83,
+    )
+
+
+class TorqueInfeasible(ProblemDetails):
+    """A joint cannot hold the load at standstill, in any arm configuration at the start or at the goal that is
+    otherwise valid. The torque during the motion is not part of this check. Reduce the payload, move its centre of mass
+    closer to the flange, or widen `limits.torque` if the request sets it."""
+
+    type: Literal["/problems/torque-infeasible"] = fixed("type", "/problems/torque-infeasible")
+    title: Literal["Not enough torque"] = fixed("title", "Not enough torque")
+    status: Literal[422] = fixed("status", 422)
+    joint: str = described("Name of the joint.", None, "shoulder_lift_joint")
+    needed: float = described(
+        "Absolute torque that holds the load, in the configuration with the smallest ratio to `available`.",
+        "N·m",
+        171.0,
+    )
+    available: float = described("Torque limit of the joint.", "N·m", 150.0)
+
+
+class _SearchError(ProblemDetails):
+    candidates: list[Candidate] = part("Every candidate, with its status and its reason.")
+
+
+class NoTrajectory(_SearchError):
+    """No candidate has a motion within the limits; the `reason` of each candidate gives the cause. Widen a limit, allow
+    a longer duration, or leave `branch` out."""
+
+    type: Literal["/problems/no-trajectory"] = fixed("type", "/problems/no-trajectory")
+    title: Literal["No trajectory found"] = fixed("title", "No trajectory found")
+    status: Literal[422] = fixed("status", 422)
+
+
+class NoCollisionFreeTrajectory(_SearchError):
+    """No collision-free motion was found, from several initial guesses. This does not prove that none exists. `pair`
+    names the two bodies that collide: move the obstacle among them, move the start or the goal, leave `branch` out, or
+    split the motion in two."""
+
+    type: Literal["/problems/no-collision-free-trajectory"] = fixed("type", "/problems/no-collision-free-trajectory")
+    title: Literal["No collision-free trajectory found"] = fixed("title", "No collision-free trajectory found")
+    status: Literal[422] = fixed("status", 422)
+    pair: list[str] = described(
+        f"{BODIES} They belong to the attempt with the smallest `depth`.", None, ["table", "forearm"]
+    )
+    depth: float = described(_DEPTH, "m", 0.031)
+    time: float = described("Time of the collision, from the start of this attempt.", "s", 0.62)
+    start: str = described("Branch at the start of this attempt.", None, LABEL)
+    goal: str = described("Branch at the goal of this attempt.", None, LABEL)
+
+
+class DeadlineExceeded(_SearchError):
+    """The deadline passed before any motion was certified. The wait for a free worker counts. Allow a longer
+    `deadline`, or try again when the service is less busy."""
+
+    type: Literal["/problems/deadline-exceeded"] = fixed("type", "/problems/deadline-exceeded")
+    title: Literal["Deadline exceeded"] = fixed("title", "Deadline exceeded")
+    status: Literal[504] = fixed("status", 504)

@@ -1,0 +1,143 @@
+"""Types of error about the request, the service or what it stores. A docstring is the text of the type's page."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from app.schemas.common import Response, described, part
+from app.schemas.errors.problem_details import ProblemDetails, fixed
+
+
+class FieldError(Response):
+    """One error in the request."""
+
+    loc: list[str | int] = described("Path of the field.", None, ["body", "start", "q"])
+    msg: str = described("What is wrong with the field.", None, "List should have at least 1 item")
+
+
+class Validation(ProblemDetails):
+    """The request is malformed or contradicts itself. The body is no JSON, or a field is missing, unknown, of the wrong
+    type or length, out of range, or not finite. Correct the fields in `errors` and send the request again."""
+
+    type: Literal["/problems/validation"] = fixed("type", "/problems/validation")
+    title: Literal["Invalid request"] = fixed("title", "Invalid request")
+    status: Literal[422] = fixed("status", 422)
+    errors: list[FieldError] = part("One entry per error; of more than 20 errors, the first ones.")
+
+
+class Busy(ProblemDetails):
+    """All workers are taken and the queue is full. Try again after the time [s] in the header `Retry-After`."""
+
+    retry_after: ClassVar[int | None] = 2
+    type: Literal["/problems/busy"] = fixed("type", "/problems/busy")
+    title: Literal["Busy"] = fixed("title", "Busy")
+    status: Literal[503] = fixed("status", 503)
+
+
+class NotReady(ProblemDetails):
+    """The workers are still starting, or all of them have ended and are being replaced. Try again after the time [s] in
+    the header `Retry-After`."""
+
+    retry_after: ClassVar[int | None] = 2
+    type: Literal["/problems/not-ready"] = fixed("type", "/problems/not-ready")
+    title: Literal["Not ready"] = fixed("title", "Not ready")
+    status: Literal[503] = fixed("status", 503)
+
+
+class ShuttingDown(ProblemDetails):
+    """The service is stopping and did not finish this request. Send it again after the time [s] in the header
+    `Retry-After`: another instance, or the restarted one, answers."""
+
+    retry_after: ClassVar[int | None] = 5
+    type: Literal["/problems/shutting-down"] = fixed("type", "/problems/shutting-down")
+    title: Literal["Shutting down"] = fixed("title", "Shutting down")
+    status: Literal[503] = fixed("status", 503)
+
+
+class StoreUnavailable(ProblemDetails):
+    """The database of studies and answers cannot be reached, read or written; the service's log has the cause. Requests
+    that need no database, for example `POST /optimize`, still work. Try again after the time [s] in the header
+    `Retry-After`."""
+
+    retry_after: ClassVar[int | None] = 5
+    type: Literal["/problems/store-unavailable"] = fixed("type", "/problems/store-unavailable")
+    title: Literal["Database unavailable"] = fixed("title", "Database unavailable")
+    status: Literal[503] = fixed("status", 503)
+
+
+class UnknownAnswer(ProblemDetails):
+    """No answer with this id is stored. It never existed, its study was deleted, or it was deleted to make space for
+    newer answers. To get it again, repeat the request that produced it."""
+
+    type: Literal["/problems/unknown-answer"] = fixed("type", "/problems/unknown-answer")
+    title: Literal["Unknown answer"] = fixed("title", "Unknown answer")
+    status: Literal[404] = fixed("status", 404)
+
+
+class UnknownStudy(ProblemDetails):
+    """No study has this id, or the study has no iteration with this number. It never existed, or the study was deleted.
+    `GET /studies` lists all studies."""
+
+    type: Literal["/problems/unknown-study"] = fixed("type", "/problems/unknown-study")
+    title: Literal["Unknown study"] = fixed("title", "Unknown study")
+    status: Literal[404] = fixed("status", 404)
+
+
+class EmptyStudy(ProblemDetails):
+    """The request needs an iteration of the study, but the study has none. Add one with
+    `POST /studies/{id}/iterations`."""
+
+    type: Literal["/problems/empty-study"] = fixed("type", "/problems/empty-study")
+    title: Literal["Empty study"] = fixed("title", "Empty study")
+    status: Literal[409] = fixed("status", 409)
+
+
+class KeyReused(ProblemDetails):
+    """This `Idempotency-Key` was already used for a different request. A key belongs to one request and its
+    repetitions: use a new key for each new request."""
+
+    type: Literal["/problems/key-reused"] = fixed("type", "/problems/key-reused")
+    title: Literal["Idempotency-Key reused"] = fixed("title", "Idempotency-Key reused")
+    status: Literal[422] = fixed("status", 422)
+
+
+class NotFound(ProblemDetails):
+    """The service has nothing at this path. `GET /openapi.json` lists all paths."""
+
+    type: Literal["/problems/not-found"] = fixed("type", "/problems/not-found")
+    title: Literal["Not found"] = fixed("title", "Not found")
+    status: Literal[404] = fixed("status", 404)
+
+
+class MethodNotAllowed(ProblemDetails):
+    """This path does not support the HTTP method of the request. Use one of the methods in the header `Allow`."""
+
+    type: Literal["/problems/method-not-allowed"] = fixed("type", "/problems/method-not-allowed")
+    title: Literal["Method not allowed"] = fixed("title", "Method not allowed")
+    status: Literal[405] = fixed("status", 405)
+
+
+class BodyTooLarge(ProblemDetails):
+    """The body exceeds the service's limit. A normal request needs a few kilobytes. Motions sent to `POST /evaluate`
+    may be about a thousand times larger. If yours is too large, send fewer samples."""
+
+    type: Literal["/problems/body-too-large"] = fixed("type", "/problems/body-too-large")
+    title: Literal["Body too large"] = fixed("title", "Body too large")
+    status: Literal[413] = fixed("status", 413)
+
+
+class UnsupportedMediaType(ProblemDetails):
+    """This path accepts JSON or CSV only. Set the header `Content-Type` to `application/json` or `text/csv`."""
+
+    type: Literal["/problems/unsupported-media-type"] = fixed("type", "/problems/unsupported-media-type")
+    title: Literal["Unsupported media type"] = fixed("title", "Unsupported media type")
+    status: Literal[415] = fixed("status", 415)
+
+
+class Internal(ProblemDetails):
+    """A defect of the service. The log has an entry with the id of the request. Please report the defect with the value
+    of `instance`."""
+
+    type: Literal["/problems/internal"] = fixed("type", "/problems/internal")
+    title: Literal["Internal error"] = fixed("title", "Internal error")
+    status: Literal[500] = fixed("status", 500)

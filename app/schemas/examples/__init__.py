@@ -1,0 +1,29 @@
+"""Examples of request bodies, in the OpenAPI document by path and media type. Each is a valid request as it is.
+
+A file `examples/<endpoint>/<name>.json` holds the same request as the example of that name.
+"""
+
+from __future__ import annotations
+
+from fastapi.openapi.models import Example
+
+from app.schemas.examples.compare import COMPARE_EXAMPLES
+from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
+from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from app.schemas.examples.pareto import PARETO_EXAMPLES
+from app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
+from app.schemas.examples.whatif import WHATIF_EXAMPLES
+
+JSON, CSV = "application/json", "text/csv"
+BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
+    "/optimize": {JSON: OPTIMIZE_EXAMPLES},
+    "/compare": {JSON: COMPARE_EXAMPLES},
+    "/pareto": {JSON: PARETO_EXAMPLES},
+    "/whatif": {JSON: WHATIF_EXAMPLES},
+    "/evaluate": {JSON: EVALUATE_EXAMPLES, CSV: CSV_EXAMPLES},
+    "/ik": {JSON: IK_EXAMPLES},
+    "/ik/path": {JSON: IK_PATH_EXAMPLES},
+    "/studies": {JSON: STUDY_EXAMPLES},
+    "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},
+}

@@ -1,0 +1,34 @@
+"""Values that the examples of several schemas share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+HOME = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+"""Joint positions [rad] with the tool pointing down."""
+NEAR = [0.3, -1.4, 1.4, -1.5, -1.57, 0.2]
+"""Joint positions [rad] near those of HOME."""
+PAPER_HOME = [0.0, -1.5708, 1.5708, -1.5708, 3.1416, 0.0]
+PAPER_POSE = [-0.1243, -0.9639, 1.6165, -2.2211, 4.7124, 0.1251]
+"""Joint positions [rad] of the founding paper: its home, and the first configuration of its Table 2."""
+LABEL = "left/up/no_flip"
+REQUEST_ID = "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
+ANSWER_ID = "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11"
+ANSWER_PATH = f"/answers/{ANSWER_ID}"
+STUDY_ID = "5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
+CREATED = "2025-03-14T09:26:53.589793Z"
+STANDING_STILL = [0.0] * 6
+
+POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+OPTIMIZE: dict[str, Any] = {"start": {"q": HOME}, "goal": {"pose": POSE}}
+"""A body of POST /optimize."""
+EVALUATE: dict[str, Any] = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}
+"""A body of POST /evaluate."""
+BOX = {"shape": "box", "size": [0.1, 0.1, 0.2], "pose": {"position": [0.0, 0.0, 0.2], "rotvec": [0.0, 0.0, 0.0]}}
+"""A shape in the flange frame."""
+TOOL = {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]}
+
+
+def at(x: float, y: float, z: float) -> dict[str, list[float]]:
+    """A pose at a position [m], not rotated."""
+    return {"position": [x, y, z], "rotvec": [0.0, 0.0, 0.0]}

@@ -1,0 +1,133 @@
+"""Every example of the OpenAPI document, sent as it is served: the documentation page sends it like that."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import jsonschema_rs
+import pytest
+from starlette.testclient import TestClient
+
+from app.main import create_app
+from tests.app.requests import HOME, NEAR
+
+# the document is served before the workers run
+DOCUMENT: dict[str, Any] = json.loads(TestClient(create_app()).get("/openapi.json").content)
+CSV = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One method of one path."""
+
+    method: str
+    path: str
+    content: dict[str, Any]
+
+    def __str__(self) -> str:
+        return f"{self.method} {self.path}"
+
+    def parameters(self, where: str) -> dict[str, Any]:
+        """The examples of the parameters in the path, the query or the headers, by name."""
+        return {own["name"]: example_of(own) for own in self.content.get("parameters", ()) if own["in"] == where}
+
+    def bodies(self) -> Iterator[tuple[str, str, dict[str, Any]]]:
+        """Media type, name and content of every example of the body."""
+        for media_type, content in self.content.get("requestBody", {}).get("content", {}).items():
+            for name, example in content.get("examples", {}).items():
+                yield media_type, name, example
+
+    def check(self, answer: Any) -> None:
+        """The status must be documented and, of a JSON answer, the schema, too."""
+        documented = self.content["responses"][str(answer.status_code)]
+        if answer.headers.get("content-type") == "application/json":
+            schema = documented["content"]["application/json"]["schema"]
+            jsonschema_rs.validate(schema | {"components": DOCUMENT["components"]}, answer.json())
+
+
+def example_of(parameter: dict[str, Any]) -> Any:
+    """The example of a parameter's schema; a parameter whose values are JSON has its schema in `content`."""
+    schema = parameter.get("schema") or parameter["content"]["application/json"]["schema"]
+    return schema["examples"][0]
+
+
+OPERATIONS = [Operation(method, path, own) for path, all in DOCUMENT["paths"].items() for method, own in all.items()]
+BODIES = {
+    f"{operation} {media_type} {name}": (operation, media_type, example)
+    for operation in OPERATIONS
+    for media_type, name, example in operation.bodies()
+}
+EVALUATE = next(operation for operation in OPERATIONS if operation.path == "/evaluate")
+
+
+@pytest.fixture
+def study(client: TestClient) -> str:
+    """The id of a new study."""
+    answer = client.post("/studies", json={"name": "examples", "threshold": 10.0})
+    assert answer.status_code == 201, answer.text
+    return str(answer.json()["id"])
+
+
+def test_every_body_has_an_example() -> None:
+    for operation in OPERATIONS:
+        declared = operation.content.get("requestBody", {}).get("content", {})
+        assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_body_is_answered(name: str, client: TestClient, study: str) -> None:
+    operation, media_type, example = BODIES[name]
+    content, url = example["value"], operation.path.format(id=study)
+    if media_type == "text/csv":
+        # the settings of a CSV file are query parameters, which the example's summary names
+        query = re.search(r"\?\S+", example["summary"])
+        url += query[0] if query else ""
+    else:
+        content = json.dumps(content)
+    answer = client.request(operation.method, url, content=content, headers={"Content-Type": media_type})
+    assert answer.is_success, answer.text
+    operation.check(answer)
+
+
+@pytest.mark.parametrize("operation", [own for own in OPERATIONS if own.parameters("path")], ids=str)
+def test_path_is_answered(operation: Operation, client: TestClient) -> None:
+    names = operation.parameters("path")
+    # an id stands for something that was made before; the example's was not, and the document says what then comes
+    expected = 404 if "id" in names else 200
+    body = next((example["value"] for _, _, example in operation.bodies()), None)
+    answer = client.request(operation.method, operation.path.format(**names), json=body)
+    assert answer.status_code == expected, answer.text
+    operation.check(answer)
+
+
+@pytest.mark.parametrize(
+    "operation", [own for own in OPERATIONS if own.method == "get" and own.parameters("query")], ids=str
+)
+def test_query_is_answered(operation: Operation, client: TestClient, study: str) -> None:
+    step = {"evaluate": {"configurations": [HOME, NEAR], "time_per_segment": 1.5}}
+    assert client.post(f"/studies/{study}/iterations", json=step).status_code == 201
+    answer = client.get(operation.path.format(id=study), params=operation.parameters("query"))
+    assert answer.status_code == 200, answer.text
+    operation.check(answer)
+
+
+@pytest.mark.parametrize("name", EVALUATE.parameters("query"))
+def test_setting_of_a_csv_file_is_answered(name: str, client: TestClient) -> None:
+    example = EVALUATE.parameters("query")[name]
+    query = {"time_per_segment": "1.5", name: example if isinstance(example, str) else json.dumps(example)}
+    answer = client.post("/evaluate", content=CSV, headers={"Content-Type": "text/csv"}, params=query)
+    assert answer.status_code == 200, answer.text
+    EVALUATE.check(answer)
+
+
+@pytest.mark.parametrize("operation", [own for own in OPERATIONS if own.parameters("header")], ids=str)
+def test_headers_are_taken(operation: Operation, client: TestClient, study: str) -> None:
+    _, _, example = next(operation.bodies())
+    url, headers = operation.path.format(id=study), operation.parameters("header")
+    answer = client.request(operation.method, url, json=example["value"], headers=headers)
+    assert answer.is_success, answer.text
+    operation.check(answer)
