@@ -21,7 +21,7 @@ from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import Change, WhatifRequest
 from app.tasks.stored_answers import AnswerCollector
 from app.tasks.task import answer, json_reply
-from optimizer.certificate import ENERGY_FLOOR
+from optimizer.energy.losses import ENERGY_FLOOR
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
 from optimizer.optimize import optimize
 from optimizer.problem.arm import Arm
