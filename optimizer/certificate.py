@@ -15,7 +15,7 @@ from models.robot import Array
 from optimizer.collision.clearance_proof import proven_clearance
 from optimizer.collision.model import collision_model
 from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.energy.losses import breakdown
+from optimizer.energy.losses import breakdown, relative_error
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
@@ -30,8 +30,6 @@ from optimizer.solution import Certificate, Energy
 from optimizer.trajectories.limit_ratios import limit_ratios
 from optimizer.trajectories.quadrature import grid, simpson_weights
 from optimizer.trajectories.spline import Spline
-
-ENERGY_FLOOR = 1e-6  # J; relative errors of energies below it are taken relative to it
 
 
 @one_thread()
@@ -53,11 +51,11 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         goal_error=replay.end_error(single(problem.goal), q_goal, replay.q[-1]),
         rest_error=replay.rest_error,
         energy_error=_worst(
-            _relative_error(energy.electrical.total, reported.electrical.total),
-            _relative_error(energy.mechanical.total, reported.mechanical.total),
+            relative_error(energy.electrical.total, reported.electrical.total),
+            relative_error(energy.mechanical.total, reported.mechanical.total),
         ),
         balance_error=_worst(
-            *(_relative_error(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
+            *(relative_error(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
         ),
         clearance=proven_clearance(collision_model(arm), spline) if arm.collisions else None,
     )
@@ -183,10 +181,6 @@ def _tool_angle(cone: ToolCone, T_base_tcp: Array) -> float:
     """Angle [rad] between the tool axis and the direction of its cone."""
     tool_axis = T_base_tcp[:3, :3] @ cone.axis
     return math.atan2(float(np.linalg.norm(np.cross(tool_axis, cone.direction))), tool_axis @ cone.direction)
-
-
-def _relative_error(value: float, reference: float) -> float:
-    return abs(value - reference) / max(abs(reference), ENERGY_FLOOR)
 
 
 def _worst(*values: float) -> float:

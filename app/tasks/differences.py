@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.convert.fields import fields
-from optimizer.certificate import ENERGY_FLOOR
+from optimizer.energy.losses import ENERGY_FLOOR
 from optimizer.solution import ElectricalEnergy, Energy
 
 

@@ -21,6 +21,8 @@ from optimizer.energy.bus_flow import exchange
 from optimizer.problem.arm import Arm
 from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, StorageUse
 
+ENERGY_FLOOR = 1e-6  # J; errors of energies below it are relative to it
+
 
 @dataclass(frozen=True)
 class PowerFlow:
@@ -113,3 +115,8 @@ def breakdown(weights: Array, v: Array, tau: Array, potential: float, arm: Arm, 
             discharged=float(flows.discharged.sum()),
         ),
     )
+
+
+def relative_error(energy: float, reference: float) -> float:
+    """|energy - reference| / |reference| of two energies [J]."""
+    return abs(energy - reference) / max(abs(reference), ENERGY_FLOOR)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import reduce
 from typing import TypeVar
 
-from optimizer.certificate import ENERGY_FLOOR
+from optimizer.energy.losses import relative_error
 from optimizer.solution import Energy, StorageUse
 
 Sum = TypeVar("Sum")
@@ -39,8 +39,7 @@ class IntervalEnergy:
     @property
     def balance_error(self) -> float:
         """|sum of the electrical parts - total| / total: quadrature error, and how badly logged v and a fit q."""
-        electrical = self.energy.electrical
-        return abs(electrical.parts_sum - electrical.total) / max(abs(electrical.total), ENERGY_FLOOR)
+        return relative_error(self.energy.electrical.parts_sum, self.energy.electrical.total)
 
 
 def joined(parts: Sequence[IntervalEnergy]) -> IntervalEnergy:
