@@ -1,14 +1,14 @@
 """Linear algebra kept to one thread per caller: the matrices are small, so more threads cost more than they give.
 
-Some BLAS libraries have one limit per thread, others one for the whole process. So every thread that enters sets the
-limit, and the last thread that leaves lifts it: whichever threads compute at the same time, all of them compute with
-one, and round alike.
+Some BLAS libraries have a limit for each thread, others one for the whole process. So every thread that enters sets the
+limit; a thread that leaves lifts its own, and the last one that of the process. Whichever threads compute at the same
+time, all of them compute with one, and round alike.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,7 +19,7 @@ class _Own(threading.local):
     """The calling thread's contexts: how many are open, and the numbers of BLAS threads before the first."""
 
     depth = 0
-    before: tuple[int, ...] = ()
+    before: Sequence[int] = ()
 
 
 class _SharedLimit:
@@ -29,7 +29,7 @@ class _SharedLimit:
         self._lock = threading.Lock()
         self._own = _Own()
         self._users = 0
-        self._before: tuple[int, ...] = ()
+        self._before: Sequence[int] = ()
         self._libraries: list[Any] = []
 
     def enter(self) -> None:
@@ -41,11 +41,12 @@ class _SharedLimit:
             self._libraries = self._libraries or [
                 library for library in ThreadpoolController().lib_controllers if library.user_api == "blas"
             ]
-            self._own.before = tuple(library.num_threads for library in self._libraries)
+            self._own.before = [library.num_threads for library in self._libraries]
             if self._users == 0:
                 self._before = self._own.before
             self._users += 1
-            self._set((1,) * len(self._libraries))
+            for library in self._libraries:
+                _set(library, 1)
 
     def leave(self) -> None:
         self._own.depth -= 1
@@ -53,15 +54,24 @@ class _SharedLimit:
             return
         with self._lock:
             self._users -= 1
-            # a limit of the process was 1 before all threads but the first: only the last one to leave lifts it
-            self._set(self._own.before if self._users else self._before)
+            for library, own, shared in zip(self._libraries, self._own.before, self._before, strict=True):
+                if _counts_per_thread(library):
+                    _set(library, own)
+                elif self._users == 0:
+                    _set(library, shared)
 
-    def _set(self, counts: tuple[int, ...]) -> None:
-        for library, count in zip(self._libraries, counts, strict=True):
-            # threadpoolctl lets one thread at a time set OpenBLAS's limit and ignores the others
-            OpenBLASController.clear_controlling_thread(force=True)
-            library.set_num_threads(count)
-        OpenBLASController.clear_controlling_thread(force=True)
+
+def _counts_per_thread(library: Any) -> bool:
+    """Whether each thread has a limit of its own, as threadpoolctl sets it: MKL, and OpenBLAS on OpenMP."""
+    openmp = library.internal_api == "openblas" and library.threading_layer == "openmp"
+    return bool(library.internal_api == "mkl" or openmp)
+
+
+def _set(library: Any, count: int) -> None:
+    # threadpoolctl lets one thread at a time set OpenBLAS's limit and silently ignores the others
+    OpenBLASController.clear_controlling_thread(force=True)
+    library.set_num_threads(count)
+    OpenBLASController.clear_controlling_thread(force=True)
 
 
 _LIMIT = _SharedLimit()

@@ -1,12 +1,12 @@
-"""Energy drawn while the arm waits at the goal until its cycle ends (Meike, Ribickis 2011; Meike, Pellicciari,
-Berselli 2014).
+"""Energy drawn while the arm waits at the goal until its cycle ends.
 
-The motors hold the goal's gravity torque. Friction would help and is ignored:
+After Meike, Ribickis 2011; Meike, Pellicciari, Berselli 2014. The motors hold the gravity torque of the goal
+configuration; static friction would carry part of it and is ignored. With the duration T [s] of the motion:
 
-P_hold   = base + Σ_j (copper_j i_j² + inverter_j(i_j)),  i = tau_gravity / torque_constant
-dwell(T) = P_hold · min(time - T, brake_delay) + P_brake · max(time - T - brake_delay, 0)
+P_hold   = base + Σ_j (copper_j i_j² + inverter_j(i_j)) [W],  i = tau_gravity / torque_constant [A]
+dwell(T) = P_hold · min(time - T, brake_delay) + P_brake · max(time - T - brake_delay, 0) [J]
 
-Without brakes the delay is infinite. So dwell is linear in T on either side of time - brake_delay.
+Without brakes the delay is infinite. So dwell is linear in T on both sides of time - brake_delay.
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ from optimizer.problem.cycle import Cycle
 
 @dataclass(frozen=True)
 class LinearDwell:
-    """dwell(T) = constant - power · T for durations T in [t_min, t_max]; s, J, W."""
+    """dwell(T) = constant - power · T [J] for durations T in [t_min, t_max] [s].
+
+    `power` (...) [W] and `constant` (...) [J] have one value per holding power.
+    """
 
     t_min: float
     t_max: float
@@ -32,7 +35,7 @@ class LinearDwell:
 
 
 def linear_dwells(cycle: Cycle, arm: Arm, hold: Array) -> list[LinearDwell]:
-    """The intervals from T = 0 to the cycle's time on which dwell(T) is linear, for holding powers `hold` (...) [W]."""
+    """The intervals of [0, cycle.time] on which dwell(T) is linear, in order, for holding powers `hold` (...) [W]."""
     if cycle.hold == "motors":
         return [LinearDwell(0.0, cycle.time, hold, hold * cycle.time)]
     brake, kink = np.full_like(hold, _brake_power(cycle, arm)), cycle.time - cycle.brake_delay
@@ -42,14 +45,17 @@ def linear_dwells(cycle: Cycle, arm: Arm, hold: Array) -> list[LinearDwell]:
 
 
 def dwell_energy(cycle: Cycle, arm: Arm, hold: float, duration: float) -> float:
-    """Energy [J] drawn after a motion of `duration` [s], whose goal takes `hold` [W]; 0 if it lasts the whole cycle."""
+    """Energy [J] drawn after a motion of `duration` [s] at a goal with holding power `hold` [W].
+
+    Zero if the motion lasts the whole cycle.
+    """
     wait = max(cycle.time - duration, 0.0)
     by_motors = wait if cycle.hold == "motors" else min(wait, cycle.brake_delay)
     return hold * by_motors + _brake_power(cycle, arm) * (wait - by_motors)
 
 
 def holding_power(arm: Arm, tau: Array) -> Array:
-    """What the arm draws (...) [W] while its motors hold torques tau (..., nq) [N·m] at rest."""
+    """Power (...) [W] that the arm draws while its motors hold torques tau (..., nq) [N·m] at standstill."""
     joints = power_flow(tau, np.zeros_like(tau), arm.drives, arm.friction_law).joints
     return np.asarray(arm.base_power + joints.sum(axis=-1))
 

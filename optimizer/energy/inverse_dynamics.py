@@ -13,7 +13,11 @@ _Z = ca.DM([0, 0, 1])
 
 @dataclass(frozen=True)
 class SymbolicPayload:
-    """A body fixed to the flange as symbols: mass, com (3,) and inertia (6,) ixx ixy ixz iyy iyz izz about the com."""
+    """A body fixed to the flange, as symbols.
+
+    `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) [kg·m²] ixx ixy ixz iyy iyz izz about the com, in
+    flange axes.
+    """
 
     mass: ca.SX
     com: ca.SX
@@ -21,13 +25,13 @@ class SymbolicPayload:
 
 
 def _tidy(matrix: np.ndarray) -> ca.DM:
-    """Drop the rounding of sines and cosines of right angles, so that CasADi drops the terms that they multiply."""
+    """The matrix without the rounding of sines and cosines of right angles: CasADi drops the terms that are zero."""
     rounded = np.round(matrix)
     return ca.sparsify(ca.DM(np.where(np.abs(matrix - rounded) < 1e-12, rounded, matrix)))
 
 
 def _about_origin(mass: ca.SX, com: ca.SX, inertia: ca.SX) -> ca.SX:
-    """Inertia (3, 3) about the frame's origin, by the parallel axis theorem."""
+    """Inertia (3, 3) [kg·m²] about the frame's origin, by the parallel axis theorem."""
     return inertia + mass * (ca.dot(com, com) * ca.SX.eye(3) - com @ com.T)
 
 
@@ -48,12 +52,14 @@ def inverse_dynamics(
 ) -> ca.SX:
     """Joint torques tau (nv,) [N·m] = M(q) a + C(q, v) v + g(q) + rotor · a, with the payload at the frame `flange`.
 
-    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5), every link described by
-    mass, first moment and inertia about its joint frame, in which the torques are linear. `gravity` (3,) is in the
-    base frame, `rotor` (nv,) the reflected rotor inertia [kg·m²]; the model's own armature and gravity are not read.
-    `link_mass_scale` (nv,) multiplies mass and inertia of the moving links, payload apart; None: as they are.
+    q [rad], v [rad/s], a [rad/s²] (nv,). `gravity` (3,) [m/s²] is in the base frame, `rotor` (nv,) [kg·m²] the
+    reflected rotor inertia; armature and gravity of the model are not read. `link_mass_scale` (nv,) [1] multiplies mass
+    and inertia of the moving links, not of the payload; None: 1.
 
-    Raises ValueError when a joint is not revolute about its z axis.
+    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5). Every link is described by
+    mass, first moment and inertia about the origin of its joint frame: the torques are linear in these.
+
+    Raises ValueError if a joint is not revolute about its z axis.
     """
     joints = range(1, model.njoints)
     if any(model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints):
@@ -87,13 +93,13 @@ def inverse_dynamics(
 
 
 def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Mass, first moment (3,) and inertia (3, 3) about the origin of joint i's frame; the last link bears the load.
+    """Mass [kg], first moment (3,) [kg·m] and inertia (3, 3) [kg·m²] of link i about the origin of joint i's frame.
 
-    `scale` multiplies what is the link's own.
+    The last link includes the payload. `scale` multiplies the link's own part.
     """
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
-    # figures first, then their factor: one product for each
+    # constants first, then their factor: one product for each
     own = ca.SX(body.mass)
     mass, moment = scale * own, scale * (own * com)
     inertia = scale * _about_origin(own, com, ca.SX(_tidy(body.inertia)))

@@ -27,16 +27,14 @@ from optimizer.energy.kernel_expressions import SYMBOLICS, build
 log = logging.getLogger(__name__)
 
 COMPILER_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+# modules whose code decides what is compiled
+SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions)
 
 
 def cache_directory() -> Path:
     """Folder of the compiled kernels."""
     given = os.environ.get("JOULEPATH_CACHE_DIR")
     return Path(given) if given else Path.home() / ".cache" / "joulepath"
-
-
-# modules whose code decides what is compiled
-SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions)
 
 
 def digest(robot: Robot) -> str:

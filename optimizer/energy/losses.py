@@ -1,12 +1,12 @@
-"""Drive losses, bus power and the breakdown of a motion's energy: one definition for optimiser, report and certificate.
+"""Drive losses, power on the bus and the parts of a motion's energy: one definition for optimiser, report, certificate.
 
-tau_motor = tau + friction(v),  i = tau_motor / torque_constant
-inverter  = constant + linear |i| + quadratic i²  (Hansen, Öltjen, Meike, Ortmaier 2012)
-P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)),  base = idle + controller
-P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0), or as the bus has it: see `optimizer.energy.bus_flow`
+tau_motor = tau + friction(v) [N·m],  i = tau_motor / torque_constant [A]
+inverter  = constant + linear |i| + quadratic i² [W]  (Hansen, Öltjen, Meike, Ortmaier 2012)
+P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)) [W],  base = idle + controller
+P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0) [W] on a shared bus; for other buses see `bus_flow`
 
-The formulas take numpy arrays (report, certificate) or CasADi symbols (optimiser) through `xp`, the module whose
-`sqrt` and `asinh` fit. The optimiser smooths |x| to sqrt(x² + width²); with width 0 the same lines are exact.
+The formulas take numpy arrays (report, certificate) or CasADi symbols (optimiser). `xp` is the module whose `sqrt` and
+`asinh` fit. The optimiser smooths |x| to sqrt(x² + width²); with width 0 the same lines are exact.
 """
 
 from __future__ import annotations
@@ -26,7 +26,11 @@ ENERGY_FLOOR = 1e-6  # J; errors of energies below it are relative to it
 
 @dataclass(frozen=True)
 class PowerFlow:
-    """Power at an instant, per joint (..., nq) unless said otherwise [W]; torques [N·m]."""
+    """Power at an instant per joint (..., nq) [W], and the motor torque (..., nq) [N·m] at the joint.
+
+    `friction` is lost in the gear, `copper` in the motor windings, `inverter` in the inverter; `shaft` is
+    tau_motor · v, negative while the joint brakes.
+    """
 
     tau_motor: Any
     friction: Any
@@ -36,19 +40,20 @@ class PowerFlow:
 
     @property
     def joints(self) -> Any:
-        """What each joint takes from the bus."""
+        """Power that each joint takes from the bus (..., nq) [W]; negative if it feeds power back."""
         return self.shaft + self.copper + self.inverter
 
 
 def smooth_abs(x: Any, width: Any, xp: Any) -> Any:
-    """|x|, rounded off within about `width` of zero."""
+    """sqrt(x² + width²): |x| with its corner smoothed over about `width`."""
     return xp.sqrt(x * x + width * width)
 
 
 def power_flow(tau: Any, v: Any, drives: Drives, friction: FrictionLaw, width: Any = 0.0, xp: Any = np) -> PowerFlow:
-    """Losses and shaft power of every joint for rigid-body-and-rotor torques tau and speeds v.
+    """Losses and shaft power of every joint.
 
-    `width` smooths the inverter's |i| [A].
+    tau (..., nq) [N·m] are torques of rigid body and rotor, without friction; v (..., nq) [rad/s]. `width` [A] smooths
+    the |i| of the inverter.
     """
     friction_torque = friction.torque(v, xp)
     tau_motor = tau + friction_torque
@@ -66,22 +71,24 @@ def power_flow(tau: Any, v: Any, drives: Drives, friction: FrictionLaw, width: A
 
 
 def drawn_power(net: Any, regeneration: Any, width: Any = 0.0, xp: Any = np) -> Any:
-    """What the bus takes from its supply for a net power demand [W]."""
+    """Power that a shared bus draws from the supply for a net demand [W]; `width` [W] smooths the corner at zero."""
     return ((1 - regeneration) * smooth_abs(net, width, xp) + (1 + regeneration) * net) / 2
 
 
 def breakdown(weights: Array, v: Array, tau: Array, potential: float, arm: Arm, kinetic: float = 0.0) -> Energy:
     """Energy of a motion of an arm from its samples, in order of time.
 
-    `weights` (k,) [s] are the quadrature's weights (they add up to the duration), v and tau (k, nq) the samples,
-    `potential` and `kinetic` [J] the change of energy between the motion's ends, known without quadrature.
+    `weights` (k,) [s] are those of the quadrature; they add up to the duration. v (k, nq) [rad/s] and tau (k, nq)
+    [N·m] are the samples; tau are torques of rigid body and rotor, without friction. `potential` and `kinetic` [J] are
+    the gains of energy from the first to the last state, known without quadrature. A part that is zero is 0.0, never
+    -0.0.
     """
     duration = float(weights.sum())
     flow = power_flow(tau, v, arm.drives, arm.friction_law)
     bus, joints = arm.bus, flow.joints
     flows = exchange(bus, arm.regeneration, arm.base_power, joints, weights)
     surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())
-    drawn, spent = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
+    drawn, discharge = float(flows.drawn.sum()), float(flows.charge[0] - flows.charge[-1])
     per_joint = JointEnergy(
         friction=weights @ flow.friction,
         copper=weights @ flow.copper,
@@ -91,7 +98,7 @@ def breakdown(weights: Array, v: Array, tau: Array, potential: float, arm: Arm, 
     mechanical = weights @ np.abs(tau * v)
     return Energy(
         electrical=ElectricalEnergy(
-            total=drawn + spent,
+            total=drawn + discharge,
             idle=arm.base_power * duration,
             potential=potential,
             kinetic=kinetic,
@@ -99,7 +106,8 @@ def breakdown(weights: Array, v: Array, tau: Array, potential: float, arm: Arm, 
             copper=float(per_joint.copper.sum()),
             inverter=float(per_joint.inverter.sum()),
             braking=surplus,
-            recovered=0.0 - arm.regeneration * surplus,  # not -0.0
+            # subtracted from 0.0, since a product of -1 and 0.0 is -0.0
+            recovered=0.0 - arm.regeneration * surplus,
             storage_loss=(1 - bus.efficiency) * charged,
         ),
         mechanical=MechanicalEnergy(total=float(mechanical.sum()), per_joint=mechanical),

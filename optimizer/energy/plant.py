@@ -18,16 +18,18 @@ from optimizer.problem.arm import Arm
 from optimizer.solution import Energy, Trajectory
 from optimizer.trajectories.spline import Spline, fine_samples, sample
 
-# smoothing that the optimiser works with: friction's reversal [rad/s] and the corners of |power| [W]
+# smoothing in the optimiser's cost: the reversal of friction [rad/s] and the corners of |power| [W]
 KNEE = 0.02
 WIDTH = 0.5
-# quadrature points per panel for reported energies, the longest panel [s], and how many there are at most
+# quadrature points per panel for reported energies
 REPORT_NODES = 8
+# a last sample nearer to the one before than this fraction of a period is rounding
+LEAST_STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Plant:
-    """An arm with its kernel and Pinocchio model."""
+    """An arm with its kernel and Pinocchio model. Any number of threads may use one plant."""
 
     arm: Arm
 
@@ -41,10 +43,6 @@ class Plant:
         """Pinocchio model of the arm, payload and gravity included."""
         return rigid_body_model(self.arm)
 
-    @cached_property
-    def _data(self) -> pin.Data:
-        return self.model.createData()
-
     def parameters(
         self,
         electrical: float = 0.0,
@@ -52,9 +50,10 @@ class Plant:
         time: float = 0.0,
         regeneration: float | None = None,
     ) -> Array:
-        """Packed kernel parameters with the given weights on energies [1] and duration [W].
+        """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1] and duration [W].
 
-        A store has no cost per instant: `regeneration` then says what its charge is taken to be worth. None: the arm's.
+        `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply takes back. The cost of
+        an instant cannot depend on a charge: with an energy storage, this value stands for it.
         """
         payload, friction, drives = self.arm.payload, self.arm.friction_law, self.arm.drives
         return Parameters(
@@ -99,33 +98,37 @@ class Plant:
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""
-        return float(pin.computePotentialEnergy(self.model, self._data, q))
+        # not one for all calls: Pinocchio writes its results into the data
+        return float(pin.computePotentialEnergy(self.model, self.model.createData(), q))
 
     def energy(self, spline: Spline) -> Energy:
-        """Energy of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
+        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
         return breakdown(weights, v, self.torques(q, v, a), change, self.arm)
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
-        """Samples at a period [s]; the last one lies on the end."""
+        """Samples of a spline motion every `period` [s]; the last one lies on the end."""
         duration = spline.duration
-        # a remainder below a millionth of a period is rounding, not a sample of its own
-        t = np.append(np.arange(int(np.ceil(duration / period - 1e-6))) * period, duration)
+        t = np.append(np.arange(int(np.ceil(duration / period - LEAST_STEP))) * period, duration)
         q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
         flow = power_flow(tau, v, self.arm.drives, self.friction)
         charge = self._charge(spline, t)
         power = drawn_at(self.arm.bus, self.arm.regeneration, self.arm.base_power, flow.joints, charge)
-        stored = charge if self.arm.bus.mode == "storage" else None
-        return Trajectory(t, q, v, a, tau, flow.tau_motor, power, spline, stored)
+        return Trajectory(
+            t, q, v, a, tau, flow.tau_motor, power, spline, charge if self.arm.bus.mode == "storage" else None
+        )
 
     def _charge(self, spline: Spline, t: Array) -> Array:
-        """The store's charge [J] at times t (k,), on the reported energy's own quadrature; zero without a store."""
+        """Charge (k,) [J] of the energy storage at times t (k,) [s]; zero without storage.
+
+        By the quadrature of the reported energy, linear in between.
+        """
         if self.arm.bus.mode != "storage":
             return np.zeros_like(t)
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
         joints = power_flow(self.torques(q, v, a), v, self.arm.drives, self.friction).joints
-        course = charges(self.arm.bus, weights * (self.arm.base_power + joints.sum(axis=1)), weights)
-        return np.interp(t, np.append(0.0, weights.cumsum()), course)
+        charge = charges(self.arm.bus, weights * (self.arm.base_power + joints.sum(axis=1)), weights)
+        return np.interp(t, np.append(0.0, weights.cumsum()), charge)

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 import random
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from optimizer.collision import path_planner
+from optimizer.deadline import Deadline
 from optimizer.methods import polynomial_ga
-from tests.optimizer.concurrent_work import Work, all_work, fingerprint
+from tests.optimizer.concurrent_work import Work, all_work, behind_a_post, fingerprint
 
 THREADS = 8
 # work for every thread, a second in all, and work for one thread each
@@ -106,3 +112,29 @@ def test_eight_threads_give_what_one_gives_fifty_times_each() -> None:
     works = all_work()
     assert len(works) == 50
     assert_as_alone([shuffled(works, k) for k in range(THREADS)])
+
+
+def test_a_thread_that_waits_for_another_ones_planner_keeps_its_deadline() -> None:
+    """Here the other one never ends; the clock ticks by a second whenever it is read."""
+    ticks = itertools.count()
+    asked = behind_a_post()
+    assert isinstance(asked.start, np.ndarray) and isinstance(asked.goal, np.ndarray)
+    with path_planner._OMPL:
+        late = Deadline(5.0, lambda: float(next(ticks)))
+        assert path_planner.plan_paths(asked.arm, asked.start, asked.goal, late) == []
+    assert next(ticks) > 5
+
+
+def test_robots_are_loaded_once_by_threads_that_come_at_once() -> None:
+    """In a process of its own, where nobody has loaded one yet."""
+    code = (
+        "import threading\n"
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "from models.registry import load_robot\n"
+        "together = threading.Barrier(8)\n"
+        "with ThreadPoolExecutor(8) as executor:\n"
+        "    loaded = list(executor.map(lambda _: together.wait() < 8 and load_robot('ur5e'), range(8)))\n"
+        "print(len({id(robot) for robot in loaded}))\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=PATIENCE)
+    assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "1", "")

@@ -5,12 +5,17 @@ Tests that compile do it without optimisation, by a compiler that adds a flag an
 
 from __future__ import annotations
 
+import gc
 import shutil
 import subprocess
 import sys
+import threading
 import time
+import weakref
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +24,7 @@ import pytest
 from models.robot import Array, Robot
 from optimizer.energy import kernel
 from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_cache import cache_directory, compile_kernel, compiler, digest
+from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
 from optimizer.energy.kernel_expressions import Parameters, build
 from optimizer.energy.losses import drawn_power, power_flow
 from optimizer.optimize import optimize
@@ -171,6 +176,36 @@ def test_the_digest_tells_chains_apart() -> None:
     assert len(digests) == 4
 
 
+def test_the_digest_covers_every_source_that_runs_while_the_functions_are_built() -> None:
+    ours, ran = Path(__file__).parents[3], set()
+
+    def note(frame: FrameType, event: str, argument: object) -> None:
+        ran.add(Path(frame.f_code.co_filename))
+
+    sys.setprofile(note)
+    try:
+        build(ROBOT)
+    finally:
+        sys.setprofile(None)
+    sources = {Path(str(module.__file__)) for module in SOURCES}
+    assert {
+        path for path in ran if any(path.is_relative_to(ours / part) for part in ("optimizer", "models"))
+    } == sources
+
+
+def test_each_thread_has_memory_of_its_own_until_it_ends(compiled: Kernel) -> None:
+    """The results of one thread survive the calls of another, and are freed with the thread."""
+    y, p = states(7), TASK.parameters(electrical=1.0)
+    cost = compiled.value(y, p)[0]
+    before = cost.copy()
+    with ThreadPoolExecutor(1) as executor:
+        memory = weakref.ref(executor.submit(lambda: compiled.value(y + 1.0, p)[0].base).result())
+        assert (cost == before).all()
+        assert memory() is not None
+    gc.collect()
+    assert memory() is None
+
+
 @dataclass
 class Workshop:
     """A cache directory of its own and a compiler that counts its calls; `robot` has been loaded by nobody else."""
@@ -239,6 +274,26 @@ def test_the_virtual_machine_serves_while_the_compiler_runs(workshop: Workshop) 
     assert kernel_for(workshop.robot) is swapped
     assert workshop.compilations == 1 and workshop.leftovers() == []
     assert kernel_for(replace(ROBOT)).compiled  # whoever comes later finds it
+
+
+def test_threads_that_come_at_once_share_one_kernel(workshop: Workshop) -> None:
+    """The first to come builds or loads it, and one of them has it compiled."""
+    count = 8
+    together = threading.Barrier(count)
+
+    def first_torques(_: int) -> Kernel:
+        together.wait()
+        found = kernel_for(workshop.robot)
+        for _ in range(20):
+            assert_right(kernel_for(workshop.robot))
+        return found
+
+    with ThreadPoolExecutor(count) as executor:
+        assert len(set(executor.map(first_torques, range(count)))) == 1
+    wait_until_compiled(workshop.robot)
+    assert workshop.compilations == 1
+    with ThreadPoolExecutor(count) as executor:
+        assert {found.compiled for found in executor.map(first_torques, range(count))} == {True}
 
 
 @pytest.mark.parametrize("damage", ["truncated", "flipped", "seal gone", "seal garbled", "library gone"])

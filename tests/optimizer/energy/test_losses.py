@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import casadi as ca
 import numpy as np
@@ -13,6 +13,7 @@ from models.registry import load_robot
 from models.robot import Array, Drives, Electronics
 from optimizer.energy.losses import breakdown, drawn_power, power_flow, smooth_abs
 from optimizer.problem.arm import Arm
+from optimizer.problem.bus import Bus
 
 IDENTITY_TOLERANCE = 1e-9  # relative; spectrally accurate quadrature of smooth shaft power leaves rounding only
 ROUTE_TOLERANCE = 1e-12  # relative; numpy and CasADi evaluate the same formulas in another order
@@ -65,6 +66,29 @@ def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float
         assert getattr(energy.per_joint, part).sum() == pytest.approx(getattr(electrical, part), rel=HAND_TOLERANCE)
     assert energy.mean_power == pytest.approx(electrical.total / 2.0, rel=HAND_TOLERANCE)
     assert energy.peak_power >= energy.mean_power
+
+
+@pytest.mark.parametrize(
+    "bus",
+    [
+        Bus(),
+        Bus("isolated"),
+        Bus("recuperating", efficiency=0.8),
+        Bus("storage", efficiency=0.9, capacity=5.0),
+        Bus("storage", efficiency=0.0, capacity=5.0),
+    ],
+    ids=lambda bus: f"{bus.mode} {bus.efficiency}",
+)
+def test_a_part_that_is_zero_has_no_sign(bus: Bus) -> None:
+    """No answer shows -0.0: neither without any power at all nor where nothing is regenerated."""
+    off = replace(ROBOT.electronics, idle_power=0.0, controller_power=0.0, regeneration=0.0)
+    weights, q, v, a = closed_motion(duration=2.0, amplitude=0.5, samples=40)
+    asked = replace(arm(ROBOT.drives, off), bus=bus)
+    for states in ((0.0 * v, 0.0 * v), (-0.0 * v, -0.0 * v), (v, torques(q, v, a))):
+        energy = breakdown(weights, *states, 0.0, asked)
+        parts = {**asdict(energy.electrical), "peak": energy.peak_power, "mean": energy.mean_power}
+        parts |= {} if energy.storage is None else asdict(energy.storage)
+        assert [name for name, value in parts.items() if value == 0 and np.signbit(value)] == []
 
 
 def test_parts_add_up_when_energy_is_stored() -> None:
