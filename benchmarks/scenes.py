@@ -26,6 +26,7 @@ from optimizer import optimize
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from optimizer.methods.free_spline import FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -77,7 +78,7 @@ def run(task: CellTask, kind: str) -> Outcome:
         return outcome
     outcome.wall = time.perf_counter() - began
     outcome.solves = solution.solver.nlp_solves
-    outcome.led = any("led around" in c.reason for c in solution.candidates if c.status == "solved")
+    outcome.led = any(FROM_PLANNED_PATH in c.reason for c in solution.candidates if c.status == "solved")
     outcome.tried = dict(Counter(c.status for c in solution.candidates))
     found = solution.certificate.clearance
     outcome.proven = np.nan if found is None else found.min_clearance

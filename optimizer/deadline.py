@@ -1,4 +1,4 @@
-"""When work ends with the best result found so far: an instant of a clock that tests may move by hand."""
+"""Deadline of a computation: an instant of a clock, at which it ends with the best result so far."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ Clock = Callable[[], float]
 
 @dataclass(frozen=True)
 class Deadline:
-    """The instant `at` [s] of `clock`."""
+    """The instant `at` [s] of `clock`, a function that returns the time [s]; a test may pass its own."""
 
     at: float = math.inf
     clock: Clock = time.perf_counter
 
     @classmethod
     def after(cls, seconds: float, clock: Clock = time.perf_counter) -> Deadline:
-        """The deadline that many seconds from now."""
+        """The deadline `seconds` [s] from now."""
         return cls(clock() + seconds, clock)
 
     @property
     def left(self) -> float:
-        """Time until then [s]; negative once it has passed."""
+        """Time until the deadline [s], negative after it."""
         return self.at - self.clock()
 
     @property
     def passed(self) -> bool:
-        """Whether that instant lies in the past."""
+        """Whether the deadline is in the past."""
         return self.left < 0
 
     def within(self, seconds: float) -> Deadline:
-        """This deadline, or the one that many seconds from now if that is earlier."""
+        """The earlier of this deadline and the one `seconds` [s] from now."""
         return replace(self, at=min(self.at, self.clock() + seconds))
 
 

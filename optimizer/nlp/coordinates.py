@@ -1,4 +1,4 @@
-"""Coordinates in which the spline of a candidate runs, and constraints on a goal that may move."""
+"""Coordinates of a candidate's spline, and constraints on a goal that is a decision variable."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from models.robot import Array, Limits
 
-# displacement below this counts as none where a shared time law is limited by the joints' own limits [rad]
-SHORTEST_TRAVEL = 1e-12
+# least displacement of a joint [rad] by which its limits are divided on a straight line
+LEAST_DISPLACEMENT = 1e-12
 
 
 @dataclass(frozen=True)
 class Coordinates:
-    """What the spline runs in: q = origin (nq,) + directions (nq, r) · s, from `start` to `goal` (r,).
+    """Coordinates s (r,) of a spline from `start` to `goal` (r,): q = origin (nq,) + directions (nq, r) · s.
 
-    `limits` are those of s, (r,) each, but for `tau_max` (nq,), which stays per joint.
+    `limits` are those of s, (r,) each, except `tau_max` (nq,) [N·m], which stays per joint.
     """
 
     origin: Array
@@ -33,11 +33,11 @@ class Coordinates:
 
     @staticmethod
     def straight_line(q_start: Array, q_goal: Array, limits: Limits) -> Coordinates:
-        """All joints share one time law s ∈ [0, 1] along the straight line from start to goal."""
+        """All joints share one time scaling s ∈ [0, 1] along the straight line from start to goal."""
         displacement = q_goal - q_start
-        length = np.maximum(np.abs(displacement), SHORTEST_TRAVEL)
+        length = np.maximum(np.abs(displacement), LEAST_DISPLACEMENT)
         zero, one = np.zeros(1), np.ones(1)
-        v_max, a_max, j_max = (np.array([(m / length).min()]) for m in (limits.v_max, limits.a_max, limits.j_max))
+        v_max, a_max, j_max = (np.array([(m / length).min()]) for m in limits.rates)
         shared = Limits(zero, one, v_max, a_max, j_max, limits.tau_max)
         return Coordinates(q_start, displacement[:, None], zero, one, shared)
 
@@ -51,15 +51,16 @@ class Coordinates:
         return np.asarray(self.origin + points @ self.directions.T)
 
     def from_joints(self, q: Array) -> Array:
-        """s (k, r) of the points nearest to q (k, nq)."""
+        """s (k, r) of the points nearest to q (k, nq) [rad]."""
         return np.asarray((q - self.origin) @ np.linalg.pinv(self.directions).T)
 
 
 @dataclass(frozen=True)
 class GoalConstraints:
-    """How far the goal may move from where it is: lower ≤ rows · (goal - coordinates.goal) ≤ upper, linear.
+    """Linear constraints on the displacement of the goal: lower ≤ rows · (goal - coordinates.goal) ≤ upper.
 
-    rows (c, r), lower and upper (c,), equal where the goal may not move that way; `radius` bounds every coordinate's.
+    rows (c, r), lower and upper (c,); equal bounds make an equation. `radius` bounds the displacement of every
+    coordinate (trust region).
     """
 
     rows: Array

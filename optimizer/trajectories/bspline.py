@@ -1,4 +1,4 @@
-"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the limit grid."""
+"""Clamped B-splines on [0, 1] with given knots: basis matrices, quadrature nodes, and the grid of the limits."""
 
 from __future__ import annotations
 
@@ -17,21 +17,19 @@ from optimizer.trajectories import quintic
 from optimizer.trajectories.quadrature import quadrature
 
 DEGREE = 5
-# at rest (v = a = 0) at both ends: the first and the last three control points coincide
+# at rest (v = a = 0) at both ends, the first three control points coincide, and the last three
 REST_POINTS = 3
-
-
-# least number of nodes that a motion's cost is summed over, and of points where its peaks are looked for
+# least number of quadrature nodes of the cost, and of grid points at which the peaks of the rates are searched
 LEAST_NODES = 31
 GRID_POINTS = 512
-# points where limits along the path are held; what goes beyond them in between is found afterwards and repaired
+# points at which path constraints are bounded; an excess between them is found afterwards and repaired
 PATH_POINTS = 96
-# parts into which the anchors of speed, acceleration and jerk divide a span: these have degree 4, 3 and 2 there
+# parts into which the anchors of speed, acceleration and jerk divide a span, where these have degree 4, 3 and 2
 ANCHORS = (2, 4, 4)
 
 
 def clamped(breaks: Array) -> Array:
-    """Clamped knots over [0, 1] from breaks (k,) that begin with 0 and end with 1."""
+    """Clamped knots over [0, 1] from breakpoints (k,), of which the first is 0 and the last is 1."""
     return np.concatenate([np.zeros(DEGREE), breaks, np.ones(DEGREE)])
 
 
@@ -42,7 +40,7 @@ def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
 
 
 def greville(knots: Array) -> Array:
-    """Greville points (n,): where a spline's control values stand for its values; it interpolates there uniquely."""
+    """Greville points (n,): the abscissae of the control values, at which interpolation by a spline is unique."""
     n = len(knots) - DEGREE - 1
     return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
 
@@ -60,7 +58,7 @@ def fit(samples: Array, at: Array, knots: Array) -> Array:
 def refit(points: Array, knots: Array, onto: Array) -> Array:
     """Control points (n, r) over the knots `onto` that interpolate the spline of `points` (m, r) over `knots`.
 
-    Exact where `onto` refines `knots`.
+    Exact if `onto` refines `knots`.
     """
     x = greville(onto)
     return np.asarray(np.linalg.solve(basis_matrix(onto, x), basis_matrix(knots, x) @ points), dtype=float)
@@ -68,12 +66,12 @@ def refit(points: Array, knots: Array, onto: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Basis:
-    """A spline space over [0, 1] of n control points, with everything that does not depend on a request.
+    """A spline space over [0, 1] with n control points, and all of it that does not depend on a request.
 
-    `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, where cost and torque are evaluated;
-    `at_nodes` (3, N, n): basis and its first two derivatives there. `at_grid` (3, M, n): first to third derivative on
-    a grid fine enough to find the peaks of speed, acceleration and jerk; `anchors` (3, M) marks the few of its points
-    per span that hold each derivative down along a stretch at its limit.
+    `nodes`, `weights` (N,): Gauss-Legendre points of every knot span, at which cost and torque are evaluated;
+    `at_nodes` (3, N, n): basis functions and their first two derivatives there. `at_grid` (3, M, n): first to third
+    derivative on a grid fine enough for the peaks of speed, acceleration and jerk. `anchors` (3, M) marks a few grid
+    points per span; bounding these bounds a derivative that stays at its limit for a while.
     """
 
     knots: Array
@@ -84,7 +82,7 @@ class Basis:
     anchors: npt.NDArray[np.bool_]
 
     degree: ClassVar[int] = DEGREE
-    # how many control points rest fixes at either end
+    # number of control points that rest fixes at either end
     resting: ClassVar[int] = REST_POINTS
 
     @property
@@ -94,11 +92,11 @@ class Basis:
 
     @property
     def free(self) -> slice:
-        """The control points that rest at the ends leaves free."""
+        """The control points that rest at both ends does not fix."""
         return slice(self.resting, self.n - self.resting)
 
     def to_spline(self, points: Array) -> Array:
-        """Control points of the B-spline over `knots` for this space's own: the same here."""
+        """Control points of the B-spline over `knots` for the points of this space: here the same."""
         return points
 
     def fit(self, samples: Array, at: Array) -> Array:
@@ -107,7 +105,7 @@ class Basis:
 
     @cached_property
     def at_path(self) -> Array:
-        """Basis and its first derivative (2, PATH_POINTS, n) where limits along the path are held, ends apart."""
+        """Basis functions and their first derivative (2, PATH_POINTS, n) at the path points inside (0, 1)."""
         points = np.linspace(0.0, 1.0, PATH_POINTS + 2)[1:-1]
         return np.stack([self.matrix(points, d) for d in range(2)])
 
@@ -117,17 +115,17 @@ class Basis:
 
     @cached_property
     def quintic(self) -> Array:
-        """Control values (n,) of the rest-to-rest quintic 10τ³ - 15τ⁴ + 6τ⁵, which every such space contains."""
+        """Control values (n,) of the rest-to-rest quintic, which every space contains."""
         x = greville(self.knots)
         return np.asarray(np.linalg.solve(basis_matrix(self.knots, x), quintic.fraction(x)), dtype=float)
 
     @staticmethod
     def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
-        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; knots may be repeated up to three times."""
+        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; inner knots have multiplicity three at most."""
         spans = len(np.unique(knots)) - 1
         nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), 3))
         edges = np.unique(knots)
-        # a hair off the edges: at a repeated knot jerk jumps, and both of its values count
+        # slightly inside the span: at a repeated knot jerk jumps, and both of its values count
         per_span = 4 * max(math.ceil(grid_points / spans / 4), 4)
         grid = (edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)).ravel()
         step = np.arange(len(grid)) % (per_span + 1)
@@ -148,9 +146,10 @@ def uniform(n: int) -> Basis:
 
 
 def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
-    """A space whose knots are repeated at the switches (k,) and otherwise no further apart than `widest`.
+    """A space with knots of multiplicity `repeat` at the switches (k,), and further knots at most `widest` apart.
 
-    At a knot repeated twice the third derivative bends, repeated three times it jumps, as jerk does at its limits.
+    At a knot of multiplicity two the slope of the third derivative may jump, at multiplicity three the third derivative
+    itself, as jerk does between its limits.
     """
     edges = np.concatenate([[0.0], switches[(switches > 1e-3) & (switches < 1 - 1e-3)], [1.0]])
     breaks = [0.0]

@@ -1,8 +1,8 @@
-"""Polynomials on [0, 1] by their values at Chebyshev nodes, at rest at both ends: the space of Lagrange interpolation.
+"""Polynomials on [0, 1] given by their values at Chebyshev nodes, at rest at both ends: Lagrange interpolation.
 
-A polynomial of degree m + 5 is given by its values at m nodes inside (0, 1) and, at both ends, by its value and by
-speed and acceleration of zero. It is computed with in Bernstein's form, a B-spline of one span, in which rest fixes the
-first and the last three coefficients; the m between them follow from the values.
+A polynomial of degree m + 5 is given by its values at m nodes inside (0, 1) and, at both ends, by its value and zero
+speed and acceleration. It is evaluated in Bernstein's form, a B-spline with one span. There, rest fixes the first and
+the last three coefficients; the m coefficients between them follow from the values.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from models.robot import Array
 from optimizer.trajectories.bspline import GRID_POINTS, REST_POINTS, Basis
 from optimizer.trajectories.quadrature import quadrature
 
-# the span is divided into panels for the sum over the cost, which has corners where a joint turns back
+# quadrature panels of the span: the cost has corners at reversals of a joint
 PANELS, PER_PANEL = 8, 5
-# every so many grid points one holds speed, acceleration and jerk down along a stretch at its limit
+# every so many grid points there is an anchor of speed, acceleration and jerk
 ANCHOR_STEP = 16
 
 
 @dataclass(frozen=True, eq=False)
 class PolynomialBasis(Basis):
-    """The space of polynomials with values (m,) at `at`; its points (m + 2, r) are start, these values, goal.
+    """The space of polynomials with values at the nodes `at` (m,); its points (m + 2, r) are start, values, goal.
 
-    `bernstein` (m + 6, m + 2) takes the points to Bernstein's coefficients.
+    `bernstein` (m + 6, m + 2) maps the points to Bernstein's coefficients.
     """
 
     at: Array
@@ -38,11 +38,11 @@ class PolynomialBasis(Basis):
 
     @property
     def degree(self) -> int:  # type: ignore[override]
-        """Of the polynomial."""
+        """Degree of the polynomial."""
         return len(self.bernstein) - 1
 
     def to_spline(self, points: Array) -> Array:
-        """Bernstein's coefficients (m + 6, r), those at rest exactly."""
+        """Bernstein's coefficients (m + 6, r); those that rest fixes are exact."""
         result = self.bernstein @ points
         result[:REST_POINTS], result[-REST_POINTS:] = points[0], points[-1]
         return np.asarray(result)
@@ -52,7 +52,7 @@ class PolynomialBasis(Basis):
         return cardinals(self.knots, self.bernstein, points, derivative)
 
     def fit(self, samples: Array, at: Array) -> Array:
-        """Points (m + 2, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1], ends exactly."""
+        """Points (m + 2, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1]; the ends are exact."""
         points = np.zeros((self.n, samples.shape[1]))
         points[0], points[-1] = samples[0], samples[-1]
         matrix = cardinals(self.knots, self.bernstein, at)
@@ -61,15 +61,15 @@ class PolynomialBasis(Basis):
 
 
 def cardinals(knots: Array, bernstein: Array, at: Array, derivative: int = 0) -> Array:
-    """Values (k, m + 2) at points (k,) of the cardinal functions, each one at its own node and zero at the others."""
+    """Derivatives (k, m + 2) at points (k,) of the cardinal functions: 1 at their own node, 0 at the others."""
     return np.ascontiguousarray(BSpline(knots, bernstein, len(bernstein) - 1)(at, derivative))
 
 
 def chebyshev(m: int) -> Array:
     """The inner m of m + 6 Chebyshev nodes of the second kind on [0, 1], ascending.
 
-    The outer three on either side have run together into the end: its value, speed and acceleration stand for them. All
-    nodes of a kind as near to the ends as m of them usually are would give cardinal functions of thousands in between.
+    The outer three on either side coincide at the end: its value, speed and acceleration replace them. With m nodes as
+    close to the ends as Chebyshev's m nodes are, cardinal functions would reach values of thousands between the nodes.
     """
     return np.asarray((1 - np.cos(np.pi * np.arange(REST_POINTS, m + REST_POINTS) / (m + 5))) / 2)
 
@@ -86,7 +86,7 @@ def polynomials(m: int) -> PolynomialBasis:
     bernstein[:REST_POINTS, 0], bernstein[-REST_POINTS:, -1] = 1.0, 1.0
     bernstein[inner] = np.linalg.solve(values[:, inner], np.eye(m, m + 2, 1) - values @ bernstein)
     nodes, weights = quadrature(np.linspace(0.0, 1.0, PANELS + 1), PER_PANEL)
-    # as dense towards the ends as a polynomial's extremes can be
+    # as dense towards the ends as the extremes of a polynomial can be
     grid = (1 - np.cos(np.linspace(0.0, np.pi, GRID_POINTS))) / 2
     return PolynomialBasis(
         knots=knots,

@@ -23,7 +23,7 @@ def _gauss_legendre(n: int) -> tuple[Array, Array]:
 def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[Array, Array]:
     """Gauss-Legendre points and weights (panels · per_panel,) over the knots' range.
 
-    Panels are the knot spans, divided evenly where they are longer than `longest`.
+    Panels are the knot spans, divided evenly if they are longer than `longest`.
     """
     x, w = _gauss_legendre(per_panel)
     spans = np.unique(knots)
@@ -34,10 +34,10 @@ def quadrature(knots: Array, per_panel: int, longest: float = np.inf) -> tuple[A
     return (spans[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
 
 
-PANELS = 72  # least number of quadrature panels over a motion: error of the energy below 1e-5 of it
-
-# Gauss-Lobatto points and weights on [0, 1]: exact for polynomials of degree 9, and with a panel's ends among them,
-# where torque peaks when acceleration jumps or bends
+# least number of Gauss-Lobatto panels over a motion: relative error of the energy below 1e-5
+PANELS = 72
+# Gauss-Lobatto points and weights on [0, 1]: exact for polynomials of degree 9. The ends of a panel are among them:
+# there torque peaks if acceleration jumps or bends
 _INNER = np.sqrt((7 + 2 * math.sqrt(7) * np.array([1, -1])) / 21)
 LOBATTO = (1 + np.array([-1.0, -_INNER[0], -_INNER[1], _INNER[1], _INNER[0], 1.0])) / 2
 LOBATTO_WEIGHTS = np.array([2, 14 - math.sqrt(7), 14 + math.sqrt(7), 14 + math.sqrt(7), 14 - math.sqrt(7), 2]) / 60
@@ -58,24 +58,24 @@ def lobatto_panels(breaks: Array, panels: Indices) -> tuple[Indices, Array, Arra
 
 
 def lobatto_nodes(breaks: Array) -> tuple[Array, Array]:
-    """Quadrature nodes and weights (k,) over [0, 1] whose panels end at every break."""
+    """Gauss-Lobatto nodes and weights (k,) over [0, 1] on panels that end at every one of the ascending breaks."""
     panels = np.maximum(np.ceil(np.diff(breaks) * PANELS), 1).astype(np.int64)
     interval, offset, weights = lobatto_panels(breaks, panels)
     return breaks[interval] + offset, weights
 
 
-GRID_PERIOD = 1e-3  # s, at most
-LEAST_INTERVALS = 100  # so that motions under 0.1 s are not judged by a handful of samples
+# greatest interval of the certificate's grid [s], and least number of intervals, for motions shorter than 0.1 s
+GRID_PERIOD, LEAST_INTERVALS = 1e-3, 100
 
 
 def grid(duration: float) -> Array:
-    """Times (k,) [s]: an even number of equal intervals of at most GRID_PERIOD, both ends included."""
+    """Times (k,) [s] from 0 to `duration`, in an even number of equal intervals of at most GRID_PERIOD."""
     pairs = math.ceil(max(duration / GRID_PERIOD, LEAST_INTERVALS) / 2)
     return np.linspace(0.0, duration, 2 * pairs + 1)
 
 
 def simpson_weights(t: Array) -> Array:
-    """Weights (k,) [s] of Simpson's rule; where |x| has its corner the error falls with h² instead of h⁴."""
+    """Weights (k,) [s] of Simpson's rule on the grid t (k,); at a corner of |x| the error is O(h²), not O(h⁴)."""
     weights = np.full(len(t), 2.0)
     weights[1::2] = 4.0
     weights[[0, -1]] = 1.0

@@ -1,6 +1,7 @@
-"""The seven-segment profile: the fastest rest-to-rest motion of a joint under speed, acceleration and jerk limits.
+"""The seven-segment profile: the time-optimal rest-to-rest motion of a joint under speed, acceleration and jerk limits.
 
-Jerk up, hold, jerk down, cruise, and the same in reverse (Biagiotti, Melchiorri 2008, sec. 3.4).
+Segments of constant jerk: acceleration rises, is constant, falls; cruise; the same in reverse (Biagiotti, Melchiorri
+2008, sec. 3.4).
 """
 
 from __future__ import annotations
@@ -12,21 +13,20 @@ from scipy.optimize import brentq
 
 from models.robot import Array, Limits
 
-# switches closer than this share of the motion count as one
+# switches closer than this fraction of the duration count as one
 CLOSEST = 1e-3
 
 
 def shortest_duration(displacement: Array, limits: Limits) -> Array:
-    """Least time [s] of a rest-to-rest motion under speed, acceleration and jerk limits; displacement (..., nq) →
-    (...).
+    """Least duration (...) [s] of a rest-to-rest motion over a displacement (..., nq) [rad], without torque limits.
 
-    Every joint needs at least its own profile, and the arm at least what its slowest joint needs.
+    It is the duration of the longest profile of all joints.
     """
     return np.asarray(_durations(np.abs(displacement), limits).max(axis=-1))
 
 
 def _durations(distance: Array, limits: Limits) -> Array:
-    """Length [s] of every joint's profile, distance (..., nq) ≥ 0."""
+    """Duration (..., nq) [s] of every joint's profile over a distance (..., nq) ≥ 0 [rad]."""
     v, a, j = limits.v_max, limits.a_max, limits.j_max
     reaches_a = v * j >= a * a
     ramp = np.where(reaches_a, v / a + a / j, 2 * np.sqrt(v / j))
@@ -37,16 +37,15 @@ def _durations(distance: Array, limits: Limits) -> Array:
 
 
 def _jerk_limited(speed: float, distance: float, jerk: float) -> float:
-    """Time [s] to displacement a distance > 0 at a cruising speed that jerk alone limits the way to."""
+    """Duration [s] over a distance > 0 [rad] with a cruising speed that is reached without constant acceleration."""
     return float(distance / speed + 2 * np.sqrt(speed / jerk))
 
 
 def switches(displacement: Array, duration: float, limits: Limits) -> Array:
-    """Where in [0, 1] the jerk of the leading joint switches when it takes `duration` [s] for displacement (nq,),
-    ascending.
+    """Switches of the leading joint's jerk as fractions of `duration` [s], ascending, for a displacement (nq,) [rad].
 
-    The leading joint is the one whose own profile is longest; retimed to `duration`, it cruises at a lower speed. A
-    duration shorter than its own counts as its own.
+    The leading joint has the longest profile. In a longer duration it cruises at a lower speed; a shorter duration
+    counts as its own.
     """
     distance = np.abs(displacement)
     own = _durations(distance, limits)
@@ -59,7 +58,7 @@ def switches(displacement: Array, duration: float, limits: Limits) -> Array:
     moving = duration - a / j
     speed = a / 2 * (moving - np.sqrt(max(moving * moving - 4 * d / a, 0.0)))
     if speed < a * a / j:
-        # it never holds its greatest acceleration: duration = d / v + 2 sqrt(v / j), which falls with v up to no cruise
+        # no constant acceleration: duration = d / v + 2 sqrt(v / j), which falls with v until there is no cruise
         top = min(a * a / j, float(np.cbrt(d * d * j / 4)))
         needed = functools.partial(_jerk_limited, distance=d, jerk=j)
         speed = top if needed(top) >= duration else brentq(lambda v: needed(v) - duration, d / duration, top)

@@ -118,7 +118,7 @@ def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> 
     t = tau * duration
     speed = 1 / (duration - blend)
     acceleration = speed / blend
-    # by panel, not by node: at a jump the nodes of either side keep to their own side
+    # by panel, not by node: at a jump of acceleration the nodes of either side belong to their own phase
     middle = np.repeat(t.reshape(-1, len(LOBATTO)).mean(axis=1), len(LOBATTO))
     left = duration - t
     phases = [middle < blend, middle > duration - blend]

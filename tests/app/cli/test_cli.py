@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from app.schemas.examples.evaluate import EVALUATE_EXAMPLES
 
 from app.cli.main import main
 from app.schemas.evaluate import EvaluateResponse
+from app.schemas.examples.evaluate import EVALUATE_EXAMPLES
 from app.schemas.response import OptimizeResponse
 from app.settings import Settings
 from tests.app.requests import NEAR, long_search, move

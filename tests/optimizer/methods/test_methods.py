@@ -1,6 +1,6 @@
 """The methods against each other: every answer certified, and none below what a wider space can do.
 
-Each is held to the limits, to fixed durations and to its deadline in `test_candidate`.
+Limits, fixed durations and deadlines of each are in `test_sqp_method`.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ def test_the_factor_is_the_best_of_many() -> None:
                 assert electrical(solution) <= task.energy(slower).electrical.total * (1 + LEAST)
 
 
-def test_slowing_makes_room_for_a_torque_limit() -> None:
-    """A weak arm needs a greater factor, and holds its limit."""
+def test_a_tighter_torque_limit_needs_a_greater_time_scale() -> None:
+    """The motion of an arm with little torque takes longer and stays within the limit."""
     weak = limits(tau_max=[45, 70, 50, 28, 28, 28])
     strong, slow = solved("uniform_scaling"), solved("uniform_scaling", limits=weak)
     assert slow.duration > strong.duration
@@ -143,24 +143,24 @@ def test_mechanical_work(method: str) -> None:
     assert slow.duration <= 3.0
 
 
-def bred(start: Any = START, goal: Any = GOAL, **given: Any) -> tuple[PolynomialGA, SolveResult]:
+def by_genetic_algorithm(start: Any = START, goal: Any = GOAL, **given: Any) -> tuple[PolynomialGA, SolveResult]:
     task = PreparedProblem.of(problem(start, goal, method="polynomial_ga", **given))
     solver = PolynomialGA(task, start, goal, NEVER)
     return solver, solver.solve()
 
 
-def test_breeding_is_the_same_every_time_and_improves_on_its_first_population() -> None:
-    solver, attempt = bred()
-    _, again = bred()
+def test_the_genetic_algorithm_is_deterministic_and_improves_on_its_first_population() -> None:
+    solver, attempt = by_genetic_algorithm()
+    _, again = by_genetic_algorithm()
     assert attempt.spline is not None and again.spline is not None
     assert (attempt.spline.control_points == again.spline.control_points).all()
     assert attempt.spline.duration == again.spline.duration
-    # by a share far beyond what making it hold every limit can take away
+    # by far more than bringing it within every limit can cost
     assert solver.prepared.energy(attempt.spline).electrical.total < 0.999 * solver.first_cost
     assert attempt.iterations == solver.generations > 0
 
 
-def test_the_deadline_cuts_breeding_short() -> None:
+def test_the_deadline_ends_the_genetic_algorithm() -> None:
     readings = 30
     solution = optimize(problem(method="polynomial_ga", deadline=float(readings)), CountingClock())
     assert solution.certificate.valid and solution.status == "feasible"
@@ -168,7 +168,7 @@ def test_the_deadline_cuts_breeding_short() -> None:
     assert solution.solver.wall_time < readings + LAST_READINGS
 
 
-def test_breeding_solves_a_few_candidates_and_says_so_of_the_others() -> None:
+def test_the_genetic_algorithm_solves_a_few_candidates_and_says_so_of_the_others() -> None:
     solution = optimize(problem(tcp_pose(START), tcp_pose(GOAL), method="polynomial_ga", windings=False))
     solved_ones = [each for each in solution.candidates if each.status == "solved"]
     left = [each for each in solution.candidates if each.status == "unvisited"]
@@ -177,7 +177,7 @@ def test_breeding_solves_a_few_candidates_and_says_so_of_the_others() -> None:
     assert not left or max(e.lower_bound for e in solved_ones) <= min(e.lower_bound for e in left)
 
 
-def test_breeding_is_never_optimal_with_a_store_either() -> None:
+def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> None:
     """There the answer may be the one found without the store."""
     store = Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9)
     solution = optimize(problem(method="polynomial_ga", bus=store))

@@ -95,7 +95,7 @@ def test_a_time_scaled_motion_stays_on_its_line() -> None:
         assert fraction[0] == pytest.approx(0, abs=ROUNDING) and fraction[-1] == pytest.approx(1, abs=ROUNDING)
 
 
-def test_in_haste_the_arm_nearly_reaches_the_shortest_duration() -> None:
+def test_minimum_time_is_nearly_the_shortest_duration() -> None:
     """With ample torque; never below what the limits allow."""
     for start, goal in random_moves(33, 4):
         least = float(shortest_duration(goal - start, ROBOT.limits))
@@ -105,7 +105,7 @@ def test_in_haste_the_arm_nearly_reaches_the_shortest_duration() -> None:
         assert least * (1 - ROUNDING) <= motion.duration <= 1.03 * least
 
 
-def test_haste_forgets_the_duration_asked_for() -> None:
+def test_minimum_time_ignores_the_duration_asked_for() -> None:
     """It tells what would be possible."""
     quick = spline(solver(START, GOAL, fastest=True).solve()).duration
     for given in (fixed(0.1), fixed(5.0)):
@@ -127,7 +127,7 @@ def test_a_deadline_that_has_passed_ends_the_attempt(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_fixed_duration_is_kept(method: str) -> None:
-    # breeding finds nothing within a tenth of the shortest duration
+    # the genetic algorithm finds no motion close to the shortest duration
     for duration in (1.0, 4.0) if method == "polynomial_ga" else (0.75, 1.0, 4.0):
         mine = solver(START, GOAL, method=method, **fixed(duration))
         motion = spline(mine.solve())

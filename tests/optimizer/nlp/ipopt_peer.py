@@ -1,6 +1,6 @@
-"""A second solver for the optimiser's programmes: the same problem, written plainly in CasADi, solved by IPOPT.
+"""A second solver for the optimiser's NLPs: the same problem, written plainly in CasADi, solved by IPOPT.
 
-ConstraintRatios with the optimiser the spline basis and the expression for power at one instant. Objective,
+Shared with the optimiser are the spline basis and the expression for power at one instant. Objective,
 constraints, their derivatives (CasADi's own) and the method (interior point) are apart from it.
 """
 

@@ -240,7 +240,7 @@ def test_too_little_torque_is_told() -> None:
 
 
 @pytest.mark.parametrize("ticks", [0, 1, 3])
-def test_the_deadline_is_looked_at_in_every_iteration(ticks: int) -> None:
+def test_the_deadline_is_checked_in_every_iteration(ticks: int) -> None:
     """A clock that reaches the deadline after a number of readings; what has been found so far is returned."""
     mine = program(START, GOAL)
     readings = iter(range(1000))
@@ -272,7 +272,7 @@ def test_electrical_optimum_does_not_depend_on_the_guess() -> None:
     assert np.ptp(costs) < SAME * min(costs)
 
 
-def test_in_haste_a_joint_moves_as_its_seven_segments() -> None:
+def test_in_minimum_time_a_joint_moves_as_its_seven_segments() -> None:
     """With time as the cost, a space whose knots hold jerk's jumps gives the shortest duration there is."""
     goal = START + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     least = shortest(START, goal)
