@@ -194,7 +194,9 @@ class EvaluatedSamples(Response):
         "Motor torque at the joint, friction included.", "N·m", [[0.0, -38.1, -16.4, -1.2, 0.0, 0.0]]
     )
     power: Samples = described("Power drawn from the supply.", "W", [42.5, 43.1, 45.0])
-    charge: Samples = described("Charge of the bus' store; zero without one.", "J", [0.0, 2.1, 5.3])
+    charge: Samples | None = described(
+        "Charge of the energy storage on the bus; null without one.", "J", [0.0, 2.1, 5.3]
+    )
 
 
 class EvaluateResponse(Response):

@@ -75,7 +75,7 @@ class IntervalEnergy:
 class Samples:
     """A motion at equal steps and at its end: t (k,), q, v, a, tau, tau_motor (k, nq), power (k,) [W].
 
-    `charge` (k,) [J] is the bus' store's: zero without one.
+    `charge` (k,) [J] is that of the energy storage on the bus, None without one.
     """
 
     t: Array
@@ -85,7 +85,7 @@ class Samples:
     tau: Array
     tau_motor: Array
     power: Array
-    charge: Array
+    charge: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class _Evaluator:
             segment_count=self._count,
             speed_jumps=self._jumps,
             limits=self._watch.report(),
-            samples=_concatenated(self._samples) if self._samples else None,
+            samples=_concatenated(self._samples, self._arm.bus.mode == "storage") if self._samples else None,
             nearest=None if self._contact is None else self._contact.nearest,
         )
 
@@ -273,6 +273,6 @@ def _sum(one: Sum, other: Sum) -> Sum:
     return one + other  # type: ignore[no-any-return, operator]
 
 
-def _concatenated(samples: list[Samples]) -> Samples:
-    names = [each.name for each in fields(Samples)]
+def _concatenated(samples: list[Samples], with_charge: bool) -> Samples:
+    names = [each.name for each in fields(Samples) if with_charge or each.name != "charge"]
     return Samples(**{name: np.concatenate([getattr(part, name) for part in samples]) for name in names})
