@@ -1,4 +1,4 @@
-"""optimize(problem) → Solution: the one door."""
+"""Public entry point: `optimize(problem)` returns a `Solution`."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ from optimizer.solution import Solution
 def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
     """Find the motion of least energy between the problem's targets, certified against every limit.
 
+    `clock` gives the time [s] for the problem's deadline.
+
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
     StartInCollision, GoalInCollision, DurationTooShort, NoTrajectory, NoCollisionFreeTrajectory, DeadlineExceeded, or
     InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
@@ -30,7 +32,7 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """A context in which linear algebra keeps to one thread: matrices here are small, more would cost than give."""
+    """A context in which BLAS uses one thread: for matrices as small as these, several are slower."""
     limit: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
     return limit
 
@@ -41,7 +43,7 @@ def _blas() -> ThreadpoolController:
 
 
 def warm_up(robot_name: str) -> None:
-    """Load a robot and its kernel and solve a small problem, so that the first request finds everything ready."""
+    """Load a robot and its kernel and solve a small problem, so that the first request does not wait for them."""
     robot = load_robot(robot_name)
     kernel_for(robot)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2
