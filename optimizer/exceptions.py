@@ -1,4 +1,4 @@
-"""Everything that can go wrong, each error carrying its data.
+"""The errors of the library, each with its data.
 
 JoulepathError
 ├── InvalidProblem          malformed or contradictory request
@@ -8,14 +8,14 @@ JoulepathError
 ├── UnreachablePose         no inverse kinematics solution
 ├── SingularPose            every solution is singular
 ├── NoReachableTarget       none of several targets has a solution
-├── InCollision             every arm configuration at an end hits something
+├── InCollision             every arm configuration at the start or goal is in collision
 │   ├── StartInCollision
 │   └── GoalInCollision
 ├── DurationTooShort
 ├── TorqueInfeasible        the arm cannot hold or move the load
 ├── NoTrajectory            every candidate failed
 │   └── NoCollisionFreeTrajectory
-└── DeadlineExceeded        nothing verified in time
+└── DeadlineExceeded        no motion certified in time
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MOST_BRANCHES = 64
 
 
 class JoulepathError(Exception):
-    """Base of all errors that a caller can act on; the message is one sentence that says what to do."""
+    """Base of all errors that a caller can correct; the message says what to do."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         # the default calls the constructor with the message, but the subclasses' constructors take data
@@ -87,7 +87,7 @@ class UnknownRobot(JoulepathError):
 
 @dataclass(frozen=True)
 class CollidingBranch:
-    """An arm configuration q (nq,) [rad] in which the bodies of `pair` are `depth` [m] nearer than they may be."""
+    """An arm configuration q (nq,) [rad] in which the bodies of `pair` miss `depth` [m] of clearance."""
 
     label: str
     target: int
@@ -119,20 +119,20 @@ class SingularPose(JoulepathError):
 
 
 class NoReachableTarget(JoulepathError):
-    """None of the start's or goal's targets can be reached; `unreachable` tells why of each."""
+    """None of the targets of the start or goal can be reached; `unreachable` has the reason for each."""
 
     def __init__(self, target: str, unreachable: Sequence[UnreachableTarget]) -> None:
         super().__init__(
-            f"The arm can go to none of the {target}'s {len(unreachable)} targets: "
-            "do for one of them what its candidate in `unreachable` says."
+            f"None of the {len(unreachable)} {target} targets can be reached: correct at least one of them as "
+            "described in `unreachable`."
         )
         self.target, self.unreachable = target, list(unreachable)
 
 
 class InCollision(JoulepathError):
-    """Every arm configuration at an end hits something; `branches` are those, the least deep first.
+    """Every arm configuration at the start or goal is in collision; `branches` lists them, the least deep first.
 
-    `pair` is what the first of them brings together, `depth` [m] how far it would have to part.
+    `pair` names the two bodies of the first one, `depth` [m] is their missing clearance.
     """
 
     target: ClassVar[str]
@@ -140,20 +140,22 @@ class InCollision(JoulepathError):
     def __init__(self, branches: Sequence[CollidingBranch]) -> None:
         self.branches = sorted(branches, key=lambda branch: branch.depth)[:MOST_BRANCHES]
         self.pair, self.depth = self.branches[0].pair, self.branches[0].depth
-        ways = "" if len(branches) == 1 else f"in each of {len(branches)} arm configurations, "
+        each = "" if len(branches) == 1 else f"in each of {len(branches)} arm configurations "
+        first, second = self.pair
         super().__init__(
-            f"The {self.target} is in collision, {ways}by {self.depth:.4f} m at least: move it, or what is in the way."
+            f"The {self.target} is in collision {each}with a missing clearance of at least {self.depth:.4f} m "
+            f"({first} and {second}): move the {self.target} or the obstacle."
         )
 
 
 class StartInCollision(InCollision):
-    """The motion would begin in a collision."""
+    """Every arm configuration at the start is in collision."""
 
     target = "start"
 
 
 class GoalInCollision(InCollision):
-    """The motion would end in a collision."""
+    """Every arm configuration at the goal is in collision."""
 
     target = "goal"
 
@@ -178,7 +180,7 @@ class TorqueInfeasible(JoulepathError):
 
 
 class NoTrajectory(JoulepathError):
-    """Every candidate failed; `candidates` tells why."""
+    """Every candidate failed; `candidates` has the reason for each."""
 
     def __init__(self, candidates: Sequence[CandidateReport]) -> None:
         super().__init__("No candidate gave a motion within the limits: relax a limit or allow a longer duration.")
@@ -186,22 +188,22 @@ class NoTrajectory(JoulepathError):
 
 
 class NoCollisionFreeTrajectory(NoTrajectory):
-    """Every candidate failed, some for what is in the way. `best` is what the motion that came nearest to none runs
-    into, `start` and `goal` are its ends' branches; `depth` [m] is how far these bodies would have to part."""
+    """Every candidate failed, some because of a collision. `best` is the least deep collision of any candidate's
+    motion, `start` and `goal` are the branches of this candidate. `depth` [m] is the missing clearance of `pair`."""
 
     def __init__(self, candidates: Sequence[CandidateReport], best: Clearance, start: str, goal: str) -> None:
         super().__init__(candidates)
         self.args = (
-            "No motion was found that hits nothing: clear what `pair` names out of the way, move the start or the "
-            "goal, or leave the branch free.",
+            "No collision-free motion was found. `pair` names the two bodies that collide: move the obstacle among "
+            "them, move the start or the goal, or leave `branch` out.",
         )
         self.pair, self.time, self.start, self.goal = best.pair, best.time, start, goal
         self.depth = max(-best.min_clearance, 0.0)
 
 
 class DeadlineExceeded(JoulepathError):
-    """Nothing verified in time; `candidates` tells how far the search came."""
+    """The deadline passed before any motion was certified; `candidates` has the state of each."""
 
     def __init__(self, candidates: Sequence[CandidateReport]) -> None:
-        super().__init__("The deadline passed before any motion was verified: allow a longer deadline.")
+        super().__init__("The deadline passed before any motion was certified: allow a longer deadline.")
         self.candidates = list(candidates)

@@ -1,4 +1,4 @@
-"""optimize(problem) → Solution: the one door."""
+"""Public entry point: `optimize(problem)` returns a `Solution`."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from optimizer.solution import Solution
 def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
     """Find the motion of least energy between the problem's targets, certified against every limit.
 
+    `clock` gives the time [s] for the problem's deadline.
+
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
     StartInCollision, GoalInCollision, DurationTooShort, NoTrajectory, NoCollisionFreeTrajectory, DeadlineExceeded, or
     InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
@@ -27,7 +29,7 @@ def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
 
 
 def warm_up(robot_name: str) -> None:
-    """Load a robot and its kernel and solve a small problem, so that the first request finds everything ready."""
+    """Load a robot and its kernel and solve a small problem, so that the first request does not wait for them."""
     robot = load_robot(robot_name)
     kernel_for(robot)
     middle = (robot.limits.q_min + robot.limits.q_max) / 2

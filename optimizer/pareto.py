@@ -1,16 +1,17 @@
-"""pareto(problem, n) → Front: energy against time, over every candidate, each point certified.
+"""Public entry point: `pareto(problem, n)` returns a `Front`, the Pareto front of energy and duration.
 
-The front begins with the fastest motion there is and ends with the one of least energy. Between these, whatever its
-shape, it passes within the rectangles that neighbouring points span: a motion that takes longer than the left one and
-is worth having needs less, and none needs less than the right one. Durations are therefore chosen one by one, each the
-geometric mean of the two whose rectangle has the longest sides, in shares of the whole front's in log T and in energy.
+The front begins with the fastest motion and ends with the motion of least energy. Every candidate counts, and every
+point is certified. Between two neighbours the front lies within the rectangle that they span: a motion that is slower
+than the left one is dominated unless it needs less energy, and no motion needs less energy than the right one.
+Durations are therefore chosen one by one. Each is the geometric mean of the two neighbours whose rectangle has the
+longest sides, relative to those of the whole front, in log T and in energy.
 
-Where neighbours go by different candidates, the front may jump: the right one's candidate has a fastest motion of its
-own, and if that is slower than the left point, it is there that it takes over. That duration is tried next, and one
-just below it, since halving would only creep up to it.
+If two neighbours belong to different candidates, the front may jump between them. The candidate of the right one has a
+fastest motion of its own. If this is slower than the left point, the jump is at its duration. That duration is tried
+next, and one just below it, because halving would only converge to it.
 
-Each duration is solved from the motions on both sides of it and from the ground up, and every other candidate whose
-bound for that very duration is below the best found is tried, too.
+Each duration is solved with a warm start from the motions on both sides and without one. Every other candidate whose
+lower bound for this duration is below the best energy is solved, too.
 """
 
 from __future__ import annotations
@@ -34,19 +35,19 @@ from optimizer.solution import Solution
 from optimizer.trajectories.spline import Spline
 
 LEAST_POINTS, MOST_POINTS = 2, 100
-# share of the time left that the search for the fastest motion, and each end of the front, may take
+# share of the time left for the search of the fastest motion, and for each end of the front
 SHARE_OF_AN_END = 1 / 3
-# two durations nearer than the first share are one; nearer than the second and of different candidates: a known jump
+# relative distance of two durations that count as one, and of two around a jump that is located well enough
 SAME_DURATION, SAME_JUMP = 2e-4, 2e-3
-# shares below a candidate's own fastest duration at which it is looked for what the front is before that
+# relative distances below the duration of a jump at which the front before the jump is solved
 BEFORE_JUMP = (1e-4, 1e-3)
-# a run's deadline is never set below this [s]
+# least deadline of a search [s]
 LEAST_TIME = 1e-3
 
 
 @dataclass(frozen=True)
 class Dropped:
-    """A duration [s] that is no point of the front, why, and the energy [J] (of the objective) of what was found."""
+    """A duration [s] that gave no point of the front, the energy [J] of its motion in the objective, and the reason."""
 
     duration: float
     energy: float | None
@@ -55,10 +56,10 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Front:
-    """Motions none of which is beaten in both duration and energy, fastest first.
+    """Motions of which none is both slower and of no less energy than another, fastest first.
 
     `shortest` [s] is the least feasible duration over all candidates. `status` is `optimal` when every duration chosen
-    was solved and every motion is optimal, `feasible` when time ran out before that. `wall_time` [s] and `nlp_solves`
+    was solved and every motion is optimal, `feasible` if the deadline passed before. `wall_time` [s] and `nlp_solves`
     are for the whole front.
     """
 
@@ -72,7 +73,7 @@ class Front:
 
 @dataclass(frozen=True)
 class _Node:
-    """A duration [s] that was tried: its answer, or why there is none; the energy of the objective [J], or inf."""
+    """A duration [s] that was tried: its answer or the reason for none, and its energy in the objective [J] or inf."""
 
     duration: float
     answer: Solution | None
@@ -102,15 +103,15 @@ def pareto(problem: Problem, n: int, clock: Clock = time.perf_counter) -> Front:
 
 
 class _Search:
-    """A front being worked on."""
+    """The computation of one front."""
 
     def __init__(self, problem: Problem, n: int, clock: Clock) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.n = problem, n
         self.nodes: list[_Node] = []
         self.solves = 0
-        self.race = self.run([])
-        self.entered: set[bytes] = set()
+        self.fastest_run = self.run([])
+        self.tried: set[bytes] = set()
 
     def front(self) -> Front:
         """The front. Raises the errors of `pareto`."""
@@ -119,14 +120,14 @@ class _Search:
         if problem.duration_max is not None and spline.duration > problem.duration_max:
             raise DurationTooShort(spline.duration)
         first = max(spline.duration, problem.duration_min or 0.0)
-        # the fastest motion is at hand even where time runs out over the cheapest
+        # first, so that the fastest motion is known even if the deadline passes before the other end is
         self.solve(first, [spline])
         self.add(self.run(known, least=first), problem.duration_max or math.inf)
-        while len(self.nodes) < self.n and self.left() > 0 and (k := self.widest()) is not None:
+        while len(self.nodes) < self.n and self.left() > 0 and (k := self.next_interval()) is not None:
             left, right = self.nodes[k : k + 2]
-            if len(self.nodes) == self.n - 1 and self.end_again():
+            if len(self.nodes) == self.n - 1 and self.refine_last():
                 break
-            if switches(left, right) and self.enter(left, right):
+            if switches(left, right) and self.try_switch(left, right):
                 continue
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
@@ -138,8 +139,8 @@ class _Search:
         The minimum-time solve may fail on a candidate on which the least-energy solve does not. Then the motion of
         least energy is its initial guess; if it fails again, that motion is the fastest one known.
         """
-        self.race.prepare()
-        found = fastest(self.race.incumbent)
+        self.fastest_run.prepare()
+        found = fastest(self.fastest_run.incumbent)
         if found is not None:
             return found[1], []
         run = self.run([])
@@ -157,7 +158,7 @@ class _Search:
         return self.began + self.problem.deadline - self.clock()
 
     def run(self, known: list[Spline], least: float | None = None, most: float | None = None) -> Run:
-        """A run between two durations, with its share of the time that is left."""
+        """A search between two durations [s], with its share of the time left."""
         problem = self.problem
         share = 1 / max(self.n - len(self.nodes), 1)
         if len(self.nodes) < LEAST_POINTS:
@@ -178,7 +179,7 @@ class _Search:
         return self.add(self.run(known, duration, duration), duration)
 
     def add(self, run: Run, duration: float) -> _Node:
-        """Work on a run, and note what comes of it; `duration` [s] is where it belongs if nothing does."""
+        """Run a search and keep its result; `duration` [s] is its place in the front if it finds no motion."""
         try:
             answer = run.solution()
             node = _Node(answer.duration, answer, answer.energy.of(self.problem.objective))
@@ -189,14 +190,14 @@ class _Search:
         self.nodes.sort(key=lambda node: (node.duration, node.energy))
         return node
 
-    def enter(self, left: _Node, right: _Node) -> bool:
-        """Try the duration at which the right node's candidate becomes possible, if that lies between the two."""
+    def try_switch(self, left: _Node, right: _Node) -> bool:
+        """Solve for the right candidate's fastest duration, and just below; false if it is not between the two."""
         assert right.answer is not None
         q_start, q_goal = right.answer.start.q, right.answer.goal.q
         key = q_start.tobytes() + q_goal.tobytes()
-        if key in self.entered:
+        if key in self.tried:
             return False
-        self.entered.add(key)
+        self.tried.add(key)
         run = self.run([])
         run.prepare()
         candidate = between(run.incumbent.prepared, run.incumbent.candidates, q_start, q_goal)
@@ -214,21 +215,21 @@ class _Search:
                 break
         return True
 
-    def end_again(self) -> bool:
-        """Look for the cheapest motion once more, from the cheapest known, if that is not the one found at first."""
-        cheapest = min(self.nodes, key=lambda node: node.energy)
-        if cheapest is self.nodes[-1] or cheapest.spline is None:
+    def refine_last(self) -> bool:
+        """Search the end of least energy again from the motion of least energy, if that is not the last node."""
+        least_energy = min(self.nodes, key=lambda node: node.energy)
+        if least_energy is self.nodes[-1] or least_energy.spline is None:
             return False
         most = self.problem.duration_max or math.inf
-        self.add(self.run([cheapest.spline], least=self.nodes[0].duration), most)
+        self.add(self.run([least_energy.spline], least=self.nodes[0].duration), most)
         return True
 
-    def widest(self) -> int | None:
-        """Behind which node another motion says most about the front; None where there is no room for one."""
+    def next_interval(self) -> int | None:
+        """The node behind which another duration tells most about the front; None if all are near enough."""
         found = [node.energy for node in self.nodes if node.answer is not None]
         if not found:
             return None
-        # what can be had within each duration: dominated points and those without a motion do not lower it
+        # least energy within each duration: dominated nodes and those without a motion do not lower it
         least = list(accumulate((min(node.energy, max(found)) for node in self.nodes), min))
         last = next(k for k, energy in enumerate(least) if energy == least[-1])
         rise = math.log(self.nodes[last].duration / self.nodes[0].duration)
@@ -239,14 +240,14 @@ class _Search:
                 continue
             falls = least[k] - least[k + 1]
             if falls == 0 and not switches(left, right):
-                continue  # one candidate, whose motions here take longer and need no less
+                continue  # one candidate, whose slower motions here need no less energy
             sides = math.log(right.duration / left.duration) / rise + falls / fall
             if sides > longest:
                 longest, chosen = sides, k
         return chosen
 
     def result(self, shortest: float, complete: bool) -> Front:
-        """What was found, the dominated put aside."""
+        """The front, without the dominated nodes."""
         points: list[Solution] = []
         dropped: list[Dropped] = []
         least = math.inf
@@ -254,32 +255,32 @@ class _Search:
             if node.answer is None:
                 dropped.append(Dropped(node.duration, None, node.reason))
             elif points and (node.duration, node.energy) == (points[-1].duration, least):
-                continue  # the same motion, found again
+                continue  # the same motion found twice
             elif node.energy >= least:
-                reason = f"the motion of {points[-1].duration:.4f} s is no slower and needs no more"
+                reason = f"dominated: the motion of {points[-1].duration:.4f} s is no slower and needs no more energy"
                 dropped.append(Dropped(node.duration, node.energy, reason))
             else:
                 points.append(node.answer)
                 least = node.energy
         if not points:
-            raise DeadlineExceeded([candidate.report() for candidate in self.race.incumbent.candidates])
+            raise DeadlineExceeded([candidate.report() for candidate in self.fastest_run.incumbent.candidates])
         return Front(
             status="optimal" if complete and all(point.status == "optimal" for point in points) else "feasible",
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],
             wall_time=self.clock() - self.began,
-            nlp_solves=self.solves + self.race.incumbent.solves,
+            nlp_solves=self.solves + self.fastest_run.incumbent.solves,
         )
 
 
 def distinct(earlier: float, later: float, share: float = SAME_DURATION) -> bool:
-    """Whether a duration [s] is longer than another by more than a share."""
+    """Whether a duration [s] is longer than another by more than a relative distance."""
     return later > earlier * (1 + share)
 
 
 def switches(left: _Node, right: _Node) -> bool:
-    """Whether two nodes go by different candidates."""
+    """Whether two nodes have motions of different candidates."""
     a, b = left.answer, right.answer
     if a is None or b is None:
         return False

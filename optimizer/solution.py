@@ -1,4 +1,4 @@
-"""What is answered: trajectory, energy, every candidate's fate, the certificate. SI units; arrays [sample][joint]."""
+"""The answer: trajectory, energy, candidates, baselines, certificate. SI units; arrays are [sample][joint]."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ Objective = Literal["electrical", "mechanical"]
 class Trajectory:
     """Samples of a motion: t (k,), q, v, a, tau, tau_motor (k, nq), power (k,) drawn from the supply [W].
 
-    `tau` is rigid body and rotor; `tau_motor` adds friction. `charge` (k,) [J] is the store's, None without a store.
+    `tau` is rigid body and rotor; `tau_motor` adds friction. `charge` (k,) [J] is that of the energy storage,
+    None without one.
     """
 
     t: Array
@@ -34,9 +35,9 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class ElectricalEnergy:
-    """Energy drawn from the supply, what a store lost of its charge included [J], and the parts that add up to it.
+    """Energy drawn from the supply plus the decrease of the energy storage's charge [J], and the parts of this total.
 
-    `recovered` is negative; `storage_loss` is lost in the store, `dwell` drawn while the arm waits after its motion.
+    `recovered` is negative; `storage_loss` is lost in the storage, `dwell` drawn while the arm waits after its motion.
     """
 
     total: float
@@ -80,7 +81,7 @@ class JointEnergy:
 
 @dataclass(frozen=True)
 class StorageUse:
-    """The bus' store over a motion [J]: its charge at both ends, and what went in and out at the bus."""
+    """Energy storage over a motion [J]: charge at both ends, and energy charged and discharged, at the bus."""
 
     initial: float
     final: float
@@ -92,7 +93,7 @@ class StorageUse:
 class Energy:
     """Everything about a motion's energy [J, W]; peak and mean power are of the motion itself, drawn from the supply.
 
-    `storage` is None on a bus without a store.
+    `storage` is None on a bus without energy storage.
     """
 
     electrical: ElectricalEnergy
@@ -126,7 +127,7 @@ class Branch:
 
 @dataclass(frozen=True)
 class UnreachableTarget:
-    """One of several targets of the `end` (start or goal), by index, that has no candidates, and why."""
+    """One of several targets of the `end` (start or goal), by index, that has no candidates, and the reason."""
 
     end: str
     target: int
@@ -145,7 +146,7 @@ class CandidateStatus(StrEnum):
 
 @dataclass(frozen=True)
 class CandidateReport:
-    """A start and goal pair: what became of it, its proven bound and the energy found (of the objective) [J].
+    """A start and goal pair: its status and reason, its proven bound and the energy found [J], of the objective.
 
     `start_target` and `goal_target` are indices as in `Branch.target`.
     """
@@ -168,7 +169,7 @@ BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "contr
 
 @dataclass(frozen=True)
 class Baseline:
-    """What another method spends between the same ends; `saving` = 1 - ours / theirs, of the objective."""
+    """Energy [J] of another method's motion between the same ends; `saving` = 1 - ours / theirs, of the objective."""
 
     name: BaselineName
     duration: float
@@ -203,11 +204,10 @@ class Certificate:
     """The answer recomputed by Pinocchio on a 1 ms grid, apart from the solver.
 
     `worst_ratio` maps position, velocity, acceleration, jerk, torque, and of tool_cone, tcp_speed and elbow_speed those
-    that are limited, to the worst value / limit. `clearance` is proven over continuous time, None where nothing is
-    compared. `start_error` and
-    `goal_error` are (position [m], rotation [rad]) of the TCP against the pose asked for (or the forward kinematics
-    of the joints asked for). `rest_error` is the worst |v| / v_max and |a| / a_max at the two ends.
-    `energy_error` is |fine quadrature - reported| / reported, `balance_error` |sum of parts - total| / total.
+    that are limited, to the worst value / limit. `clearance` is proven over continuous time, None if no bodies are
+    compared. `start_error` and `goal_error` are (position [m], rotation [rad]) of the TCP against the pose asked for
+    (or the forward kinematics of the joints asked for). `rest_error` is the worst |v| / v_max and |a| / a_max at the
+    two ends. `energy_error` is |fine quadrature - reported| / reported, `balance_error` |sum of parts - total| / total.
     """
 
     worst_ratio: dict[str, float]
@@ -225,7 +225,7 @@ class Certificate:
 
     @property
     def valid(self) -> bool:
-        """Whether the motion holds every limit, meets its ends at rest and has its energy right. NaN is not valid."""
+        """Whether the motion is within every limit, at rest at its ends, and of the reported energy. NaN is invalid."""
         return (
             all(ratio <= 1 + RATIO_TOLERANCE for ratio in self.worst_ratio.values())
             and all(error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error)
@@ -238,8 +238,8 @@ class Certificate:
 
 @dataclass(frozen=True)
 class SolverReport:
-    """Cost of the answer: wall time [s], iterations and programmes solved over all candidates, and the
-    largest component of the Lagrangian's gradient, as a share of the cost per rad (None for a baseline's motion).
+    """Effort: wall time [s], iterations and nonlinear programs solved over all candidates; and the largest component
+    of the Lagrangian's gradient, relative to the cost, per rad (None for the motion of a baseline).
     """
 
     wall_time: float
@@ -250,7 +250,7 @@ class SolverReport:
 
 @dataclass(frozen=True)
 class Solution:
-    """The motion of least energy, with its proof."""
+    """The motion of least energy, with its lower bound and certificate."""
 
     status: Literal["optimal", "feasible"]
     start: Branch

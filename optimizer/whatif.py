@@ -1,7 +1,7 @@
-"""What an arm's motion would cost were the arm another: lighter links, another payload, other drives.
+"""Public entry point: `whatif(base, problem)` compares a motion with the best one of a changed arm.
 
-Two effects are told apart: what the change does to the motion that was best before it (`same_motion`), and what a
-motion found for the changed arm does beside that (`reoptimised`).
+The change may be lighter links, another payload or other drives. It has two effects, reported apart: the energy of the
+same motion on the changed arm (`same_motion`), and the energy of a motion optimised for it (`reoptimised`).
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from optimizer.solution import Certificate, Energy, Solution
 
 @dataclass(frozen=True)
 class Changed:
-    """A change's outcome.
+    """Result of a change.
 
-    `same_motion` is the energy [J] of the base's motion on the changed arm, `certificate` whether it holds there.
-    `reoptimised` is the best motion of the changed arm; None, with the `error`, where none was found.
+    `same_motion` is the energy [J] of the base motion on the changed arm, `certificate` says whether it is feasible
+    there. `reoptimised` is the best motion of the changed arm; None, with the `error`, if none was found.
     """
 
     same_motion: Energy
@@ -37,11 +37,11 @@ class Changed:
 
 @one_thread()
 def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -> Changed:
-    """Hold the answer `base` against `problem`, the same motion asked of a changed arm of as many joints.
+    """Compare the answer `base` with that of `problem`, the same motion for a changed arm with as many joints.
 
-    The changed problem is solved on its own. Where the base's motion holds on the changed arm and costs less than what
-    was found, it is solved again from that motion: re-optimising never costs more than not to. `problem.deadline` [s]
-    holds for all of it.
+    The changed problem is solved on its own. If the base motion is feasible on the changed arm and needs less energy
+    than the new motion, the problem is solved again with a warm start from it. The result then needs no more energy
+    than the base motion, unless the deadline passes first. `problem.deadline` [s] holds for all of it.
     """
     deadline = Deadline.after(problem.deadline, clock)
     spline, prepared = base.trajectory.spline, PreparedProblem.of(problem)
@@ -58,7 +58,7 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
         try:
             again = Run(replace(problem, deadline=left), [spline], clock).solution()
         except JoulepathError:
-            # too little time was left: the first answer stands
+            # the time left was too short: the first answer counts
             return Changed(energy, certificate, found, None)
         found = min(found, again, key=lambda each: each.energy.of(problem.objective))
     return Changed(energy, certificate, found, None)

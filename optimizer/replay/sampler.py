@@ -24,8 +24,8 @@ PERIOD_ROUNDING = 1e-6
 class Samples:
     """A motion at multiples of a period and at its end: t (k,) [s]; q, v, a, tau, tau_motor (k, nq); power (k,) [W].
 
-    `tau` [N·m] is rigid body and rotor, `tau_motor` adds friction. `charge` (k,) [J] is that of the energy storage:
-    zero without one.
+    `tau` [N·m] is rigid body and rotor, `tau_motor` adds friction. `charge` (k,) [J] is that of the energy storage,
+    None without one.
     """
 
     t: Array
@@ -35,7 +35,7 @@ class Samples:
     tau: Array
     tau_motor: Array
     power: Array
-    charge: Array
+    charge: Array | None = None
 
 
 class Sampler:
@@ -65,7 +65,8 @@ class Sampler:
     def finish(self, last: PiecewiseMotion, charge: float) -> Samples:
         """All samples, with one at the end of the `last` block, where the energy storage has `charge` [J]."""
         self._add(last, last.breakpoints[-1:], np.array([charge]))
-        names = [each.name for each in fields(Samples)]
+        stored = self._plant.arm.bus.mode == "storage"
+        names = [each.name for each in fields(Samples) if stored or each.name != "charge"]
         return Samples(**{name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names})
 
     def _add(self, motion: PiecewiseMotion, t: Array, charge: Array) -> None:

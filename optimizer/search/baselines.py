@@ -1,13 +1,13 @@
-"""What other methods spend between the same ends, and the optimiser's first guesses.
+"""Energy of other methods' motions between the same ends; these motions are also initial guesses of the optimiser.
 
-- `trapezoid`: trapezoid of speed, all joints in step, in our duration
-- `quintic`: rest-to-rest quintic, all joints in step, in our duration
-- `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021); knows no torque
-- `ruckig_slowed`: the same path and law, scaled evenly to our duration
+- `trapezoid`: trapezoidal speed, all joints synchronised, in our duration
+- `quintic`: rest-to-rest quintic, all joints synchronised, in our duration
+- `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021); without torque limits
+- `ruckig_slowed`: the same motion, its time scaled to our duration
 - `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid
 
-All go from the start to the nearest goal, and wait there, each in the time that it leaves of a cycle. A trapezoid's
-acceleration jumps: its jerk is unbounded, so it is never within a jerk limit, and says so.
+All go from the start to the nearest goal and wait there until the end of the cycle, if there is one. The acceleration
+of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def baselines(
 
     `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
     (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
-    `satisfies_path_constraints` says of samples q, v (k, nq) whether they hit nothing and hold the limits along the
-    path.
+    `satisfies_path_constraints` says of samples q, v (k, nq) whether they are free of collision and within the limits
+    along the path.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks
@@ -103,7 +103,7 @@ def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential
 
 
 def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:
-    """Whether a motion holds every limit: its exact peaks of the rates, positions and motor torques at its samples.
+    """Whether a motion is within every limit: its exact peaks of the rates, positions and motor torques at its samples.
 
     A motion that takes longer than the cycle does not.
     """

@@ -1,4 +1,4 @@
-"""Which candidates there are, in which order they are solved, and which bound rules the others out."""
+"""The candidates of a problem: pairs of start and goal configurations, with their lower bounds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from optimizer.trajectories.spline import Spline
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
 MOST_PAIRS = 32768
-# two relative windings that differ by less are the same [rad]
+# joint displacements that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 
 
@@ -98,15 +98,14 @@ class Candidate:
 def pairs(
     prepared: PreparedProblem, starts: Sequence[EndConfiguration], goals: Sequence[EndConfiguration]
 ) -> list[Candidate]:
-    """Every pair of branches with every winding that makes a motion of its own.
+    """Every pair of branches, with every full-turn alternative that makes a motion of its own.
 
-    Dynamics does not know full turns: where both ends are poses, pairs of the same relative displacement are one
-    candidate,
-    and those that turn a joint by more than a full turn are left out, since the same pair of branches without that turn
-    travels less in that joint and no further in the others, under a bound that is never higher.
-    Without `windings`, and to samples of a free orientation, the one of least displacement.
+    The dynamics has period 2π in every joint. If both ends are poses, pairs with equal joint displacement are one
+    candidate. Pairs that move a joint by more than 2π are left out: without that full turn, the same branches have less
+    displacement in this joint, no more in the others, and a bound that is never higher. Without `windings`, and for
+    samples of a free orientation, only the pair of least displacement is kept.
 
-    Raises InvalidProblem when several targets make too many.
+    Raises InvalidProblem if several targets make too many pairs.
     """
     result: list[Candidate] = []
     for start in starts:
@@ -132,7 +131,7 @@ def pairs(
 
 
 def _joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
-    """(start, goal) of one joint for each relative displacement, least displacement first."""
+    """(start, goal) [rad] of one joint for each displacement, least first."""
     both = sorted(product(starts, goals), key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])))
     if not windings:
         return both[:1]
@@ -147,9 +146,9 @@ def _joint_options(starts: list[float], goals: list[float], fixed: bool, winding
 
 
 def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
-    """Rule out the pairs at whose ends the arm cannot be, and give every candidate its lower bound and least duration.
+    """Mark the candidates with an infeasible start or goal, and give each its lower bound and least duration.
 
-    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible when no pair is left.
+    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is left.
     """
     sides = {
         name: list({id(end): end for end in (getattr(candidate, name) for candidate in candidates)}.values())

@@ -1,5 +1,7 @@
-"""Whether the arm can be where a motion starts or ends: tool within its cone, hitting nothing, able to hold its load.
-What cannot be is ruled out before any motion is looked for."""
+"""Whether a start or goal configuration is feasible: tool within its cone, no collision, torque to hold the load.
+
+Infeasible configurations are ruled out before any motion is computed.
+"""
 
 from __future__ import annotations
 
@@ -16,29 +18,29 @@ from optimizer.kinematics.path_constraints import ToolConeConstraint
 from optimizer.nlp.clearance_constraint import RESERVE
 from optimizer.prepared_problem import PreparedProblem
 
-# rounding of the angle in a cone, as a share of its half angle
+# rounding of the angle in a cone, relative to its half angle
 EDGE = 1e-9
 
 
 @dataclass(frozen=True)
 class InvalidReason:
-    """Why the arm cannot be somewhere, in words, and what it is: an angle [rad] beyond the cone, a contact, a joint."""
+    """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a pair, a joint)."""
 
     reason: str
     cause: float | ClosestPair | TorqueInfeasible
 
 
 def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
-    """What rules out each of the configurations q (n, nq), if anything does."""
+    """The reason why each configuration of q (n, nq) [rad] is infeasible; None for a feasible one."""
     result: list[InvalidReason | None] = [*_overloads(prepared, q)]
-    # the later ones are graver: they do not depend on the load
+    # later reasons replace earlier ones: they do not depend on the load
     for k, contact in enumerate(
         prepared.surroundings.model.closest_pairs(q, within=RESERVE) if prepared.problem.arm.collisions else ()
     ):
         if contact.distance < RESERVE:
             first, second = contact.pair
-            words = f"{first} and {second}: clearance {RESERVE - contact.distance:.4f} m too small"
-            result[k] = InvalidReason(words, contact)
+            message = f"{first} and {second}: clearance {RESERVE - contact.distance:.4f} m too small"
+            result[k] = InvalidReason(message, contact)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:
             result[k] = InvalidReason(f"the tool points {beyond:.4f} rad outside its cone", beyond)
@@ -48,7 +50,7 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
 def raise_if_none_is_left(
     name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[InvalidReason | None]
 ) -> None:
-    """Raise what rules out every branch (label, target, q) at the `name`, start or goal, if none is left.
+    """Raise the error for the branches (label, target, q) at the `name`, start or goal, if none of them is feasible.
 
     Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible.
     """
@@ -74,7 +76,7 @@ def raise_if_none_is_left(
 
 
 def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
-    """Joints that cannot hold the load at q (n, nq)."""
+    """For each of q (n, nq) [rad] the joint that cannot hold the load, if any."""
     tau_max, joints = prepared.problem.arm.active_limits.tau_max, prepared.problem.arm.robot.joint_names
     still = np.zeros_like(q)
     needed = np.abs(prepared.torques(q, still, still))
@@ -87,7 +89,7 @@ def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None
 
 
 def _beyond_cone(prepared: PreparedProblem, q: Array) -> list[float]:
-    """How far [rad] the tool points outside its cone at q (n, nq); none where it is inside."""
+    """Angle [rad] of the tool beyond its cone at each of q (n, nq); empty without a cone."""
     problem = prepared.problem
     if problem.arm.tool_cone is None:
         return []

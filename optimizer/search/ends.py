@@ -1,4 +1,4 @@
-"""Waypoints at the start and the goal of a problem."""
+"""Arm configurations at the start and the goal of a problem."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.targets import AnyOf, Single
 from optimizer.solution import UnreachableTarget
 
-# orientations tried of a pose that leaves it free, and of each of several at least
+# orientations sampled of a pose that leaves it free, and of each of several such poses at least
 SAMPLES, LEAST_SAMPLES = 96, 12
-# share of the tool's cone that a goal of free orientation may use: on the edge nothing would be left for the motion
+# share of the tool's cone that a goal of free orientation may use: on its edge the motion could not leave the goal
 INSIDE = 0.999
 # label of joint positions of an arm without named branches
 GIVEN = "given"
@@ -30,10 +30,10 @@ GIVEN = "given"
 
 @dataclass(frozen=True)
 class EndConfiguration:
-    """One branch at an end of the motion: its label, and for every joint the positions that the limits allow [rad].
+    """One branch at the start or goal: its label, and per joint its full-turn alternatives within the limits [rad].
 
-    `target` is the index, among the end's targets, of the one that it reaches; `tolerance` that target, where its
-    orientation is free in part and this is but a sample of it.
+    `fixed`: the joint positions are given. `target` is the index of the target that it reaches. `tolerance` is this
+    target if its orientation is free in part: then the configuration is a sample of it.
     """
 
     label: str
@@ -45,11 +45,10 @@ class EndConfiguration:
 
 
 def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches at `start` or `goal` that the problem allows, none of them singular; and, of several targets, those
-    that have none.
+    """The branches at `start` or `goal` that the problem allows, none singular; and the targets without any.
 
-    Raises NoReachableTarget when all of several have none, and of a single pose UnreachablePose or SingularPose;
-    UnreachablePose also when the branch asked for does not reach the pose.
+    Raises NoReachableTarget if none of several targets has a branch; for a single pose UnreachablePose (also if the
+    branch asked for does not reach it) or SingularPose; InvalidProblem for a pose of an arm without inverse kinematics.
     """
     target = getattr(prepared.problem, name)
     if not isinstance(target, AnyOf):
@@ -97,7 +96,7 @@ def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, s
 def _ends_of_samples(
     prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
 ) -> list[EndConfiguration]:
-    """The branches of orientations spread over those that the pose, and the tool's cone, allow."""
+    """The branches of orientations sampled evenly from those that the pose and the tool's cone allow."""
     pose = _within_cone(prepared, pose)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
@@ -119,14 +118,16 @@ def _ends_of_samples(
     raise UnreachablePose(
         name,
         min(distances, default=None),
-        f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to where the arm can "
-        "go, widen limits.position or leave `branch` out.",
+        f"The {name} is out of reach in each of the {tried} orientations tried: move it closer to the robot's "
+        "workspace, widen limits.position or leave `branch` out.",
     )
 
 
 def _within_cone(prepared: PreparedProblem, pose: ConeOrientedPose) -> ConeOrientedPose:
-    """The pose with no more freedom than the tool's cone leaves, where both are about the same axes: few orientations
-    of a free pose would be in a narrow cone."""
+    """The pose with no more freedom than the tool's cone leaves it, if both have the same axes.
+
+    Else few samples of a free orientation would lie in a narrow cone.
+    """
     cone = prepared.problem.arm.tool_cone
     if cone is None:
         return pose

@@ -1,9 +1,9 @@
-"""Goals whose orientation is free in part: which samples of it are tried, and how the best are turned into better ones.
+"""Goals whose orientation is free in part: which samples are solved, and how the best of them are refined.
 
-A goal of that kind is a continuum of arm configurations. A sample of it is ranked by the bounds, the most promising
-are solved, and from the best of these the goal itself becomes an unknown of the program, on the plane that touches
-the continuum there. What that proposes is put back on the continuum by inverse kinematics and solved with its goal
-held, until turning pays no more.
+The configurations of such a goal form a manifold. Its samples are ordered by lower bound, and those of least bound are
+solved. From the best of these, the goal configuration becomes a decision variable of the nonlinear program, restricted
+to the tangent space of the goal manifold. Inverse kinematics projects the new goal onto the manifold, and the motion is
+solved again with this goal fixed, until the energy no longer decreases.
 """
 
 from __future__ import annotations
@@ -37,25 +37,25 @@ from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import REST_POINTS
 from optimizer.trajectories.spline import sample
 
-# samples solved before any is improved: in all, and of one pair of branches
+# samples solved before any is refined: in all, and of one pair of branches
 BATCH, ALIKE = 12, 2
-# how many of the solved are improved, each of a pair of branches of its own
+# solved samples that are refined, each of a pair of branches of its own
 MOST_REFINED = 4
-# turns of improvement, how far a joint of the goal may go in one [rad], and the least worth trying
+# rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
-# a share of the energy that another turn must have gained to be followed by one more
+# relative decrease of the energy below which no further round follows
 GAIN = 2e-4
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
-# instants at which a motion of another method is looked at
+# instants at which a motion of another method is sampled
 FIT_SAMPLES = 201
-# configurations that differ by less are one [rad]
+# configurations that differ by less are the same [rad]
 SAME = 1e-6
 # sides of the polygon that stands for a cone's circle
 SIDES = 12
 
 
 def activate_deferred(candidates: Sequence[Candidate]) -> bool:
-    """Open the most promising samples that are held back; false when there are none."""
+    """Activate the deferred samples of least lower bound; false if there are none."""
     alike: Counter[tuple[str, str, int]] = Counter()
     opened = 0
     for candidate in sorted((e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)):
@@ -78,9 +78,9 @@ def between(
     q_goal: Array,
     among: Sequence[Candidate] | None = None,
 ) -> Candidate:
-    """The candidate (of `among`, default all) between two configurations (nq,), or else the nearest.
+    """The candidate (of `among`, default all) between two configurations (nq,) [rad], else the nearest one.
 
-    Where it is missing only because q_goal is no sample of a free orientation, though allowed, it is added.
+    If it is missing only because q_goal is not among the samples of a free orientation, it is added to `candidates`.
     """
     known = candidates if among is None else among
     nearest = min(known, key=lambda e: _distance(e.q_start, q_start) + _distance(e.q_goal, q_goal))
@@ -102,7 +102,7 @@ def _distance(a: Array, b: Array) -> float:
 
 
 def _with_goal(prepared: PreparedProblem, candidate: Candidate, q_goal: Array) -> Candidate | None:
-    """The candidate with another of its goal's configurations, bounded; None where the arm cannot be there."""
+    """The candidate with another goal configuration, with its bounds; None if that is infeasible."""
     label = label_of(prepared.problem.arm.robot, q_goal)
     goal = replace(candidate.goal, label=label, q=q_goal, choices=[[value] for value in q_goal.tolist()], fixed=True)
     fresh = Candidate(candidate.start, goal, candidate.q_start, q_goal)

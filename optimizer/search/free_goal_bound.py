@@ -1,11 +1,11 @@
 """A lower bound on the motions to a goal whose orientation is free in part: to all of its configurations at once.
 
-The orientation decides what the last three joints do; the bound leaves these their freedom and looks at the first
-three. Branch and bound over boxes of (q1, q2, q3): a box that cannot bring the fourth joint's origin near enough to the
-goal, or not far enough from it, holds no configuration; of any other, the joints displacement at least to the box,
-and the potential_gain is at least its potential_gain less what the links can still sink. `lower_bounds` of the least
-displacement and the least potential_gain
-then bounds every motion into the box, since it falls with neither. The least over all boxes bounds the family.
+The wrist decides the orientation; the bound leaves it free and looks at the inner joints alone (`kinematics.
+wrist_geometry`). Branch and bound over boxes of inner joint positions. A box that cannot bring the wrist near enough to
+the goal, or not far enough from it, holds no configuration. For any other box, the joint displacement is at least that
+to the box, and the potential energy at least that in its middle less what the links can still sink. `lower_bounds` of
+the least displacement and the least gain of potential energy bounds every motion into the box, since it falls with
+neither. The least value over all boxes bounds the family.
 """
 
 from __future__ import annotations
@@ -18,30 +18,25 @@ from itertools import product
 import numpy as np
 
 from models.robot import Array
+from optimizer.collision.bodies import Indices
 from optimizer.deadline import NEVER, Deadline
 from optimizer.energy.dwell import holding_power
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.kinematics.wrist_geometry import Shell, WristBody, WristGeometry, least_potential
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import Candidate
 from optimizer.search.lower_bound import lower_bounds
 
-INNER = 3
 # boxes along each joint at first, boxes split in a round, rounds
 FIRST_BOXES, SPLIT, ROUNDS = 4, 160, 20
-# a side is never split below this [rad]
+# a box is not split once its widest side is below this [rad]
 SMALLEST = 0.01
-# angles along the fifth and sixth joint at which the wrist's reach is looked at; between them it is given a margin
-REACH_ANGLES = 240
-# points on the tool's axis, from the TCP [m], whose distance from the fourth joint is bounded where a cone holds them
-ANCHORS = (0.0, -0.05, 0.05, -0.1, 0.1, -0.2, 0.2, -0.3, 0.3)
 
 
 def family_bound_of(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> float:
-    """Bound of the motions to those goals whose orientation is free in part [J]; inf where there are none."""
-    poses = {e.goal.target: e.goal.tolerance for e in candidates if e.goal.tolerance is not None}
-    starts = np.array(list({id(e.start): e.start.q for e in candidates}.values()))
+    """Bound [J] on the motions to those goals whose orientation is free in part; inf if there are none."""
+    poses = {each.goal.target: each.goal.tolerance for each in candidates if each.goal.tolerance is not None}
+    starts = np.array(list({id(each.start): each.start.q for each in candidates}.values()))
     rounds = ROUNDS // max(len(poses), 1)
     return min((family_bound(prepared, pose, starts, rounds, deadline) for pose in poses.values()), default=np.inf)
 
@@ -49,39 +44,101 @@ def family_bound_of(prepared: PreparedProblem, candidates: Sequence[Candidate], 
 def family_bound(
     prepared: PreparedProblem, pose: ConeOrientedPose, starts: Array, rounds: int = ROUNDS, deadline: Deadline = NEVER
 ) -> float:
-    """What no motion from any of `starts` (s, nq) to any configuration of `pose` can go below [J].
+    """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration of `pose`.
 
-    Fewer rounds, or a deadline, give a weaker bound.
+    Fewer rounds, or a deadline, give a weaker bound. For a chain without inner joints the bound is that of motions to
+    anywhere.
     """
-    family = _Family(prepared, pose)
-    side = np.pi / FIRST_BOXES
-    centres = np.array(list(product(-np.pi + side * (2 * np.arange(FIRST_BOXES) + 1), repeat=INNER)))
-    origin = np.repeat(np.arange(len(starts)), len(centres))
-    centres = np.tile(centres, (len(starts), 1))
-    halves = np.full_like(centres, side)
-    potential_gains = np.array([prepared.potential(q) for q in starts])
-    value = family.bounds(starts[origin], potential_gains[origin], centres, halves)
-    for _ in range(rounds):
-        # what holds no configuration is let go
-        kept = np.isfinite(value)
-        origin, centres, halves, value = origin[kept], centres[kept], halves[kept], value[kept]
-        order = np.argsort(value, kind="stable")
-        worst, rest = order[:SPLIT], order[SPLIT:]
-        if not len(order) or halves[order[0]].max() < SMALLEST or deadline.passed:
-            break
-        # the side that blurs the fourth joint's place most
-        widest = (halves[worst] * family.arms).argmax(axis=1)
-        step = np.zeros((len(worst), INNER))
-        step[np.arange(len(worst)), widest] = halves[worst, widest] / 2
-        parents = np.concatenate([worst, worst])
-        fresh = np.concatenate([centres[worst] - step, centres[worst] + step])
-        smaller = halves[parents] - np.concatenate([step, step])
-        # a part's bound is at least the whole's
-        bounds = family.bounds(starts[origin[parents]], potential_gains[origin[parents]], fresh, smaller)
-        value = np.concatenate([value[rest], np.maximum(bounds, value[parents])])
-        origin = np.concatenate([origin[rest], origin[parents]])
-        centres, halves = np.concatenate([centres[rest], fresh]), np.concatenate([halves[rest], smaller])
-    return float(value.min(initial=np.inf))
+    geometry = WristGeometry.of(prepared.arm)
+    if geometry is None:
+        gain = least_potential(prepared.arm) - np.array([prepared.potential(q) for q in starts])
+        return float(_Bound(prepared).of(np.zeros_like(starts), gain).min())
+    return _BoxSearch(_Family(prepared, pose, geometry), starts).run(rounds, deadline)
+
+
+@dataclass(frozen=True)
+class _Boxes:
+    """Boxes of inner joint positions: `start` (b,) the index of each one's start, middle and half sides (b, inner)
+    [rad], and the bound (b,) [J], inf for a box without configurations."""
+
+    start: Indices
+    centre: Array
+    half: Array
+    value: Array
+
+    def __getitem__(self, chosen: Indices) -> _Boxes:
+        return _Boxes(self.start[chosen], self.centre[chosen], self.half[chosen], self.value[chosen])
+
+    def joined(self, other: _Boxes) -> _Boxes:
+        """These boxes, then the others."""
+        return _Boxes(
+            np.concatenate([self.start, other.start]),
+            np.concatenate([self.centre, other.centre]),
+            np.concatenate([self.half, other.half]),
+            np.concatenate([self.value, other.value]),
+        )
+
+
+class _BoxSearch:
+    """Branch and bound over boxes for one family of goal configurations."""
+
+    def __init__(self, family: _Family, starts: Array) -> None:
+        self.family, self.starts = family, starts
+        self.potentials = np.array([family.prepared.potential(q) for q in starts])
+
+    def run(self, rounds: int, deadline: Deadline) -> float:
+        """The least bound [J] of any box after at most so many rounds of splitting."""
+        boxes = self.first()
+        for _ in range(rounds):
+            boxes = boxes[np.flatnonzero(np.isfinite(boxes.value))]
+            order = np.argsort(boxes.value, kind="stable")
+            if not len(order) or boxes.half[order[0]].max() < SMALLEST or deadline.passed:
+                break
+            boxes = boxes[order[SPLIT:]].joined(self.halved(boxes[order[:SPLIT]]))
+        return float(boxes.value.min(initial=np.inf))
+
+    def first(self) -> _Boxes:
+        """Boxes that cover every position of the inner joints, for every start."""
+        side, count = np.pi / FIRST_BOXES, len(self.starts)
+        one_side = -np.pi + side * (2 * np.arange(FIRST_BOXES) + 1)
+        centres = np.array(list(product(one_side, repeat=self.family.geometry.inner)))
+        start = np.repeat(np.arange(count), len(centres))
+        return self.bounded(start, np.tile(centres, (count, 1)), np.full((len(start), centres.shape[1]), side))
+
+    def halved(self, boxes: _Boxes) -> _Boxes:
+        """Both halves of every box, split along the side that moves the wrist most."""
+        widest = (boxes.half * self.family.geometry.levers).argmax(axis=1)
+        rows = np.arange(len(widest))
+        step = np.zeros_like(boxes.half)
+        step[rows, widest] = boxes.half[rows, widest] / 2
+        start = np.concatenate([boxes.start, boxes.start])
+        centre = np.concatenate([boxes.centre - step, boxes.centre + step])
+        halves = self.bounded(start, centre, np.concatenate([boxes.half - step, boxes.half - step]))
+        # the bound of a part is at least that of the whole
+        value = np.maximum(halves.value, np.concatenate([boxes.value, boxes.value]))
+        return _Boxes(halves.start, halves.centre, halves.half, value)
+
+    def bounded(self, start: Indices, centre: Array, half: Array) -> _Boxes:
+        """The boxes with their bounds."""
+        return _Boxes(start, centre, half, self.family.bounds(self.starts[start], self.potentials[start], centre, half))
+
+
+@dataclass(frozen=True)
+class _Bound:
+    """`lower_bounds` of a problem for motions of which only the least displacement and potential gain are known."""
+
+    prepared: PreparedProblem
+
+    def of(self, displacement: Array, potential_gain: Array) -> Array:
+        """Bounds (b,) [J] for joint displacements (b, nq) [rad] and gains of potential energy (b,) [J], or more."""
+        if self.prepared.problem.objective == "mechanical":
+            potential_gain = np.maximum(potential_gain, 0.0)  # that bound is |gain|, of which zero is the least
+        return lower_bounds(self.prepared, displacement, potential_gain, np.full_like(potential_gain, self._hold))[0]
+
+    @cached_property
+    def _hold(self) -> float:
+        """Least power [W] to stand still: with no torque to hold."""
+        return float(holding_power(self.prepared.arm, np.zeros(self.prepared.arm.robot.nq)))
 
 
 @dataclass(frozen=True)
@@ -90,130 +147,43 @@ class _Family:
 
     prepared: PreparedProblem
     pose: ConeOrientedPose
+    geometry: WristGeometry
+
+    @cached_property
+    def _shells(self) -> list[Shell]:
+        return self.geometry.shells(self.pose)
+
+    @cached_property
+    def _bodies(self) -> list[WristBody]:
+        return self.geometry.bodies(self.pose)
+
+    @cached_property
+    def _bound(self) -> _Bound:
+        return _Bound(self.prepared)
 
     def bounds(self, starts: Array, potentials: Array, centres: Array, halves: Array) -> Array:
-        """Bounds (b,) [J] on motions from starts (b, nq) into boxes (b, 3); inf where a box holds no configuration."""
-        wrist, height = self._placed(centres)
-        blur = halves @ self.arms
+        """Bounds (b,) [J] on motions from starts (b, nq), of potential energy (b,) [J], into boxes (b, inner).
+
+        inf for a box that holds no configuration.
+        """
+        wrist, lowest = self.geometry.placed(centres)
+        blur = halves @ self.geometry.levers
         value = np.full(len(centres), np.inf)
         inside = np.ones(len(centres), dtype=bool)
-        for place, least, most in self._shells:
-            distance = np.linalg.norm(wrist - place, axis=1)
-            inside &= (distance - blur <= most) & (distance + blur >= least)
-        if inside.any():
-            away = starts[inside, :INNER] - centres[inside]
-            away = np.abs(away - 2 * np.pi * np.round(away / (2 * np.pi)))
-            displacement = np.zeros((int(inside.sum()), starts.shape[1]))
-            displacement[:, :INNER] = np.maximum(away - halves[inside], 0.0)
-            lowest = height[inside] - halves[inside] @ self._leverage
-            hanging = -wrist[inside] @ self._gravity - blur[inside] * np.linalg.norm(self._gravity)
-            for mass, from_wrist, floor in self._wrist_bodies:
-                # as low as it can hang from the fourth joint, and as low as it can be about the goal
-                lowest += mass * np.maximum(hanging - from_wrist * np.linalg.norm(self._gravity), floor)
-            potential_gain = lowest - potentials[inside]
-            if self.prepared.problem.objective == "mechanical":
-                potential_gain = np.maximum(potential_gain, 0.0)  # that bound is |potential_gain|, which is no less
-            hold = np.full_like(potential_gain, self._least_hold)
-            value[inside], _ = lower_bounds(self.prepared, displacement, potential_gain, hold)
+        for shell in self._shells:
+            distance = np.linalg.norm(wrist - shell.centre, axis=1)
+            inside &= (distance - blur <= shell.most) & (distance + blur >= shell.least)
+        if not inside.any():
+            return value
+        inner, strength = self.geometry.inner, float(np.linalg.norm(self.geometry.gravity))
+        away = starts[inside, :inner] - centres[inside]
+        away = np.abs(away - 2 * np.pi * np.round(away / (2 * np.pi)))
+        displacement = np.zeros((int(inside.sum()), starts.shape[1]))
+        displacement[:, :inner] = np.maximum(away - halves[inside], 0.0)
+        lowest = lowest[inside] - halves[inside] @ self.geometry.potential_rates
+        hanging = -wrist[inside] @ self.geometry.gravity - blur[inside] * strength
+        for body in self._bodies:
+            # as low as it can hang from the wrist, and as low as it can be about the goal
+            lowest += body.mass * np.maximum(hanging - body.reach * strength, body.least_potential)
+        value[inside] = self._bound.of(displacement, lowest - potentials[inside])
         return value
-
-    @cached_property
-    def _least_hold(self) -> float:
-        """What standing still draws at least [W]: with no torque to hold."""
-        return float(holding_power(self.prepared.arm, np.zeros(self.prepared.problem.arm.robot.nq)))
-
-    @property
-    def _gravity(self) -> Array:
-        return np.asarray(self.prepared.problem.arm.gravity)
-
-    @cached_property
-    def _placements(self) -> Array:
-        return joint_placements(self.prepared.model)
-
-    @cached_property
-    def arms(self) -> Array:
-        """How far the fourth joint's origin is from each of the first three at most [m]."""
-        lengths = np.linalg.norm(self._placements[1 : INNER + 1, :3, 3], axis=1)
-        return np.asarray(np.cumsum(lengths[::-1])[::-1])
-
-    @cached_property
-    def _leverage(self) -> Array:
-        """How fast the potential energy of the first three links can change with each of their joints [N·m]."""
-        lengths = np.linalg.norm(self._placements[1:INNER, :3, 3], axis=1)
-        weights = np.zeros(INNER)
-        for k in range(INNER):
-            body = self.prepared.model.inertias[k + 1]
-            for j in range(k + 1):
-                weights[j] += body.mass * (float(np.linalg.norm(body.lever)) + float(lengths[j:k].sum()))
-        return weights * float(np.linalg.norm(self._gravity))
-
-    def _placed(self, q: Array) -> tuple[Array, Array]:
-        """Origin of the fourth joint (b, 3) [m], and potential energy of the first three links (b,) [J]."""
-        T = np.tile(np.eye(4), (len(q), 1, 1))
-        height = np.zeros(len(q))
-        for j in range(INNER):
-            T = T @ self._placements[j] @ _about_z(q[:, j])
-            body = self.prepared.model.inertias[j + 1]
-            height -= body.mass * (T[:, :3, :3] @ body.lever + T[:, :3, 3]) @ self._gravity
-        return (T @ self._placements[INNER])[:, :3, 3], height
-
-    @cached_property
-    def _tool(self) -> tuple[Array, Array]:
-        """T_last_tcp (4, 4), and the TCP's chain: lengths [m] from the fourth joint to the fifth and to the sixth."""
-        lengths = np.linalg.norm(self._placements[INNER + 1 :, :3, 3], axis=1)
-        return T_last_tcp(self.prepared.problem.arm), np.asarray(lengths)
-
-    @cached_property
-    def _shells(self) -> list[tuple[Array, float, float]]:
-        """Points (3,) [m], and how near to each and how far from it the fourth joint's origin must lie [m].
-
-        A point on the tool's axis at s from the TCP lies within 2 |s| sin(half_angle / 2) of its place with the axis
-        along the direction. Turning the fourth joint does not change its distance from that joint's origin.
-        """
-        T_last_tcp, lengths = self._tool
-        angles = 2 * np.pi * np.arange(REACH_ANGLES) / REACH_ANGLES
-        fifth = self._placements[INNER + 1] @ _about_z(angles) @ self._placements[INNER + 2]
-        shells = []
-        for s in ANCHORS if self.pose.half_angle < np.pi / 2 else (0.0,):
-            anchor = T_last_tcp[:3, 3] + s * (T_last_tcp[:3, :3] @ self.pose.axis)
-            turned = np.append(anchor, 1.0) @ _about_z(angles).transpose(0, 2, 1)
-            reach = np.linalg.norm((turned @ fifth.transpose(0, 2, 1))[..., :3], axis=-1)
-            length = float(np.linalg.norm(anchor))
-            slack = np.pi / REACH_ANGLES * (2 * length + float(lengths[1])) + 1e-9
-            slack += 2 * abs(s) * float(np.sin(self.pose.half_angle / 2))
-            place = self.pose.position + s * self.pose.direction
-            shells.append((place, float(reach.min()) - slack, float(reach.max()) + slack))
-        return shells
-
-    @cached_property
-    def _wrist_bodies(self) -> list[tuple[float, float, float]]:
-        """Per body beyond the fourth joint: mass [kg], farthest from that joint [m], least potential about the goal
-        [J/kg]."""
-        T_last_tcp, lengths = self._tool
-        g, strength = self._gravity, float(np.linalg.norm(self._gravity))
-        tcp = float(np.linalg.norm(T_last_tcp[:3, 3]))
-        bodies = [self.prepared.model.inertias[k] for k in range(INNER + 1, self.prepared.problem.arm.robot.nq + 1)]
-        levers = [float(np.linalg.norm(body.lever)) for body in bodies]
-        at_goal = -float(self.pose.position @ g)
-        # the last body stands still in the TCP frame: along the axis it cannot turn further than the cone lets it
-        offset = T_last_tcp[:3, :3].T @ (bodies[-1].lever - T_last_tcp[:3, 3])
-        along = float(offset @ self.pose.axis)
-        across = float(np.linalg.norm(offset - along * self.pose.axis))
-        turn = 2 * float(np.sin(self.pose.half_angle / 2))
-        upright = -along * float(self.pose.direction @ g) - strength * (abs(along) * turn + across)
-        floors = [
-            at_goal - strength * (levers[0] + float(lengths.sum()) + tcp),
-            at_goal - strength * (levers[1] + float(lengths[1]) + tcp),
-            at_goal + max(upright, -strength * float(np.linalg.norm(offset))),
-        ]
-        from_wrist = [levers[k] + float(lengths[:k].sum()) for k in range(len(bodies))]
-        return [(body.mass, far, floor) for body, far, floor in zip(bodies, from_wrist, floors, strict=True)]
-
-
-def _about_z(angle: Array) -> Array:
-    """Rotations (n, 4, 4) about z."""
-    T = np.tile(np.eye(4), (len(angle), 1, 1))
-    T[:, 0, 0] = T[:, 1, 1] = np.cos(angle)
-    T[:, 1, 0] = np.sin(angle)
-    T[:, 0, 1] = -T[:, 1, 0]
-    return T

@@ -1,4 +1,4 @@
-"""Lower bounds: what no motion of any shape and any allowed duration between two configurations can go below.
+"""Lower bounds on the objective of all motions, of any shape and any allowed duration, between two configurations.
 
 Each term below is proven in its function's docstring; their sum is minimised over the duration.
 """
@@ -25,9 +25,8 @@ def lower_bounds(
     """Bounds (P,) on the problem's objective [J] and least durations (P,) [s] for candidates.
 
     displacement (P, nq) [rad] is goal - start, potential_gain (P,) [J] the gain of potential energy, `hold` (P,) [W]
-    what holding the
-    goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds the longest allowed one has
-    the bound inf.
+    the power that holding the goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds
+    the longest allowed one has the bound inf.
 
     Waiting draws constant - power · T on each of its linear pieces (see `optimizer.energy.dwell`): there it is a
     constant and a power less for every second of the motion, and the least over the pieces is a bound for all
@@ -58,10 +57,10 @@ def mechanical(potential_gain: Array) -> Array:
 def _least_drawn(
     prepared: PreparedProblem, displacement: Array, potential_gain: Array, t_min: Array, t_max: Array, waiting: Array
 ) -> Array:
-    """`electrical`, and besides what is drawn even where all of the motion's work comes for nothing.
+    """The greater of `electrical` and the energy drawn by a motion without any work.
 
-    Where the supply takes nothing back and there is no store, drawn power is never negative; on an isolated bus it is
-    never less than the electronics', for which the joints' surplus does nothing.
+    If the supply takes nothing back and there is no energy storage, the drawn power is never negative. On an isolated
+    bus it is never less than that of the electronics, because they cannot use the joints' surplus.
     """
     arm = prepared.arm
     bound = electrical(prepared, displacement, potential_gain, t_min, t_max, waiting)
@@ -93,9 +92,8 @@ def electrical(
     friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
     The Coulomb part is at least coulomb · |displacement|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
     ∫ g'(h) m(h) dh, ∫ m(h) dh ≥ |displacement|, and m(h) ≤ T - 2 t(h), where t(h) ≥ h / a_max (and half a jerk ramp
-    more
-    above half its speed) is the least time from rest to speed h and back. As g' grows, the least integral fills m up to
-    its limit from h = 0 on, until the displacement is reached at h = c:
+    more above half its speed) is the least time from rest to speed h and back. As g' grows, the least integral fills m
+    up to its limit from h = 0 on, until the displacement is reached at h = c:
 
         |displacement| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
 

@@ -15,12 +15,13 @@ from models.robot import Array
 from optimizer.energy.plant import Plant
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable
 from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.optimize import optimize
 from optimizer.problem.arm import Arm
 from optimizer.problem.bus import Bus
 from optimizer.replay.evaluate import MOST_SEGMENTS, Evaluation, evaluate
 from optimizer.replay.recording import BLOCK, Log, LogBlock, Waypoints, in_blocks
 from optimizer.trajectories.time_scalings import quintic
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits
+from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem
 
 VIA = START + np.array([-0.4, 0.3, 0.5, -0.6, 0.8, 0.2])
 POINTS = np.array([START, VIA, GOAL])
@@ -208,7 +209,15 @@ def test_energy_storage_keeps_its_charge_from_segment_to_segment() -> None:
     assert use.charged == pytest.approx(sum(each.charged for each in uses if each is not None))
     assert use.charged > 0
     assert result.total.balance_error < 1e-6
-    assert result.samples is not None and result.samples.charge[-1] == pytest.approx(use.final)
+    assert result.samples is not None and result.samples.charge is not None
+    assert result.samples.charge[-1] == pytest.approx(use.final)
+
+
+def test_without_a_store_there_is_no_charge() -> None:
+    """As in an answer of `optimize`."""
+    samples = evaluate(ARM, motion("quintic"), sample_period=0.01).samples
+    assert samples is not None and samples.charge is None
+    assert optimize(problem()).trajectory.charge is None
 
 
 def test_too_many_segments_to_list_are_still_counted() -> None:

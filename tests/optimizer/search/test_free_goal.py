@@ -34,6 +34,7 @@ from optimizer.search.lower_bound import lower_bounds
 from optimizer.search.run import RESERVE
 from optimizer.solution import Solution
 from optimizer.trajectories import bspline
+from tests.optimizer.chains import serial_chain
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
 
@@ -259,6 +260,24 @@ def test_the_bound_holds_for_the_whole_family(half_angle: float, given: dict[str
         values = [family_bound(PreparedProblem.of(task), pose, start[None], rounds) for rounds in (0, 5, 20)]
         assert values == sorted(values)
         assert values[-1] <= bound_of_samples(task, pose, 150)
+
+
+@pytest.mark.parametrize("nq", [2, 3, 4, 5, 7])
+@pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 5.0}], ids=str)
+def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
+    """It is below the bound of a configuration that reaches the pose, also for chains without inner joints."""
+    robot, rng = serial_chain(nq), np.random.default_rng(nq)
+    for half_angle in (0.0, 0.3, np.pi):
+        start, goal = rng.uniform(-3, 3, (2, nq))
+        made = PreparedProblem.of(problem(start, goal, robot=robot, payload=Payload(mass=0.5), **given))
+        data = robot.model.createData()
+        pin.framesForwardKinematics(robot.model, data, goal)
+        T = data.oMf[robot.model.getFrameId("flange")].homogeneous
+        pose = ConeOrientedPose(T[:3, 3], [0, 1, 1], T[:3, :3] @ np.array([0, 1, 1]), half_angle)
+        displacement = (goal - start) - 2 * np.pi * np.round((goal - start) / (2 * np.pi))
+        gain = np.array([made.potential(goal) - made.potential(start)])
+        value = family_bound(made, pose, start[None], 5)
+        assert np.isfinite(value) and value <= lower_bounds(made, displacement[None], gain)[0][0]
 
 
 def test_the_bound_tells_far_from_near() -> None:
