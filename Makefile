@@ -58,7 +58,7 @@ $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
 	@$(INSTALL) -r $<
 	@touch $@
 
-# The peers that the benchmarks compare with, on top of the runtime.
+# The other planners that the benchmarks compare with, on top of the runtime.
 $(VENV)/.benchmarks: requirements-benchmarks.lock $(VENV)/.runtime
 	@echo "Installing $< into $(VENV) ..."
 	@$(INSTALL) -r $<

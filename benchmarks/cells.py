@@ -1,7 +1,7 @@
 """Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls, cages of bars.
 
-PreparedProblem `index` of a seed is the first of the draws of (seed, index) that can be solved: neither end hits
-anything, and a planner with ample time finds a way between them.
+Task `index` of a seed is the first draw of (seed, index) that has a solution: start and goal are collision-free, and
+the path planner finds a path between them in AMPLE seconds.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from optimizer.problem.scene import Box, Capsule, Cylinder, Obstacle, Scene, Sha
 
 Cell = Literal["table", "shelf", "bin", "cage"]
 CELLS: tuple[Cell, ...] = ("table", "shelf", "bin", "cage")
-# kept away from everything that is drawn [m], and how long a way is looked for [s]
+# margin of every obstacle [m], and longest time for the path planner [s]
 MARGIN, AMPLE = 0.01, 5.0
 # a gripper 10 cm long, and where it grips
 TOOL = capsule_between(np.zeros(3), np.array([0.0, 0.0, 0.1]), 0.03)
@@ -35,9 +35,9 @@ GRIP = 0.15
 
 @dataclass(frozen=True)
 class CellTask:
-    """From q_start (nq,) to a TCP pose T_goal (4, 4), one configuration of which is q_goal; `draws` until it was found.
+    """From q_start (nq,) [rad] to the TCP pose T_goal (4, 4), which q_goal reaches; found at draw number `draws`.
 
-    `blocked`: the straight line between the configurations hits something.
+    `blocked`: the straight line in joint space between q_start and q_goal collides.
     """
 
     seed: int
@@ -52,12 +52,12 @@ class CellTask:
 
     @property
     def name(self) -> str:
-        """Where to find it again."""
+        """Seed, index and kind of cell."""
         return f"seed {self.seed} index {self.index} ({self.cell})"
 
 
 def cell_task(seed: int, index: int) -> CellTask:
-    """PreparedProblem `index` of a seed; the kinds of cells take turns."""
+    """Task `index` of a seed; the kinds of cells take turns."""
     cell = CELLS[index % len(CELLS)]
     table = Obstacle("table", Box(np.array([2.0, 2.0, 0.04])), _at(0, 0, -0.03))
     for draw in count():
@@ -72,7 +72,7 @@ def cell_task(seed: int, index: int) -> CellTask:
         if not from_ or not to:
             continue
         q_start = from_[int(rng.integers(len(from_)))]
-        # the nearest configuration of the goal that can be come to
+        # the nearest configuration of the goal to which there is a path
         for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
             if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, model=model):
                 blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
@@ -86,7 +86,7 @@ def cell_tasks(seed: int, number: int) -> Iterator[CellTask]:
 
 
 def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
-    """Configurations (nq,) of a TCP pose that hit nothing."""
+    """Collision-free configurations (nq,) [rad] of a TCP pose."""
     kinematics = required_inverse_kinematics(arm.robot, "goal")
     try:
         found = kinematics.solve(T, arm.T_flange_tcp, arm.active_limits, windings=False, target="goal")
@@ -99,7 +99,7 @@ Draw = tuple[list[Obstacle], Callable[[], Array], Callable[[], Array]]
 
 
 def _on_table(rng: np.random.Generator) -> Draw:
-    """Three to nine things of any shape that stand or lie on the table."""
+    """Three to nine objects of any shape on the table."""
     things = []
     for number in range(int(rng.integers(3, 10))):
         size, kind = rng.uniform([0.05, 0.05, 0.1], [0.2, 0.2, 0.5]), int(rng.integers(4))

@@ -1,4 +1,4 @@
-"""The robot's chain cut short or made longer, to see how cost grows with degrees of freedom."""
+"""Robots with a shortened or extended chain, to measure the growth of times with the degrees of freedom."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ T = TypeVar("T", Limits, Drives, FrictionLaw)
 
 
 def chain(robot: Robot, count: int) -> Robot:
-    """The robot with its first `count` joints; beyond its own, the last joint and link are repeated, turned.
+    """The robot with its first `count` joints. If it has fewer, its last joint and link are repeated with another axis.
 
-    The links of joints left out stay, rigid in their zero position, at the last joint that is left.
+    Links of omitted joints stay fixed, in their zero position, at the last remaining joint.
     """
     model = _cut(robot, count) if count <= robot.nq else _extended(robot, count)
     laws = {name: _resized(law, count) for name, law in robot.friction_laws.items()}
@@ -40,7 +40,7 @@ def _extended(robot: Robot, count: int) -> pin.Model:
     model = pin.Model()
     for k in range(1, count + 1):
         own = min(k, base.njoints - 1)
-        # the copies turn about an axis across the last joint's, a flange's length further on
+        # each copy rotates about an axis perpendicular to the last joint's, one flange length further out
         across = flange * pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0.0, 0.0), np.zeros(3))
         placement = base.jointPlacements[own] if k == own else across
         joint = model.addJoint(k - 1, pin.JointModelRZ(), placement, f"joint_{k}")
@@ -51,11 +51,11 @@ def _extended(robot: Robot, count: int) -> pin.Model:
     return model
 
 
-def _resized(figures: T, count: int) -> T:
-    """The same figures for another number of joints."""
-    values = {field.name: getattr(figures, field.name) for field in fields(figures)}
+def _resized(parameters: T, count: int) -> T:
+    """The same parameters for another number of joints."""
+    values = {field.name: getattr(parameters, field.name) for field in fields(parameters)}
     arrays: dict[str, Any] = {name: _sized(v, count) for name, v in values.items() if isinstance(v, np.ndarray)}
-    return replace(figures, **arrays)
+    return replace(parameters, **arrays)
 
 
 def _sized(values: Array, count: int) -> Array:

@@ -1,4 +1,4 @@
-"""What an answer of the service must hold, looked at from outside: certificate, ends, limits, energy, baselines."""
+"""Checks of the service's answers from outside: certificate, start and goal, limits, energy, baselines."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.motion import SplineMotion, limit_shares
+from benchmarks.motion import SplineMotion, worst_ratios
 from benchmarks.tasks import flange
 from models.registry import load_robot
 from models.robot import Array, Limits
@@ -17,33 +17,33 @@ from optimizer.problem.problem import Problem
 
 # as the contract has them
 RATIO, REACH, BALANCE = 1 + 1e-6, 1e-6, 1e-3
-# two durations are the same within this share; a baseline is better only beyond what quadrature leaves open
+# relative: two durations within SAME are equal; a baseline needs less energy only beyond SLACK, the quadrature error
 SAME, SLACK = 1e-9, 1e-6
 LIMITS = ("position", "velocity", "acceleration", "jerk", "torque")
 PARTS = ("idle", "potential", "kinetic", "friction", "copper", "inverter", "braking", "recovered")
 
 
-def identity_error(answer: dict[str, Any]) -> float:
-    """Sum of the energy's parts against its total, relative."""
+def balance_error(answer: dict[str, Any]) -> float:
+    """|sum of the energy's parts - total| / |total|."""
     electrical = answer["energy"]["electrical"]
     return float(abs(sum(electrical[part] for part in PARTS) - electrical["total"]) / abs(electrical["total"]))
 
 
 def objective(answer: dict[str, Any]) -> float:
-    """The energy that was minimised [J]."""
+    """The energy of the objective [J]."""
     return float(answer["energy"][answer["objective"]]["total"])
 
 
-def faults(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> list[str]:
-    """Everything wrong with an answer, in words; T_start, T_goal (4, 4) are the flange poses asked for."""
-    return [*_certificate_faults(answer), *_replay_faults(body, answer, T_start, T_goal), *_energy_faults(body, answer)]
+def errors_found(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> list[str]:
+    """A message for every error in an answer; T_start and T_goal (4, 4) are the flange poses of the request."""
+    return [*_certificate_errors(answer), *_replay_errors(body, answer, T_start, T_goal), *_energy_errors(body, answer)]
 
 
-def _certificate_faults(answer: dict[str, Any]) -> Iterator[str]:
+def _certificate_errors(answer: dict[str, Any]) -> Iterator[str]:
     certificate = answer["certificate"]
     for name in LIMITS:
         ratio = certificate["worst_ratio"][name]
-        # written so that NaN, here and below, is a fault
+        # written so that NaN is an error, here and below
         if ratio is None or not ratio <= RATIO:
             yield f"certificate: {name} ratio {ratio}"
     for end in ("start_error", "goal_error"):
@@ -55,33 +55,33 @@ def _certificate_faults(answer: dict[str, Any]) -> Iterator[str]:
             yield f"certificate: {name} {certificate[name]}"
 
 
-def _replay_faults(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> Iterator[str]:
-    """The returned spline against the request, without a look at the certificate."""
+def _replay_errors(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> Iterator[str]:
+    """Checks the returned spline against the request, without the certificate."""
     robot = load_robot(answer["robot"])
     spline = answer["trajectory"]["spline"]
     points = np.array(spline["control_points"])
     motion = SplineMotion(np.array(spline["knots"]), points, spline["degree"])
     if abs(motion.duration - answer["duration"]) > SAME * motion.duration:
-        yield f"the spline lasts {motion.duration}, the answer says {answer['duration']}"
+        yield f"duration {answer['duration']} s, but the spline has {motion.duration} s"
     for name, q, T, asked in (
         ("start", points[0], T_start, body["start"]),
         ("goal", points[-1], T_goal, body["goal"]),
     ):
         reached = flange(robot, q)
         error = float(np.linalg.norm(reached[:3, 3] - T[:3, 3]))
-        turn = float(np.linalg.norm(pin.log3(np.ascontiguousarray(T[:3, :3].T @ reached[:3, :3]))))
+        rotation = float(np.linalg.norm(pin.log3(np.ascontiguousarray(T[:3, :3].T @ reached[:3, :3]))))
         joints = float(np.abs(q - asked["q"]).max()) if "q" in asked else 0.0
-        if not max(error, turn, joints) <= REACH:
-            yield f"replay: {name} is {error:.2g} m, {turn:.2g} rad, joints {joints:.2g} rad off"
-    for name, share in limit_shares(problem_of(body), motion).items():
-        if not share <= RATIO:
-            yield f"replay: {name} ratio {share}"
+        if not max(error, rotation, joints) <= REACH:
+            yield f"replay: {name} is off by {error:.2g} m, {rotation:.2g} rad, joints by {joints:.2g} rad"
+    for name, ratio in worst_ratios(problem_of(body), motion).items():
+        if not ratio <= RATIO:
+            yield f"replay: {name} ratio {ratio}"
 
 
-def _energy_faults(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str]:
-    error, energy = identity_error(answer), answer["energy"]
+def _energy_errors(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str]:
+    error, energy = balance_error(answer), answer["energy"]
     if not error <= BALANCE:
-        yield f"energy identity off by {error:.2g}"
+        yield f"energy balance is off by {error:.2g} of the total"
     total, bound, gap = objective(answer), energy["lower_bound"], energy["optimality_gap"]
     if not bound <= total * (1 + SLACK):
         yield f"lower bound {bound} above the energy {total}"
@@ -89,11 +89,11 @@ def _energy_faults(body: dict[str, Any], answer: dict[str, Any]) -> Iterator[str
         yield f"optimality gap {gap} is not 1 - {bound} / {total}"
     for baseline in answer["baselines"]:
         if beats(body, answer, baseline):
-            yield f"{baseline['name']} is within limits and spends {-baseline['saving']:.3%} less"
+            yield f"{baseline['name']} is within limits and needs {-baseline['saving']:.3%} less energy"
 
 
 def beats(body: dict[str, Any], answer: dict[str, Any], baseline: dict[str, Any]) -> bool:
-    """Whether a baseline is within limits, takes a duration that the request allows, and spends less than ours."""
+    """Whether a baseline is within limits, has an allowed duration, and needs less energy than the answer."""
     if not baseline["within_limits"]:
         return False
     least, most = allowed(body.get("duration"))
@@ -106,7 +106,7 @@ def beats(body: dict[str, Any], answer: dict[str, Any], baseline: dict[str, Any]
 
 
 def allowed(duration: Any) -> tuple[float, float]:
-    """Least and most that a request lets a motion take [s]."""
+    """Shortest and longest duration that a request allows [s]."""
     if duration is None:
         return 0.0, np.inf
     if isinstance(duration, dict):
@@ -115,7 +115,7 @@ def allowed(duration: Any) -> tuple[float, float]:
 
 
 def problem_of(body: dict[str, Any]) -> Problem:
-    """What a request of `benchmarks.tasks` asks, but for its targets."""
+    """The problem of a request of `benchmarks.tasks`, with other targets."""
     robot = load_robot(body["robot"])
     given = body.get("limits", {})
     limits: Limits = robot.limits.tightened(

@@ -1,4 +1,4 @@
-"""What the benchmarks' commands share: one thread, and figures as JSON for the report."""
+"""Shared by the benchmarks' commands: one thread for linear algebra, common options, results as JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def on_one_core() -> None:
-    """Start this process anew unless its linear algebra keeps to one thread; has to come before any measurement."""
+    """Restarts this process if its linear algebra may use several threads. Call it before any measurement."""
     if any(os.environ.get(name) != "1" for name in THREADS):
         os.environ.update(dict.fromkeys(THREADS, "1"))
         sys.stdout.flush()
@@ -22,14 +22,15 @@ def on_one_core() -> None:
 
 
 def parser(description: str | None, seed: int = 0) -> argparse.ArgumentParser:
-    """A parser with what every command takes."""
+    """A parser with the options that every command has: `--seed` and `--json`."""
     result = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    result.add_argument("--seed", type=int, default=seed, help="of the tasks (%(default)s)")
-    result.add_argument("--json", type=Path, help="also write the figures here")
+    result.add_argument("--seed", type=int, default=seed, help="seed of the tasks (%(default)s)")
+    result.add_argument("--json", type=Path, help="also write the results to this file")
     return result
 
 
-def keep(path: Path | None, figures: dict[str, Any]) -> None:
-    """Write figures as JSON, if a path is given."""
+def write_json(path: Path | None, results: dict[str, Any]) -> None:
+    """Writes results as JSON. Does nothing if `path` is None."""
     if path is not None:
-        path.write_bytes(orjson.dumps(figures, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(orjson.dumps(results, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_INDENT_2))

@@ -1,4 +1,4 @@
-"""The peers side by side on the same tasks: one table, one plot of time against energy."""
+"""Comparison of planners on the same tasks: one table, and one plot of energy over time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from models.robot import Array
 
 WHOLE = "joulepath, whole answer"
 PLOT = "time_against_energy.png"
-HELD = 1e-3  # by which a motion may exceed a limit and still count as holding it, in the table
+WITHIN = 1e-3  # largest relative excess over a limit at which a motion counts as within limits
 # Okabe and Ito's palette, which colour-blind readers can tell apart; joulepath's own in one colour
 OURS = "#D55E00"
 COLOURS = ["#0072B2", "#56B4E9", "#009E73", "#CC79A7", "#E69F00", "#000000", "#999999"]
@@ -22,51 +22,51 @@ MARKERS = "osD^vPX*<"
 
 @dataclass(frozen=True)
 class Row:
-    """One peer: times (n,) [s], energies (n,) [J] and worst shares (n,) of a limit, NaN where it found no motion."""
+    """One planner: times (n,) [s], energies (n,) [J] and largest ratios (n,) value / limit; NaN without a motion."""
 
     title: str
     versions: str
     what: str
     wall: Array
     energy: Array
-    share: Array
+    ratio: Array
     duration: Array
     ours: bool
 
     @property
-    def held(self) -> Array:
-        """Energies of the motions that hold all limits, else NaN."""
-        return np.where(self.share <= 1 + HELD, self.energy, np.nan)
+    def feasible(self) -> Array:
+        """Energies (n,) [J] of the motions within all limits, else NaN."""
+        return np.where(self.ratio <= 1 + WITHIN, self.energy, np.nan)
 
 
 @dataclass(frozen=True)
-class Peers:
-    """All peers on the same tasks; `best` (n,) is the least energy that any motion within limits had [J]."""
+class Comparison:
+    """All planners on the same tasks; `best` (n,) [J] is the least energy of any motion within limits."""
 
     rows: list[Row]
     best: Array
     seed: int
 
     @staticmethod
-    def of(figures: dict[str, dict[str, Any]]) -> Peers:
-        """From the figures that `python -m benchmarks.peers` writes."""
-        count = min((len(found["rows"]) for found in figures.values()), default=0)
-        rows = [_row(name, found, count) for name, found in figures.items()]
+    def of(results: dict[str, dict[str, Any]]) -> Comparison:
+        """From the results that `python -m benchmarks.planners` writes."""
+        count = min((len(found["rows"]) for found in results.values()), default=0)
+        rows = [_row(name, found, count) for name, found in results.items()]
         best = np.full(count, np.inf)
         for row in rows:
-            best = np.fmin(best, row.held)
-        return Peers(rows, best, next((found["seed"] for found in figures.values()), 0))
+            best = np.fmin(best, row.feasible)
+        return Comparison(rows, best, next((found["seed"] for found in results.values()), 0))
 
     def above(self, row: Row) -> Array:
-        """How much a peer's motions spend above the best, whether they hold the limits or not."""
+        """Relative excess (n,) of a planner's energies over the best, within limits or not."""
         return row.energy / self.best - 1
 
-    def told(self) -> str:
-        """The section of the report."""
+    def formatted(self) -> str:
+        """The section of the report in Markdown."""
         reference = next((row for row in self.rows if row.title == WHOLE), None)
         header = [
-            "", "time p50", "p95", "found", "hold limits", "worst share of a limit",
-            "energy above the best: median", "p95", "duration, median",
+            "planner", "time: median [ms]", "95th percentile [ms]", "solved [%]", "within limits [%]",
+            "largest value / limit", "energy above the best: median [%]", "95th percentile [%]", "duration: median [s]",
         ]  # fmt: skip
         lines = [header, ["---"] * len(header)]
         for row in self.rows:
@@ -74,50 +74,51 @@ class Peers:
             lines.append(
                 [
                     f"**{row.title}**" if row.ours else row.title,
-                    f"{np.median(row.wall) * 1e3:.1f} ms",
-                    f"{np.percentile(row.wall, 95) * 1e3:.1f} ms",
-                    f"{np.isfinite(row.energy).mean():.0%}",
-                    f"{np.isfinite(row.held).mean():.0%}",
+                    f"{np.median(row.wall) * 1e3:.1f}",
+                    f"{np.percentile(row.wall, 95) * 1e3:.1f}",
+                    f"{100 * np.isfinite(row.energy).mean():.0f}",
+                    f"{100 * np.isfinite(row.feasible).mean():.0f}",
                     _worst(row),
-                    f"{np.nanmedian(above):+.2%}",
-                    f"{np.nanpercentile(above, 95):+.2%}",
-                    f"{np.nanmedian(row.duration):.2f} s",
+                    f"{100 * np.nanmedian(above):+.2f}",
+                    f"{100 * np.nanpercentile(above, 95):+.2f}",
+                    f"{np.nanmedian(row.duration):.2f}",
                 ]
             )
-        text = "## Peers\n\n"
+        text = "## Other planners\n\n"
         text += (
-            f"{len(self.best)} joint-to-joint tasks (seed {self.seed}), all limits of the robot, duration free, one "
-            "core each, in the same run. Energies are computed for all by the same exact formulas on a grid of 1 ms, "
-            f"limits checked there too; a motion holds them when it exceeds none by more than {HELD:.1%}. The best is, "
-            "task by task, the least energy of any motion here that holds all limits.\n\n"
+            f"{len(self.best)} joint-to-joint tasks (seed {self.seed}), all limits of the robot, free duration, one "
+            "core each, in the same run. The same exact formulas give all energies on a grid of 1 ms, on which the "
+            f"limits are checked, too. A motion is within limits if it exceeds none of them by more than {WITHIN:.1%}. "
+            "The best is the least energy of any motion within limits, task by task.\n\n"
         )
         text += "\n".join(f"| {' | '.join(line)} |" for line in lines)
-        text += f"\n\n![Time to compute against energy above the best]({PLOT})\n\n"
+        text += f"\n\n![Energy above the best over the time to compute]({PLOT})\n\n"
         text += "\n".join(f"- {row.title} ({row.versions}): {row.what}." for row in self.rows)
         return text if reference is None else text + "\n\n" + self._losses(reference)
 
     def _losses(self, reference: Row) -> str:
-        """Where our whole answer loses."""
+        """Tasks on which another planner is faster or needs less energy within limits."""
         lines = []
         for row in self.rows:
             if row.ours:
                 continue
-            saved = 1 - row.held / reference.energy
+            saved = 1 - row.feasible / reference.energy
             faster = int((row.wall < reference.wall).sum())
-            cheaper = int((saved > 1e-6).sum())
-            if not faster and not cheaper:
+            less = int((saved > 1e-6).sum())
+            if not faster and not less:
                 continue
-            by = f", by at most {np.nanmax(saved):.2%}" if cheaper else ""
-            lines.append(f"- {row.title}: faster on {faster}, less energy within limits on {cheaper}{by}.")
+            by = f", by at most {np.nanmax(saved):.2%}" if less else ""
+            lines.append(f"- {row.title}: faster on {faster}, less energy within limits on {less}{by}.")
         if not lines:
-            return "joulepath's whole answer loses to no peer on any task."
-        return f"Where joulepath's whole answer loses, of {len(self.best)} tasks:\n\n" + "\n".join(lines)
+            return "No planner is faster, or needs less energy within limits, on any task."
+        head = f"Tasks, of {len(self.best)}, on which another planner is better than joulepath's whole answer:"
+        return head + "\n\n" + "\n".join(lines)
 
 
 def _row(name: str, found: dict[str, Any], count: int) -> Row:
     def column(field: str, missing: float) -> Array:
         values = [row.get(field, np.nan) for row in found["rows"][:count]]
-        # JSON knows no infinity
+        # JSON has no infinity
         return np.array([missing if value is None else value for value in values], dtype=float)
 
     return Row(
@@ -126,7 +127,7 @@ def _row(name: str, found: dict[str, Any], count: int) -> Row:
         what=found["what"],
         wall=column("wall", np.nan),
         energy=column("energy", np.nan),
-        share=column("worst", np.inf),
+        ratio=column("worst", np.inf),
         duration=column("duration", np.nan),
         ours=found["versions"] == "this repository",
     )
@@ -135,29 +136,29 @@ def _row(name: str, found: dict[str, Any], count: int) -> Row:
 def _worst(row: Row) -> str:
     if not np.isfinite(row.energy).any():
         return ""
-    most = np.nanmax(row.share)
-    return f"{most:.4f}" if np.isfinite(most) else "jerk unbounded"
+    most = np.nanmax(row.ratio)
+    return f"{most:.4f}" if np.isfinite(most) else "unbounded jerk"
 
 
-def draw(peers: Peers, path: Path) -> None:
-    """Medians with their middle halves, and every task as a dot; hollow where limits are broken."""
+def draw(planners: Comparison, path: Path) -> None:
+    """Plots medians with quartiles, and every task as a dot; a hollow marker means that limits are violated."""
     figure = Figure(figsize=(9, 6), layout="constrained")
     axes = figure.subplots()
     colours = iter(COLOURS)
-    for row, marker in zip(peers.rows, MARKERS, strict=False):
+    for row, marker in zip(planners.rows, MARKERS, strict=False):
         colour = OURS if row.ours else next(colours)
-        above = 100 * peers.above(row)
+        above = 100 * planners.above(row)
         known = np.isfinite(above)
         if not known.any():
             continue
         wall, above = 1e3 * row.wall[known], above[known]
         axes.scatter(wall, above, s=10, color=colour, alpha=0.3, linewidth=0, marker=marker)
         x, y = np.percentile(wall, [25, 50, 75]), np.percentile(above, [25, 50, 75])
-        holds = bool((row.share[known] <= 1 + HELD).all())
+        within = bool((row.ratio[known] <= 1 + WITHIN).all())
         axes.errorbar(
             x[1], y[1], xerr=[[x[1] - x[0]], [x[2] - x[1]]], yerr=[[y[1] - y[0]], [y[2] - y[1]]],
-            color=colour, marker=marker, markersize=9, markerfacecolor=colour if holds else "white",
-            linewidth=1, label=row.title + ("" if holds else " (breaks limits)"), zorder=3,
+            color=colour, marker=marker, markersize=9, markerfacecolor=colour if within else "white",
+            linewidth=1, label=row.title + ("" if within else " (violates limits)"), zorder=3,
         )  # fmt: skip
     axes.set(xscale="log", xlabel="time to compute [ms]", ylabel="energy above the best motion found [%]")
     axes.set_yscale("symlog", linthresh=1)
@@ -168,7 +169,7 @@ def draw(peers: Peers, path: Path) -> None:
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     figure.suptitle(
-        f"Time against energy, {len(peers.best)} random joint-to-joint tasks, one core: medians and middle halves",
+        f"Time against energy, {len(planners.best)} random joint-to-joint tasks, one core: medians and quartiles",
         fontsize=10,
     )
     figure.savefig(path, dpi=150)

@@ -20,7 +20,7 @@ import numpy as np
 import orjson
 
 from benchmarks.cells import cell_task
-from benchmarks.command import keep, on_one_core, parser
+from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.tasks import collision_free, flange
 from models.registry import load_robot
 from models.robot import Array
@@ -146,7 +146,7 @@ def main() -> int:
         rows.append(row := solve(given.seed, index))
         found = row["outcome"] if row["energy"] is None else f"{row['energy']:.6f} J, {row['outcome']}"
         print(f"{index:4d} {row['kind']:14s} {found}, {row['wall']:.2f} s", flush=True)
-    keep(given.json, {"seed": given.seed, "tasks": rows})
+    write_json(given.json, {"seed": given.seed, "tasks": rows})
     if given.compare is None:
         return 0
     stored = orjson.loads(given.compare.read_bytes())

@@ -1,6 +1,6 @@
-"""The service under steady load: clients that each send their next request as soon as the last is answered.
+"""The service under steady load: each client sends its next request as soon as the last one is answered.
 
-Then a burst of more requests than workers and queue can take, all at once: those beyond must be refused with 503.
+Then a burst: more simultaneous requests than workers and queue can take. The service must refuse the excess with 503.
 """
 
 from __future__ import annotations
@@ -15,41 +15,41 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.command import keep, parser
-from benchmarks.figures import Spread
+from benchmarks.command import parser, write_json
 from benchmarks.service import Client, Service, resident, running
-from benchmarks.tasks import ask
+from benchmarks.statistics import Spread
+from benchmarks.tasks import request_task
 
-PERIOD = 1.0  # between two looks at memory [s]
-BURST = 40  # requests at once
+PERIOD = 1.0  # between two measurements of memory [s]
+BURST = 40  # simultaneous requests
 VALID = b'"certificate"'
 
 
 @dataclass
 class Record:
-    """What the clients saw; `waiting` is the most requests under way at once."""
+    """Results of all clients: wall times [s], statuses, lost requests, and most simultaneous requests."""
 
     walls: list[float] = field(default_factory=list)
     statuses: Counter[int] = field(default_factory=Counter)
     lost: list[str] = field(default_factory=list)
-    under_way: int = 0
-    most_under_way: int = 0
+    in_flight: int = 0
+    most_in_flight: int = 0
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def exchange(self, client: Client, body: dict[str, Any]) -> None:
-        """One request."""
+        """Sends one request and records its result."""
         with self.lock:
-            self.under_way += 1
-            self.most_under_way = max(self.most_under_way, self.under_way)
+            self.in_flight += 1
+            self.most_in_flight = max(self.most_in_flight, self.in_flight)
         try:
             answer = client.optimize(body)
-        except Exception as error:  # whatever it is, the answer is lost
+        except Exception as error:  # any failure loses the answer
             with self.lock:
                 self.lost.append(repr(error))
             return
         finally:
             with self.lock:
-                self.under_way -= 1
+                self.in_flight -= 1
         with self.lock:
             valid = answer.status != 200 or VALID in answer.raw
             self.statuses[answer.status if valid else -1] += 1
@@ -57,7 +57,7 @@ class Record:
 
 
 def steady(service: Service, seed: int, clients: int, seconds: float) -> dict[str, Any]:
-    """`clients` for some time; each has tasks of its own."""
+    """Results of `clients` clients over `seconds`, each with tasks of its own."""
     record, end = Record(), time.perf_counter() + seconds
     workers = service.worker_pids()
     memory: list[float] = []
@@ -65,7 +65,7 @@ def steady(service: Service, seed: int, clients: int, seconds: float) -> dict[st
     def one(number: int) -> None:
         client, index = service.client(), number
         while time.perf_counter() < end:
-            record.exchange(client, ask(seed, index).body)
+            record.exchange(client, request_task(seed, index).body)
             index += clients
 
     threads = [threading.Thread(target=one, args=(number,)) for number in range(clients)]
@@ -84,7 +84,7 @@ def steady(service: Service, seed: int, clients: int, seconds: float) -> dict[st
         "per_second": len(record.walls) / elapsed,
         "statuses": {str(status): count for status, count in record.statuses.items()},
         "lost": record.lost,
-        "most_under_way": record.most_under_way,
+        "most_in_flight": record.most_in_flight,
         "wall": Spread.of(record.walls),
         "memory": memory,
         "memory_first": float(np.median(memory[quarter : 2 * quarter] or memory)),
@@ -96,8 +96,8 @@ def steady(service: Service, seed: int, clients: int, seconds: float) -> dict[st
 
 
 def burst(service: Service, seed: int) -> dict[str, Any]:
-    """BURST requests at once."""
-    bodies = [ask(seed, index).body for index in range(BURST)]
+    """Results of BURST simultaneous requests."""
+    bodies = [request_task(seed, index).body for index in range(BURST)]
 
     def one(body: dict[str, Any]) -> tuple[int, bool]:
         answer = service.client().optimize(body)
@@ -108,31 +108,32 @@ def burst(service: Service, seed: int) -> dict[str, Any]:
     return {
         "sent": BURST,
         "statuses": {str(s): n for s, n in Counter(status for status, _ in answers).items()},
-        "refusals_say_when": all(told for status, told in answers if status == 503),
+        "refusals_have_retry_after": all(named for status, named in answers if status == 503),
     }
 
 
 def main() -> None:
-    """Load, then burst."""
+    """Runs the load, then the burst."""
     arguments = parser(__doc__, seed=7)
-    arguments.add_argument("--clients", type=int, default=8, help="at a time (%(default)s)")
-    arguments.add_argument("--seconds", type=float, default=60.0, help="how long (%(default)s)")
+    arguments.add_argument("--clients", type=int, default=8, help="clients (%(default)s)")
+    arguments.add_argument("--seconds", type=float, default=60.0, help="duration [s] (%(default)s)")
     given = arguments.parse_args()
     with running() as service:
-        figures = steady(service, given.seed, given.clients, given.seconds)
-        figures["burst"] = burst(service, given.seed)
-    wall = figures["wall"]
+        results = steady(service, given.seed, given.clients, given.seconds)
+        results["burst"] = burst(service, given.seed)
+    wall = results["wall"]
     print(
-        f"{figures['clients']} clients for {figures['seconds']:.0f} s: {figures['answers']} answers, "
-        f"{figures['per_second']:.1f} per second, {figures['statuses']}, lost {figures['lost'] or 'none'}"
+        f"{results['clients']} clients for {results['seconds']:.0f} s: {results['answers']} answers, "
+        f"{results['per_second']:.1f} per second, {results['statuses']}, lost {results['lost'] or 'none'}"
     )
-    print(f"wall {wall.times(1e3).told(' ms', 0)}, p99 {wall.p99 * 1e3:.0f} ms = {wall.p99 / wall.p50:.1f} × p50")
+    print(f"wall {wall.times(1e3).formatted(' ms', 0)}")
+    print(f"99th percentile {wall.p99 * 1e3:.0f} ms = {wall.p99 / wall.p50:.1f} × median")
     print(
-        f"memory of {figures['processes']} processes, MiB: second quarter {figures['memory_first']:.0f}, "
-        f"last {figures['memory_last']:.0f}; same processes throughout: {figures['same_workers']}"
+        f"memory of {results['processes']} processes, MiB: second quarter {results['memory_first']:.0f}, "
+        f"last {results['memory_last']:.0f}; same processes throughout: {results['same_workers']}"
     )
-    print(f"burst: {figures['burst']}")
-    keep(given.json, figures)
+    print(f"burst: {results['burst']}")
+    write_json(given.json, results)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What a run was made on and with."""
+"""Machine and package versions of a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PACKAGES = ("casadi", "daqp", "numpy", "scipy", "pin", "fastapi", "uvicorn", "ru
 
 
 def cpu() -> str:
-    """The processor's model name, as the system has it."""
+    """The processor's model name, from the operating system."""
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("model name"):
             return line.partition(":")[2].strip()

@@ -1,4 +1,4 @@
-"""The methods against each other on random moves: energies relative to `bspline`, and what they took.
+"""Comparison of the methods on random motions: energies relative to `bspline`, and processor times.
 
 `python -m benchmarks.methods --count 20 --seed 0`
 """
@@ -18,13 +18,13 @@ from optimizer.optimize import optimize, warm_up
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import MethodName, Problem
 
-# within half a turn of zero, as the paper's poses are [rad]
+# joints are within half a turn of zero, as in the paper's poses [rad]
 RANGE = np.pi
 DEADLINE = 60.0
 
 
 def measure(count: int, seed: int) -> dict[MethodName, list[tuple[float, float]]]:
-    """(energy [J], processor time [s]) of every method on `count` random moves; NaN where there is no motion."""
+    """(energy [J], processor time [s]) of every method on `count` random motions; NaN without a motion."""
     robot = load_robot("ur5e")
     compile_kernel(robot)
     warm_up(robot.name)
@@ -50,21 +50,24 @@ def measure(count: int, seed: int) -> dict[MethodName, list[tuple[float, float]]
 
 
 def main() -> None:
-    """Print the table."""
+    """Prints the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
     table = measure(given.count, given.seed)
     best = np.array([energy for energy, _ in table["bspline"]])
-    print("| method | solved | energy over `bspline`, median | greatest | processor time, median | greatest |")
+    print(
+        "| method | solved | energy above `bspline`: median [%] | maximum [%] "
+        "| processor time: median [s] | maximum [s] |"
+    )
     print("| --- | --- | --- | --- | --- | --- |")
     for method, rows in table.items():
         energy, took = np.array(rows).T
         over = energy / best - 1
         print(
-            f"| `{method}` | {int(np.isfinite(energy).sum())} of {given.count} | {np.nanmedian(over):+.2%} | "
-            f"{np.nanmax(over):+.2%} | {np.median(took):.3f} s | {took.max():.3f} s |"
+            f"| `{method}` | {int(np.isfinite(energy).sum())} of {given.count} | {100 * np.nanmedian(over):+.2f} | "
+            f"{100 * np.nanmax(over):+.2f} | {np.median(took):.3f} | {took.max():.3f} |"
         )
 
 

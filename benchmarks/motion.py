@@ -1,4 +1,4 @@
-"""Motions of any origin on one fine grid: exact energy and the share of every limit that they use."""
+"""Motions of any planner on one fine grid: exact energy, and the ratio of every value to its limit."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from optimizer.problem.problem import Problem
 from optimizer.solution import Energy
 from optimizer.trajectories.limit_ratios import limit_ratios
 
-PERIOD = 1e-3  # of the fine grid, at most [s]
+PERIOD = 1e-3  # largest period of the fine grid [s]
 
 
 class Motion(Protocol):
-    """A motion that can be sampled."""
+    """A motion of any planner, as a function of time."""
 
     @property
     def duration(self) -> float:
-        """Its length [s]."""
+        """Duration [s]."""
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """q, v, a and jerk (k, nq) at times t (k,); no jerk where acceleration jumps, which makes it unbounded."""
+        """q, v, a and jerk (k, nq) at times t (k,) [s]; jerk is None if the acceleration is discontinuous."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class SplineMotion:
 
     @property
     def duration(self) -> float:
-        """Its length [s]."""
+        """Duration [s]."""
         return float(self.knots[-1] - self.knots[0])
 
     @cached_property
@@ -49,14 +49,17 @@ class SplineMotion:
         return BSpline(self.knots, self.control_points, self.degree)
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """As `Motion` has it."""
+        """See `Motion.sample`."""
         curve = self._curve
         return curve(t), curve(t, 1), curve(t, 2), curve(t, 3)
 
 
 @dataclass(frozen=True)
 class Replay:
-    """A motion on the fine grid: its energy, the worst share of each limit, and how far its ends are off [rad]."""
+    """A motion on the fine grid: duration [s], energy, and the largest value / limit per kind of limit.
+
+    `end_error` [rad] is the largest joint error at start and goal.
+    """
 
     duration: float
     energy: Energy
@@ -65,38 +68,38 @@ class Replay:
 
     @property
     def worst(self) -> float:
-        """The greatest share of any limit."""
+        """The largest value / limit."""
         return max(self.ratios.values())
 
 
 def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> Replay:
-    """Evaluate a motion between two configurations (nq,) by Pinocchio and the exact energy formulas."""
+    """Evaluates a motion between two configurations (nq,) [rad] by Pinocchio and the exact energy formulas."""
     t, weights = fine_grid(motion.duration)
     q, v, a, jerk = motion.sample(t)
     tau = torques(problem, q, v, a)
     model, data = _model(problem)
-    climb = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
-    energy = breakdown(weights, v, tau, climb[1] - climb[0], problem.arm)
+    potential = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
+    energy = breakdown(weights, v, tau, potential[1] - potential[0], problem.arm)
     ends = max(float(np.abs(q[0] - q_start).max()), float(np.abs(q[-1] - q_goal).max()))
-    return Replay(motion.duration, energy, _shares(problem, q, v, a, jerk, tau), ends)
+    return Replay(motion.duration, energy, _ratios(problem, q, v, a, jerk, tau), ends)
 
 
-def limit_shares(problem: Problem, motion: Motion) -> dict[str, float]:
-    """The worst value / limit on the fine grid, per kind of limit."""
+def worst_ratios(problem: Problem, motion: Motion) -> dict[str, float]:
+    """The largest value / limit on the fine grid, per kind of limit."""
     t, _ = fine_grid(motion.duration)
     q, v, a, jerk = motion.sample(t)
-    return _shares(problem, q, v, a, jerk, torques(problem, q, v, a))
+    return _ratios(problem, q, v, a, jerk, torques(problem, q, v, a))
 
 
 def torques(problem: Problem, q: Array, v: Array, a: Array) -> Array:
-    """Rigid body and rotor torques (k, nq) by Pinocchio."""
+    """Torques (k, nq) [N·m] of rigid bodies and rotors by Pinocchio."""
     model, data = _model(problem)
     rows = zip(*(np.ascontiguousarray(each) for each in (q, v, a)), strict=True)
     return np.array([pin.rnea(model, data, *row) for row in rows])
 
 
 def fine_grid(duration: float) -> tuple[Array, Array]:
-    """Times (k,) [s], both ends included, and the weights (k,) [s] of Simpson's rule over them."""
+    """Times (k,) [s] including 0 and the duration, and the weights (k,) [s] of Simpson's rule."""
     pairs = max(math.ceil(duration / PERIOD / 2), 50)
     t = np.linspace(0.0, duration, 2 * pairs + 1)
     weights = np.full(len(t), 2.0)
@@ -110,6 +113,6 @@ def _model(problem: Problem) -> tuple[pin.Model, pin.Data]:
     return model, model.createData()
 
 
-def _shares(problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array) -> dict[str, float]:
+def _ratios(problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array) -> dict[str, float]:
     jerk = np.full_like(a, np.inf) if jerk is None else jerk
     return limit_ratios(problem.arm.active_limits, q, v, a, jerk, tau + problem.arm.friction_law.torque(v))

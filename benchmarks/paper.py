@@ -1,4 +1,4 @@
-"""The founding paper's three tables next to ours: writes them into docs/paper.md, between its markers.
+"""Comparison of the founding paper's three tables with this model; written into docs/paper.md between its markers.
 
     python -m benchmarks.paper            # writes the page
     python -m benchmarks.paper --print    # prints what it would write
@@ -32,9 +32,9 @@ BEGIN, END = "<!-- made by python -m benchmarks.paper -->", "<!-- end of what it
 REFERENCE = ROOT / "tests" / "reference"
 
 SECONDS = 1.5
-"""Of the motion from home to a configuration, and of the way back."""
+"""Duration [s] of the motion from home to a configuration, and of the motion back."""
 TOLERANCE = 0.10
-"""Within which a row of Table 3 counts as proportional to ours."""
+"""Relative deviation from a common factor within which a row of Table 3 counts as proportional to our power."""
 
 # Universal Robots, "DH parameters for calculations of kinematics and dynamics": a, d [m], alpha
 ALPHA = (np.pi / 2, 0, 0, np.pi / 2, -np.pi / 2, 0)
@@ -45,7 +45,7 @@ UR5_MASSES = np.array([3.7, 8.393, 2.33, 1.219, 1.219, 0.1879])
 
 
 def table(name: str) -> Array:
-    """A table of the paper as printed."""
+    """The numbers of a table of the paper."""
     return np.asarray(np.loadtxt(REFERENCE / f"paper_{name}.csv", delimiter=",", skiprows=1), dtype=float)
 
 
@@ -85,7 +85,7 @@ def older_links() -> Array:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How Table 3 goes with our powers: rank correlation, and the factor that most rows share within TOLERANCE."""
+    """Agreement of Table 3 with our powers: rank correlation, and the factor common to most rows within TOLERANCE."""
 
     rank_correlation: float
     factor: float
@@ -94,9 +94,9 @@ class Agreement:
 
     @staticmethod
     def of(ours: Array, theirs: Array) -> Agreement:
-        """Looks at every factor at which a row enters or leaves the band; `needed` is the band of twelve rows."""
+        """Tries every factor at which a row enters or leaves the band; `needed` is the tolerance for twelve rows."""
         ratios = theirs / ours
-        # a hair inside, so that the row at the edge counts
+        # 1e-9 of slack, so that a row on the edge of the band counts
         factors = np.concatenate([ratios / (1 - TOLERANCE), ratios / (1 + TOLERANCE)])
         inside = [int((np.abs(ratios / factor - 1) <= TOLERANCE * (1 + 1e-9)).sum()) for factor in factors]
         best = np.flatnonzero(np.array(inside) == max(inside))
@@ -139,7 +139,7 @@ def _head(*names: str) -> list[str]:
 
 
 def table_1() -> list[str]:
-    """Poses, and what both geometries make of Table 2."""
+    """Table 1 beside the poses of Table 2's configurations, with the geometries of UR5 and UR5e."""
     asked = poses()
     reached = {
         name: [forward(geometry, q) for q in configurations()] for name, geometry in (("UR5", UR5), ("UR5e", UR5E))
@@ -170,7 +170,7 @@ def table_1() -> list[str]:
 
 
 def table_2() -> list[str]:
-    """Waypoints, and ours that reaches the same pose exactly and is nearest."""
+    """Table 2 beside the nearest configurations that reach the poses of Table 1 exactly."""
     robot = load_robot("ur5e")
     solver = required_inverse_kinematics(robot, "pose")
 
@@ -180,7 +180,7 @@ def table_2() -> list[str]:
     def cells(k: int) -> list[str]:
         q = configurations()[k]
         solutions = solver.solve(poses()[k])
-        # a full turn more or less is the same posture
+        # configurations that differ by full turns are equal here
         apart = [(solution.q - q + np.pi) % (2 * np.pi) - np.pi for solution in solutions]
         best = int(np.argmin([np.abs(each).max() for each in apart]))
         branch = str(solutions[best].label).split(" ")[0]
@@ -191,7 +191,7 @@ def table_2() -> list[str]:
 
 
 def table_3() -> list[str]:
-    """Power, and what it is proportional to."""
+    """Table 3 beside our mean powers, and the ratios of the two."""
     theirs = table("table3_power")[:, 1]
     arms = {
         "UR5e": powers(Arm(robot=load_robot("ur5e"))),
@@ -228,7 +228,7 @@ def table_3() -> list[str]:
 
 
 def savings() -> list[str]:
-    """The paper's motion to each configuration against ours, and against what the controller does by default."""
+    """Energies of the paper's motion to each configuration, of ours, and of the controller's default."""
 
     def saved(ours: float, theirs: float) -> str:
         return f"{100 * (1 - ours / theirs):.1f}"
@@ -265,7 +265,7 @@ def savings() -> list[str]:
 
 
 def made() -> str:
-    """All tables, as they stand in the page."""
+    """All tables as Markdown."""
     parts = {
         "Table 1: poses": table_1(),
         "Table 2: configurations": table_2(),
@@ -276,7 +276,7 @@ def made() -> str:
 
 
 def page(text: str, tables: str) -> str:
-    """The page with the tables in their place. Raises ValueError where a marker is missing."""
+    """The page with new tables. Raises ValueError if a marker is missing."""
     head, rest = text.split(BEGIN, 1)
     _, tail = rest.split(END, 1)
     return f"{head}{BEGIN}\n{tables}\n{END}{tail}"

@@ -1,13 +1,13 @@
-"""Energy of the answers against the best of many starts on a fine grid, from `benchmarks.reference`."""
+"""Energy of the answers relative to the references of `benchmarks.reference`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from benchmarks.command import keep, on_one_core, parser
-from benchmarks.figures import Spread
+from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.reference import FILE, fingerprint, load
+from benchmarks.statistics import Spread
 from benchmarks.tasks import move
 from models.registry import load_robot
 from optimizer.energy.kernel_cache import compile_kernel
@@ -18,7 +18,7 @@ from optimizer.problem.problem import Problem
 
 
 def main() -> None:
-    """Answer every task that has a reference, and compare."""
+    """Solves every task that has a reference, and compares the energies."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
     arguments.add_argument("--reference", type=Path, default=FILE, help="the stored references (%(default)s)")
@@ -28,10 +28,10 @@ def main() -> None:
     compile_kernel(robot)
     reference = load(given.reference)
     if reference["fingerprint"] != fingerprint(robot):
-        raise SystemExit("The robot's figures have changed: renew the references by python -m benchmarks.reference")
+        raise SystemExit("The robot's parameters have changed: renew the references by python -m benchmarks.reference")
     rows: list[dict[str, Any]] = []
     for row in reference["tasks"][: given.count]:
-        if row["energy"] is None:  # no start led anywhere
+        if row["energy"] is None:  # no start has a motion
             continue
         task = move(reference["seed"], row["index"])
         try:
@@ -44,7 +44,7 @@ def main() -> None:
         excess, fine_excess = energy / row["energy"] - 1, energy / row["fine"] - 1
         rows.append({"index": task.index, "energy": energy, "excess": excess, "fine_excess": fine_excess})
     worst = sorted(rows, key=lambda row: row["excess"], reverse=True)
-    figures = {
+    results = {
         "seed": reference["seed"],
         "count": len(rows),
         "starts": reference["starts"],
@@ -58,11 +58,11 @@ def main() -> None:
         "within_three_percent": sum(row["excess"] <= 0.03 for row in rows) / len(rows),
         "worst": worst[:5],
     }
-    print(f"energy above the best of {figures['starts']} starts: {figures['excess'].times(100).told(' %', 2)}")
-    print(f"above the same polished on a finer grid: {figures['fine_excess'].times(100).told(' %', 2)}")
-    print(f"within 1 %: {figures['within_one_percent']:.0%}, within 3 %: {figures['within_three_percent']:.0%}")
+    print(f"energy above the best of {results['starts']} starts: {results['excess'].times(100).formatted(' %', 2)}")
+    print(f"above the references refined on a finer grid: {results['fine_excess'].times(100).formatted(' %', 2)}")
+    print(f"within 1 %: {results['within_one_percent']:.0%}, within 3 %: {results['within_three_percent']:.0%}")
     print(f"worst: {[(row['index'], round(row['excess'], 4)) for row in worst[:5]]}")
-    keep(given.json, figures)
+    write_json(given.json, results)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,13 @@
-"""What the least energy of seeded tasks is, at great length: many starts on a fine grid, by two independent solvers.
+"""Reference energies of seeded tasks: the best of many starts on a fine grid, by two independent solvers.
 
     python -m benchmarks.reference            writes benchmarks/reference_energies.json, in about half an hour
 
-Interrupted, it goes on where it was when it is started again.
+A run that was interrupted continues when it is started again.
 
-For every task: joulepath's own SQP from STARTS first guesses (the straight line and random bulges around it) on POINTS
-control points, IPOPT from a few more on the same spline, its motions then polished by the SQP so that they hold limits
-between the nodes as well, and the best of all polished once more on twice as many spans. All under the limits and the
-free duration that requests have. `make bench` compares answers with the stored figures.
+Each task is solved by joulepath's SQP from STARTS initial guesses (the straight line and random perturbations of it) on
+POINTS control points, and by IPOPT from IPOPT_STARTS initial guesses on the same spline. The SQP then refines IPOPT's
+motions, so that they satisfy the limits between the nodes, too. Finally it refines the best motion on twice as many
+spans. Limits are those of the robot, and the duration is free. `make bench` compares answers with the stored energies.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 import orjson
 
 from benchmarks.command import on_one_core, parser
-from benchmarks.peers.casadi_opti import CasadiOptiGrid
+from benchmarks.planners.casadi_opti import CasadiOptiGrid
 from benchmarks.tasks import Move, move
 from models.registry import load_robot
 from models.robot import Array, Robot
@@ -41,15 +41,15 @@ FILE = Path(__file__).with_name("reference_energies.json")
 SEED, TASKS = 1, 100
 STARTS, POINTS = 64, 25
 IPOPT_STARTS = 4
-FINE_POINTS = 45  # spans half as long as POINTS'
-MODES = 3  # half waves of which a bulge is made
-BULGES = (0.1, 1.5)  # least and greatest standard deviation of a bulge's waves [rad]
-PATIENCE = 60.0  # for one start [s]
+FINE_POINTS = 45  # spans of half the length
+MODES = 3  # half waves of a perturbation
+PERTURBATIONS = (0.1, 1.5)  # least and largest standard deviation of the waves' amplitudes [rad]
+PATIENCE = 60.0  # longest time for one start [s]
 
 
-def bulge(rng: np.random.Generator, space: bspline.Basis, nq: int) -> Array:
-    """What a first guess's free control points (m, nq) are moved by: waves that vanish at the ends."""
-    size = np.exp(rng.uniform(*np.log(BULGES)))
+def perturbation(rng: np.random.Generator, space: bspline.Basis, nq: int) -> Array:
+    """Random displacement (m, nq) [rad] of an initial guess's free control points: waves that vanish at both ends."""
+    size = np.exp(rng.uniform(*np.log(PERTURBATIONS)))
     at = bspline.greville(space.knots)[space.free]
     waves = np.sin(np.pi * np.outer(at, np.arange(1, MODES + 1)))
     return np.asarray(waves @ (rng.normal(size=(MODES, nq)) * (size / np.arange(1, MODES + 1)[:, None])))
@@ -61,32 +61,29 @@ def _opti() -> CasadiOptiGrid:
 
 
 class Search:
-    """One task's best motion so far, by the exact energy [J]."""
+    """The best motion found for one task, and its exact energy [J]."""
 
     def __init__(self, task: Move) -> None:
-        self.move, self.task = (
-            task,
-            PreparedProblem.of(
-                Problem(arm=Arm(robot=load_robot("ur5e"), collisions=False), start=task.q_start, goal=task.q_goal)
-            ),
-        )
+        arm = Arm(robot=load_robot("ur5e"), collisions=False)
+        self.move = task
+        self.prepared = PreparedProblem.of(Problem(arm=arm, start=task.q_start, goal=task.q_goal))
         self.best: Spline | None = None
         self.energy = np.inf
 
     def improve(self, guess: Guess) -> float:
-        """The energy from a first guess, inf where it leads nowhere; kept if it is the least."""
+        """The energy [J] reached from an initial guess, inf without a motion. The best motion is stored."""
         deadline = Deadline.after(PATIENCE)
-        spline = FreeSpline(self.task, self.move.q_start, self.move.q_goal, deadline).improve(guess).spline
+        spline = FreeSpline(self.prepared, self.move.q_start, self.move.q_goal, deadline).improve(guess).spline
         if spline is None:
             return float("inf")
-        energy = self.task.energy(spline).electrical.total
+        energy = self.prepared.energy(spline).electrical.total
         if energy < self.energy:
             self.best, self.energy = spline, energy
         return energy
 
 
 def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, Any]:
-    """The figures of one task."""
+    """The results for one task; energies in J."""
     task = move(seed, index)
     found, space = Search(task), bspline.uniform(POINTS)
     nq = len(task.q_start)
@@ -96,15 +93,15 @@ def search(seed: int, starts: int, ipopt_starts: int, index: int) -> dict[str, A
     def guess(points: Array) -> Guess:
         return Guess(space, points, 0.0)
 
-    def bulged() -> Array:
+    def perturbed() -> Array:
         points = straight.copy()
-        points[space.free] += bulge(rng, space, nq)
-        limits = found.task.problem.arm.active_limits
+        points[space.free] += perturbation(rng, space, nq)
+        limits = found.prepared.problem.arm.active_limits
         return np.clip(points, limits.q_min, limits.q_max)
 
     from_line = found.improve(guess(straight))
-    energies = [from_line, *(found.improve(guess(bulged())) for _ in range(starts - 1))]
-    by_ipopt = [_ipopt(found, bulged() - straight if k else None) for k in range(ipopt_starts)]
+    energies = [from_line, *(found.improve(guess(perturbed())) for _ in range(starts - 1))]
+    by_ipopt = [_ipopt(found, perturbed() - straight if k else None) for k in range(ipopt_starts)]
     least = found.energy
     if found.best is not None:
         fine = bspline.uniform(FINE_POINTS)
@@ -134,13 +131,13 @@ def _ipopt(found: Search, moved: Array | None) -> float:
 
 
 def fingerprint(robot: Robot) -> str:
-    """Hash of the figures that energies and limits depend on: references hold for these alone."""
+    """Hash of the robot's parameters that energies and limits depend on: references are valid for these only."""
     friction = next(iter(robot.friction_laws.values()))
-    figures = {
+    parameters = {
         k: v for part in (robot.limits, robot.drives, friction, robot.electronics) for k, v in vars(part).items()
     }
-    # the names bear no figure, and the ranges of the joints bind no motion between two configurations within them
-    parts = [np.atleast_1d(v) for k, v in figures.items() if k not in ("name", "q_min", "q_max")]
+    # names are no parameters, and joint ranges do not limit a motion between two configurations within them
+    parts = [np.atleast_1d(v) for k, v in parameters.items() if k not in ("name", "q_min", "q_max")]
     parts += [placement.homogeneous.ravel() for placement in robot.model.jointPlacements]
     parts += [body.toDynamicParameters() for body in robot.model.inertias]
     text = " ".join(f"{value:.9g}" for value in np.round(np.concatenate(parts), 12).tolist())
@@ -148,19 +145,19 @@ def fingerprint(robot: Robot) -> str:
 
 
 def load(path: Path = FILE) -> dict[str, Any]:
-    """The stored references."""
+    """The stored reference energies."""
     content: dict[str, Any] = orjson.loads(path.read_bytes())
     return content
 
 
 def main() -> None:
-    """Search and store."""
+    """Solves the tasks and stores the results."""
     arguments = parser(__doc__, seed=SEED)
     arguments.add_argument("--count", type=int, default=TASKS, help="tasks (%(default)s)")
-    arguments.add_argument("--starts", type=int, default=STARTS, help="first guesses of the SQP (%(default)s)")
+    arguments.add_argument("--starts", type=int, default=STARTS, help="initial guesses of the SQP (%(default)s)")
     arguments.add_argument("--ipopt-starts", type=int, default=IPOPT_STARTS, help="and of IPOPT (%(default)s)")
-    arguments.add_argument("--processes", type=int, default=2, help="at a time (%(default)s)")
-    arguments.add_argument("--output", type=Path, default=FILE, help="where to (%(default)s)")
+    arguments.add_argument("--processes", type=int, default=2, help="processes (%(default)s)")
+    arguments.add_argument("--output", type=Path, default=FILE, help="file to write (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
@@ -175,8 +172,8 @@ def main() -> None:
         "fine_control_points": FINE_POINTS,
     }
     before = load(given.output) if given.output.exists() else {}
-    goes_on = {name: before.get(name) for name in settings} == settings
-    rows: list[dict[str, Any]] = before["tasks"] if goes_on else []
+    continued = {name: before.get(name) for name in settings} == settings
+    rows: list[dict[str, Any]] = before["tasks"] if continued else []
     done = {row["index"] for row in rows}
     one: Callable[[int], dict[str, Any]] = partial(search, given.seed, given.starts, given.ipopt_starts)
     with multiprocessing.get_context("spawn").Pool(given.processes) as pool:

@@ -1,32 +1,31 @@
-"""benchmarks/RESULTS.md from the sections' figures: the bars first, then what lies behind them, then the peers."""
+"""benchmarks/RESULTS.md from the results of the sections: requirements, distributions, growth, other planners."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
-from benchmarks.comparison import PLOT, Peers, draw
+from benchmarks.comparison import PLOT, Comparison, draw
+from benchmarks.requirements import MS, PERCENT, Results, requirements
 from benchmarks.service import ROOT
 
 RESULTS = ROOT / "benchmarks" / "RESULTS.md"
-MISSING = "not measured"
-Figures = dict[str, Any]
 
 
-def write(path: Path, machine: Figures, figures: dict[str, Figures | None], took: float, whole: bool) -> None:
-    """Write the report at `path` and the plot beside it."""
-    peers = Peers.of({name: found for name, found in figures.items() if name.startswith("peer-") and found})
+def write(path: Path, machine: Results, results: dict[str, Results | None], took: float, whole: bool) -> None:
+    """Writes the report to `path` and the plot beside it."""
+    planners = Comparison.of({name: found for name, found in results.items() if name.startswith("planner-") and found})
     parts = [
         _heading(machine, took, whole),
-        _bars(figures),
-        _requests(figures),
-        _load(figures.get("load")),
-        _scaling(figures.get("scaling")),
+        _requirements(results),
+        _distributions(results),
+        _notes(results),
+        _load(results.get("load")),
+        _growth(results.get("scaling")),
     ]
-    if peers.rows:
-        draw(peers, path.with_name(PLOT))
-        parts.append(peers.told())
+    if planners.rows:
+        draw(planners, path.with_name(PLOT))
+        parts.append(planners.formatted())
     path.write_text("\n\n".join(part for part in parts if part) + "\n", encoding="utf-8")
 
 
@@ -36,285 +35,149 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def ms(spread: Figures, digits: int = 0) -> str:
-    """Median and 95th percentile of times [s], in ms."""
-    return f"p50 {spread['p50'] * 1e3:.{digits}f} ms, p95 {spread['p95'] * 1e3:.{digits}f} ms"
-
-
-def spread_of(spread: Figures, factor: float, unit: str, digits: int = 1) -> str:
-    """The middle half and the greatest."""
-    low, high, most = (spread[name] * factor for name in ("p25", "p75", "most"))
-    return f"middle half {low:.{digits}f} to {high:.{digits}f}, most {most:.{digits}f} {unit}, n = {spread['count']}"
-
-
-def verdict(holds: bool) -> str:
-    """Whether a bar is held."""
-    return "held" if holds else "**missed**"
-
-
-def _heading(machine: Figures, took: float, whole: bool) -> str:
+def _heading(machine: Results, took: float, whole: bool) -> str:
     packages = ", ".join(f"{name} {version}" for name, version in machine["packages"].items())
-    scope = f"one run of {took / 60:.1f} minutes" if whole else "several runs: not all sections were run anew"
+    scope = f"one run of {took / 60:.1f} minutes" if whole else "several runs, because not all sections ran again"
     return (
         "# Results\n\n"
-        f"`make bench` wrote this on {machine['date']}, in {scope}, on {machine['cores']} cores of "
-        f"{machine['cpu']} with {machine['memory']:.0f} GiB of memory (load before the run: {machine['load']:.1f}). "
-        f"Python {machine['python']}, {packages}. Every number is one core's unless it says otherwise; times are wall "
-        "times. All tasks are drawn at random from a seed, none is left out: `benchmarks/tasks.py`."
+        f"`make bench` wrote this page on {machine['date']}, in {scope}. Machine: {machine['cores']} cores of "
+        f"{machine['cpu']}, {machine['memory']:.0f} GiB of memory, load {machine['load']:.1f} before the run. "
+        f"Python {machine['python']}, {packages}. Each number is for one core unless stated otherwise. Times are wall "
+        "times. All tasks are random with a fixed seed, and none is left out: `benchmarks/tasks.py` and "
+        "`benchmarks/cells.py`."
     )
 
 
-def _bars(figures: dict[str, Figures | None]) -> str:
-    rows = [row for section, judge in JUDGES if (found := figures.get(section)) is not None for row in judge(found)]
-    return "## Bars\n\n" + table(["what", "bar", "measured", "", "spread"], rows)
+def _requirements(results: dict[str, Results | None]) -> str:
+    header = ["task", "quantity", "statistic", "required", "measured", "satisfied"]
+    return "## Requirements\n\n" + table(header, (each.row() for each in requirements(results)))
 
 
-def _solver(found: Figures) -> list[list[str]]:
-    spline, line = found["bspline"]["wall"], found["time_scaling"]["wall"]
-    return [
-        [
-            "one candidate, joint to joint: B-spline of 13 control points, duration free, all limits",
-            "p50 ≤ 20 ms, p95 ≤ 45 ms",
-            ms(spline, 1),
-            verdict(spline["p50"] <= 0.020 and spline["p95"] <= 0.045),
-            f"{spread_of(spline, 1e3, 'ms')}; {_statuses(found['bspline'])}",
-        ],
-        [
-            "the same on the time-scaled straight line",
-            "p50 ≤ 10 ms",
-            ms(line, 1),
-            verdict(line["p50"] <= 0.010),
-            f"{spread_of(line, 1e3, 'ms')}; {_statuses(found['time_scaling'])}",
-        ],
-        [
-            "the B-spline with the arm's own links kept apart, times the same without",
-            "p50 ≤ 1.3",
-            f"p50 {found['apart']['ratio']['p50']:.2f}, p95 {found['apart']['ratio']['p95']:.2f}",
-            verdict(found["apart"]["ratio"]["p50"] <= 1.3),
-            spread_of(found["apart"]["ratio"], 1, "", 2),
-        ],
-    ]
+def _distributions(results: dict[str, Results | None]) -> str:
+    header = ["task", "quantity", "n", "25th percentile", "median", "75th percentile", "95th percentile", "maximum"]
+    return "## Distributions\n\n" + table(header, _spreads(results))
 
 
-def _scenes(found: Figures) -> list[list[str]]:
-    bars = {"one candidate": 0.25, "whole request": 1.0}
-    rows = [
-        [
-            f"among obstacles (table, shelf, bin, cage; p50 {found['obstacles']['p50']:.0f} of them): {kind}",
-            f"p50 ≤ {bar * 1e3:.0f} ms",
-            ms(found["wall"][kind]),
-            verdict(found["wall"][kind]["p50"] <= bar),
-            spread_of(found["wall"][kind], 1e3, "ms", 0),
-        ]
-        for kind, bar in bars.items()
-    ]
-    solved = [found["solved"][kind] for kind in bars]
-    return [
-        *rows,
-        [
-            "the same tasks solved, and answers that hit something when replayed every 0.1 ms by Coal",
-            "≥ 99 %, none",
-            f"{solved[0]} and {solved[1]} of {found['count']}, {len(found['hits'])}",
-            verdict(min(solved) >= 0.99 * found["count"] and not found["hits"]),
-            f"{sum(found['led'].values())} of them led around; straight line blocked in {found['blocked']}",
-        ],
-    ]
-
-
-def _statuses(found: Figures) -> str:
-    return ", ".join(f"{count} {status}" for status, count in found["statuses"].items())
-
-
-def _http(found: Figures) -> list[list[str]]:
-    wall = found["wall"]["joint to pose"]
-    return [
-        [
-            "`POST /optimize`, pose from a known start, all branches and windings, over HTTP",
-            "p50 ≤ 100 ms, p95 ≤ 250 ms",
-            ms(wall),
-            verdict(wall["p50"] <= 0.100 and wall["p95"] <= 0.250),
-            spread_of(wall, 1e3, "ms", 0),
-        ]
-    ]
-
-
-def _starts(found: Figures) -> list[list[str]]:
-    warm, cold = found["warm"], found["cold"]
-    meanwhile = cold["wall_meanwhile"]
-    return [
-        [
-            "first request after a start, warm cache",
-            "≤ 1 s",
-            f"{warm['first_after_ready']:.2f} s once ready",
-            verdict(warm["first_after_ready"] <= 1.0),
-            f"ready {warm['start_to_ready']:.1f} s after the start of the process; a request sent before that is "
-            f"answered {warm['start_to_answer']:.1f} s after the start",
-        ],
-        [
-            "first request after a start, cold cache (nothing compiled)",
-            "≤ 20 s, answered meanwhile",
-            f"{cold['start_to_answer']:.1f} s from the start of the process",
-            verdict(cold["start_to_answer"] <= 20.0 and cold["all_answered"]),
-            f"compiled {_seconds(cold['compiled_after'])} after the start, until then "
-            f"{cold['answered_meanwhile']} requests answered, {ms(meanwhile)}; then {ms(cold['wall_afterwards'])}",
-        ],
-    ]
-
-
-def _seconds(value: float | None) -> str:
-    return "not" if value is None else f"{value:.1f} s"
-
-
-def _success(found: Figures) -> list[list[str]]:
-    gap = found["gap"]
-    refusals = ", ".join(f"{count} {kind}" for kind, count in found["refusals"].items()) or "none"
-    return [
-        [
-            f"{found['count']} random feasible requests answered, certificate valid",
-            "≥ 99.9 %",
-            f"{found['share']:.2%}",
-            verdict(found["share"] >= 0.999),
-            f"refused: {refusals}; faults found in answers: {len(found['faults'])}",
-        ],
-        [
-            "proven gap, 1 - lower bound / energy",
-            "median ≤ 10 %, p90 ≤ 22 %",
-            f"median {gap['p50']:.1%}, p90 {gap['p90']:.1%}",
-            verdict(gap["p50"] <= 0.10 and gap["p90"] <= 0.22),
-            "; ".join(
-                f"{kind}: median {each['p50']:.1%}, p90 {each['p90']:.1%}, most {each['most']:.1%}"
-                for kind, each in found["gaps"].items()
-            ),
-        ],
-        [
-            "no baseline within limits spends less, energy identity, replay of limits and ends",
-            "all answers",
-            f"{found['valid']} of {found['answered']}",
-            verdict(not found["faults"]),
-            f"energy identity within {found['identity']:.0e} of the total",
-        ],
-        [
-            "B-spline's energy over the time-scaled line's, same duration",
-            "≤ 1 %",
-            f"at most {found['relative_excess']:+.2%}",
-            verdict(found["relative_excess"] <= 0.01),
-            f"{found['compared']} compared",
-        ],
-    ]
-
-
-def _quality(found: Figures) -> list[list[str]]:
-    excess, fine = found["excess"], found["fine_excess"]
-    return [
-        [
-            f"energy above the best of {found['starts']} starts on {found['control_points']} control points",
-            "≤ 1 % on 95 % of tasks, ≤ 3 % on all",
-            f"{found['within_one_percent']:.0%} within 1 %, most {excess['most']:+.2%}",
-            verdict(found["within_one_percent"] >= 0.95 and found["within_three_percent"] == 1.0),
-            f"{_excess(excess)}; above the same polished on {found['fine_control_points']} points: {_excess(fine)}",
-        ]
-    ]
-
-
-def _excess(spread: Figures) -> str:
-    return f"median {spread['p50']:+.2%}, p95 {spread['p95']:+.2%}, n = {spread['count']}"
-
-
-def _service(found: Figures) -> list[list[str]]:
-    wall, burst = found["wall"], found["burst"]
-    ratio = wall["p99"] / wall["p50"]
-    errors = sum(count for status, count in found["statuses"].items() if status != "200") + len(found["lost"])
-    flat = found["memory_last"] <= 1.05 * found["memory_first"] and found["same_workers"]
-    bounded = set(burst["statuses"]) <= {"200", "503"} and "503" in burst["statuses"] and burst["refusals_say_when"]
-    return [
-        [
-            f"{found['clients']} clients for {found['seconds']:.0f} s",
-            "no error, queue bounded, memory flat, p99 ≤ 4 × p50",
-            f"{errors} errors in {found['answers']} answers, p99 {wall['p99'] * 1e3:.0f} ms = {ratio:.1f} × p50",
-            verdict(not errors and ratio <= 4 and flat and bounded),
-            f"p50 {wall['p50'] * 1e3:.0f} ms, {found['per_second']:.0f} answers per second by {found['cores']} cores",
-        ]
-    ]
-
-
-JUDGES = (
-    ("solver", _solver),
-    ("http", _http),
-    ("scenes", _scenes),
-    ("starts", _starts),
-    ("success", _success),
-    ("quality", _quality),
-    ("load", _service),
-)
-
-
-def _requests(figures: dict[str, Figures | None]) -> str:
-    rows, notes = [], []
-    for section, name in (("http", "one client"), ("success", "two clients")):
-        found = figures.get(section)
-        if found is None:
-            continue
-        for kind, wall in found["wall"].items():
+def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
+    """One row per measured distribution."""
+    if solver := results.get("solver"):
+        yield _spread("one candidate, B-spline", "time [ms]", solver["bspline"]["wall"], MS)
+        yield _spread("one candidate, time scaling", "time [ms]", solver["time_scaling"]["wall"], MS)
+        ratio = solver["self_collision"]["ratio"]
+        yield _spread("one candidate, B-spline", "time with / without self-collision constraints", ratio, 1, 2)
+    if scenes := results.get("scenes"):
+        for kind, wall in scenes["wall"].items():
+            yield _spread(f"among obstacles, {kind}", "time [ms]", wall, MS, 0)
+        yield _spread("among obstacles", "obstacles", scenes["obstacles"], 1, 0)
+    for section, clients in (("http", "one client"), ("success", "two clients")):
+        for kind, wall in (results.get(section) or {"wall": {}})["wall"].items():
             if wall["count"]:
-                rows.append([f"{kind}, {name}", ms(wall), spread_of(wall, 1e3, "ms", 0)])
-        notes += [f"- refused: {line}" for line in found["refused"]] + [f"- fault: {line}" for line in found["faults"]]
-    if not rows:
-        return ""
-    text = "## Requests\n\n" + table(["requests", "wall time over HTTP", "spread"], rows)
-    return text + ("\n\n" + "\n".join(notes) if notes else "")
+                yield _spread(f"request, {kind}, {clients}", "time [ms]", wall, MS, 0)
+    if success := results.get("success"):
+        for kind, gap in success["gaps"].items():
+            yield _spread(f"random feasible requests, {kind}", "gap, 1 - lower bound / energy [%]", gap, PERCENT)
+    if starts := results.get("starts"):
+        cold = starts["cold"]
+        yield _spread("requests while the kernel compiles", "time [ms]", cold["wall_meanwhile"], MS, 0)
+        yield _spread("requests after the kernel is compiled", "time [ms]", cold["wall_afterwards"], MS, 0)
+    if quality := results.get("quality"):
+        for name, points in (("excess", "control_points"), ("fine_excess", "fine_control_points")):
+            task = f"best of {quality['starts']} starts, {quality[points]} control points"
+            yield _spread(task, "energy above it [%]", quality[name], PERCENT, 2)
+    if load := results.get("load"):
+        yield _spread(f"{load['clients']} clients", "time [ms]", load["wall"], MS, 0)
 
 
-def _load(found: Figures | None) -> str:
+def _spread(task: str, quantity: str, spread: Results, factor: float, digits: int = 1) -> list[str]:
+    numbers = (f"{spread[name] * factor:.{digits}f}" for name in ("p25", "p50", "p75", "p95", "maximum"))
+    return [task, quantity, str(spread["count"]), *numbers]
+
+
+def _notes(results: dict[str, Results | None]) -> str:
+    """Results that are no distribution, and the tasks that were not solved."""
+    lines = []
+    if scenes := results.get("scenes"):
+        planned = sum(scenes["from_planned_path"].values())
+        lines.append(f"Among obstacles, the straight line in joint space collides in {scenes['blocked']} tasks.")
+        lines.append(f"Among obstacles, {planned} answers start from a planned collision-free path.")
+        lines += [f"Not solved: {each}." for each in scenes["unsolved"]]
+    if starts := results.get("starts"):
+        warm, cold = starts["warm"], starts["cold"]
+        lines.append(f"Warm cache: ready {warm['start_to_ready']:.1f} s after the start of the process.")
+        lines.append(f"Warm cache: a request sent at once is answered {warm['start_to_answer']:.1f} s after the start.")
+        compiled = cold["compiled_after"]
+        if compiled is not None:
+            lines.append(
+                f"Empty cache: the kernel is compiled {compiled:.1f} s after the start. "
+                f"{cold['answered_meanwhile']} requests are answered until then."
+            )
+    for section in ("http", "success"):
+        found = results.get(section) or {"refused": [], "errors": []}
+        lines += [f"Answered with a problem: {each}." for each in found["refused"]]
+        lines += [f"Error: {each}." for each in found["errors"]]
+    if success := results.get("success"):
+        lines.append(f"Energy balance: largest error {success['balance_error']:.0e} of the total.")
+    return "## Notes\n\n" + "\n".join(f"- {line}" for line in lines) if lines else ""
+
+
+def _load(found: Results | None) -> str:
     if found is None:
         return ""
-    burst = ", ".join(f"{count} with {status}" for status, count in sorted(found["burst"]["statuses"].items()))
+    burst = ", ".join(f"{count} with status {status}" for status, count in sorted(found["burst"]["statuses"].items()))
     return (
         "## Load\n\n"
-        f"Each of {found['clients']} clients sends its next request as soon as the last is answered, so that "
-        f"{found['most_under_way']} are under way at all times on {found['cores']} workers. Resident memory of the "
-        f"service's processes, sum: {found['memory_first']:.0f} MiB in the second quarter of the time, "
-        f"{found['memory_last']:.0f} MiB in the last. {found['burst']['sent']} requests at once: {burst}, the refusals "
-        "with `Retry-After`."
+        f"Each of {found['clients']} clients sends its next request as soon as the last one is answered. "
+        f"{found['most_in_flight']} requests are in flight at all times on {found['cores']} workers. The service gives "
+        f"{found['per_second']:.0f} answers per second, {found['answers']} in all. The resident memory of its "
+        f"processes adds up to {found['memory_first']:.0f} MiB in the second quarter of the time, and to "
+        f"{found['memory_last']:.0f} MiB in the last. Then {found['burst']['sent']} requests arrive at once: {burst}."
     )
 
 
-def _scaling(found: Figures | None) -> str:
+def _growth(found: Results | None) -> str:
     if found is None:
         return ""
-    points, joints, candidates = (found[name] for name in ("control_points", "joints", "candidates"))
-    text = "## Growth\n\n"
-    text += f"Exponents are of medians, by a straight line through their logarithms; {found['count']} tasks a row.\n\n"
-    text += _growth("Control points, one programme, evenly spaced knots", points) + "\n\n"
-    text += table(
-        ["control points", "nodes", "time", "iterations", "solved"],
-        (
-            [f"{row['size']}", f"{row['nodes']}", ms(row["wall"], 1), f"{row['iterations']['p50']:.0f}", _share(row)]
-            for row in points["rows"]
-        ),
+    exponents = (
+        [name, f"{found[key]['exponent']:.1f}", f"{found[key]['exponent_per_iteration']:.1f}" if per_iteration else ""]
+        for name, key, per_iteration in (
+            ("control points", "control_points", True),
+            ("degrees of freedom", "joints", True),
+            ("candidates", "candidates", False),
+        )
     )
-    text += "\n\n" + _growth("Degrees of freedom, one candidate, the chain cut short or made longer", joints) + "\n\n"
-    text += table(
-        ["joints", "time", "iterations", "solved"],
-        (
-            [f"{row['size']}", ms(row["wall"], 1), f"{row['iterations']['p50']:.0f}", _share(row)]
-            for row in joints["rows"]
+    times = ["time: median [ms]", "95th percentile [ms]"]
+    parts = [
+        "## Growth",
+        f"Exponents of power laws, fitted to medians by least squares in logarithms; {found['count']} tasks per size.",
+        table(["size", "exponent of the time", "exponent of the time per iteration"], exponents),
+        "**Control points**: one NLP with evenly spaced knots.",
+        table(
+            ["control points", "nodes", *times, "iterations: median", "solved [%]"],
+            (
+                [str(row["size"]), str(row["nodes"]), *_times(row), *_solved(row)]
+                for row in found["control_points"]["rows"]
+            ),
         ),
-    )
-    text += "\n\n" + _growth("Candidates, one whole answer", candidates, False) + "\n\n"
-    text += table(
-        ["what is allowed", "candidates", "time", "programmes solved"],
-        (
-            [row["name"], f"{row['size']:.0f}", ms(row["wall"]), f"{row['iterations']['p50']:.0f}"]
-            for row in candidates["rows"]
+        "**Degrees of freedom**: one candidate of an arm whose chain is shortened or extended.",
+        table(
+            ["joints", *times, "iterations: median", "solved [%]"],
+            ([str(row["size"]), *_times(row), *_solved(row)] for row in found["joints"]["rows"]),
         ),
-    )
-    return text
+        "**Candidates**: one whole answer.",
+        table(
+            ["allowed", "candidates: median", *times, "NLPs solved: median"],
+            (
+                [row["name"], f"{row['size']:.0f}", *_times(row, 0), f"{row['iterations']['p50']:.0f}"]
+                for row in found["candidates"]["rows"]
+            ),
+        ),
+    ]
+    return "\n\n".join(parts)
 
 
-def _growth(what: str, found: Figures, iterations: bool = True) -> str:
-    text = f"**{what}**: time grows with the power {found['exponent']:.1f}"
-    return text + (f", that of an iteration with {found['exponent_per_iteration']:.1f}." if iterations else ".")
+def _times(row: Results, digits: int = 1) -> list[str]:
+    return [f"{row['wall'][name] * MS:.{digits}f}" for name in ("p50", "p95")]
 
 
-def _share(row: Figures) -> str:
-    return f"{row['solved']} of {row['wall']['count']}"
+def _solved(row: Results) -> list[str]:
+    return [f"{row['iterations']['p50']:.0f}", f"{PERCENT * row['solved'] / row['wall']['count']:.0f}"]

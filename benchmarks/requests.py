@@ -1,10 +1,11 @@
-"""Random requests against the real service over HTTP, every answer checked: exits with 1 when a line is missed.
+"""Random requests to the service over HTTP. Every answer is checked; the exit code is 1 if a requirement fails.
 
     python -m benchmarks.requests --count 300 --seed 0
 
-Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in turn. Each answer's
-certificate is read and its spline replayed here; baselines, energy identity and bound are compared; for some, the
-time-scaled motion of the same duration is asked for too. `--varied` adds payloads, mounts, tighter limits, durations.
+Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in turn. The certificate
+of each answer is checked, its spline is replayed here, and baselines, energy balance and lower bound are compared. Some
+tasks are also solved by time scaling with the same duration. `--varied` adds payloads, mountings, tighter limits and
+durations.
 """
 
 from __future__ import annotations
@@ -17,82 +18,82 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-from benchmarks.checks import faults, identity_error, objective
-from benchmarks.command import keep, parser
-from benchmarks.figures import Spread
+from benchmarks.checks import balance_error, errors_found, objective
+from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Client, Service, running
-from benchmarks.tasks import KINDS, Ask, asks
+from benchmarks.statistics import Spread
+from benchmarks.tasks import KINDS, RequestTask, request_tasks
 
-ANSWERED = 0.99  # share that must be answered with a motion
-NO_BETTER = 1e-2  # how far above the time-scaled motion's energy ours may be
+ANSWERED = 0.99  # least fraction of valid answers
+MOST_EXCESS = 1e-2  # largest relative excess of the energy over that of the time-scaled motion
 PROBLEM = "application/problem+json"
 TOO_SHORT = "duration-too-short"
 
 
 @dataclass
 class Outcome:
-    """What came of one request."""
+    """Result of one request: status, wall time [s], errors found, energy [J] of the objective."""
 
-    task: Ask
+    task: RequestTask
     status: int = 0
     wall: float = 0.0
-    refusal: str | None = None
-    faults: list[str] = field(default_factory=list)
+    problem: str | None = None
+    errors: list[str] = field(default_factory=list)
     energy: float = 0.0
     gap: float = 0.0
-    identity: float = 0.0
+    balance_error: float = 0.0
     candidates: int = 0
     solves: int = 0
     optimal: bool = False
-    relative_excess: float | None = None  # ours over the time-scaled motion's energy, minus 1
+    relative_excess: float | None = None  # energy / energy of the time-scaled motion - 1
     bytes: int = 0
 
     @property
     def name(self) -> str:
-        """Where to find the task again."""
+        """Seed, index and kind of the task."""
         return f"seed {self.task.seed} index {self.task.index} ({self.task.kind})"
 
 
-def examine(task: Ask, answer: Answer) -> Outcome:
-    """One answer against its request."""
+def examine(task: RequestTask, answer: Answer) -> Outcome:
+    """The result of a request: its answer, checked."""
     outcome = Outcome(task, answer.status, answer.wall, bytes=len(answer.raw))
     content = answer.content
     if answer.status != 200:
         typed = answer.headers.get("content-type", "").startswith(PROBLEM) and answer.status < 500
-        outcome.refusal = str(content.get("type", "")).rpartition("/")[2] or "untyped"
+        outcome.problem = str(content.get("type", "")).rpartition("/")[2] or "untyped"
         if not typed:
-            outcome.faults.append(f"{answer.status} {outcome.refusal} is no typed refusal")
+            outcome.errors.append(f"{answer.status} {outcome.problem} is no problem of the contract")
         return outcome
-    outcome.faults = faults(task.body, content, task.T_start, task.T_goal)
+    outcome.errors = errors_found(task.body, content, task.T_start, task.T_goal)
     outcome.energy = objective(content)
     outcome.gap = content["energy"]["optimality_gap"]
-    outcome.identity = identity_error(content)
+    outcome.balance_error = balance_error(content)
     outcome.candidates = len(content["candidates"])
     outcome.solves = content["solver"]["nlp_solves"]
     outcome.optimal = content["status"] == "optimal"
     return outcome
 
 
-def compare_with_line(client: Client, task: Ask, outcome: Outcome, duration: float) -> None:
-    """Ask for the time-scaled motion of the same duration, and note how much relative_excess ours is."""
+def compare_with_line(client: Client, task: RequestTask, outcome: Outcome, duration: float) -> None:
+    """Requests the time-scaled motion of the same duration, and sets the relative excess of the energy over it."""
     answer = client.optimize({**task.body, "method": "time_scaling", "duration": duration})
     content = answer.content
     if answer.status == 200:
         outcome.relative_excess = outcome.energy / objective(content) - 1
     elif answer.status >= 500 or not answer.headers.get("content-type", "").startswith(PROBLEM):
-        outcome.faults.append(f"time scaling: {answer.status}")
+        outcome.errors.append(f"time scaling: {answer.status}")
 
 
-def ask_all(service: Service, tasks: Sequence[Ask], clients: int = 1, line_every: int = 0) -> list[Outcome]:
-    """Send every task, `clients` at a time, and examine the answers; every `line_every`-th also asks for the line."""
+def send_all(service: Service, tasks: Sequence[RequestTask], clients: int = 1, line_every: int = 0) -> list[Outcome]:
+    """Sends every task by `clients` clients and checks the answers; compares every `line_every`-th with the line."""
     local = threading.local()
 
-    def one(task: Ask) -> Outcome:
+    def one(task: RequestTask) -> Outcome:
         if not hasattr(local, "client"):
             local.client = service.client()
         answer = local.client.optimize(task.body)
         outcome = examine(task, answer)
-        # by pairs, so that both kinds have their turn
+        # by pairs, so that both kinds take part
         if line_every and (task.index // len(KINDS)) % line_every == 0 and outcome.status == 200:
             compare_with_line(local.client, task, outcome, answer.content["duration"])
         return outcome
@@ -102,23 +103,23 @@ def ask_all(service: Service, tasks: Sequence[Ask], clients: int = 1, line_every
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """The figures of a run."""
+    """Statistics of a run."""
     solved = [o for o in outcomes if o.status == 200]
-    valid = [o for o in solved if not o.faults]
+    valid = [o for o in solved if not o.errors]
     relative_excess = [o.relative_excess for o in outcomes if o.relative_excess is not None]
     return {
         "count": len(outcomes),
         "answered": len(solved),
         "valid": len(valid),
-        "share": len(valid) / max(len(outcomes), 1),
+        "valid_fraction": len(valid) / max(len(outcomes), 1),
         "optimal": sum(o.optimal for o in solved),
-        "refusals": dict(Counter(o.refusal for o in outcomes if o.refusal)),
-        "refused": [f"{o.name}: {o.refusal}" for o in outcomes if o.refusal],
-        "faults": [f"{o.name}: {fault}" for o in outcomes for fault in o.faults],
-        "identity": max((o.identity for o in solved), default=0.0),
+        "problems": dict(Counter(o.problem for o in outcomes if o.problem)),
+        "refused": [f"{o.name}: {o.problem}" for o in outcomes if o.problem],
+        "errors": [f"{o.name}: {error}" for o in outcomes for error in o.errors],
+        "balance_error": max((o.balance_error for o in solved), default=0.0),
         "gap": Spread.of([o.gap for o in solved]),
         "gaps": {kind: Spread.of([o.gap for o in solved if o.task.kind == kind]) for kind in KINDS},
-        "loosest": max(solved, key=lambda o: o.gap).name if solved else "",
+        "widest": max(solved, key=lambda o: o.gap).name if solved else "",
         "wall": {kind: Spread.of([o.wall for o in solved if o.task.kind == kind]) for kind in KINDS},
         "slowest": max(outcomes, key=lambda o: o.wall).name if outcomes else "",
         "candidates": Spread.of([o.candidates for o in solved]),
@@ -126,7 +127,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "megabytes": Spread.of([o.bytes / 1e6 for o in solved]),
         "compared": len(relative_excess),
         "relative_excess": max(relative_excess, default=0.0),
-        "dearest": max(
+        "worst": max(
             (o for o in outcomes if o.relative_excess is not None), key=lambda o: o.relative_excess or 0.0
         ).name
         if relative_excess
@@ -134,62 +135,66 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
-def misses(figures: dict[str, Any]) -> list[str]:
-    """Acceptance lines that a run misses."""
-    found = list(figures["faults"])
-    if figures["share"] < ANSWERED:
-        found.append(f"only {figures['share']:.2%} answered with a valid certificate: at least {ANSWERED:.0%} must be")
-    if figures["relative_excess"] > NO_BETTER:
+def failed_requirements(results: dict[str, Any]) -> list[str]:
+    """A message for every requirement that a run fails."""
+    found = list(results["errors"])
+    if results["valid_fraction"] < ANSWERED:
+        found.append(f"{results['valid_fraction']:.2%} of the answers are valid: required {ANSWERED:.0%} or more")
+    if results["relative_excess"] > MOST_EXCESS:
         found.append(
-            f"{figures['relative_excess']:.2%} relative_excess than the time-scaled motion in {figures['dearest']}"
+            f"{results['worst']}: {results['relative_excess']:.2%} more energy than the time-scaled motion, required "
+            f"{MOST_EXCESS:.0%} or less"
         )
     return found
 
 
-def tell(figures: dict[str, Any]) -> None:
-    """Print a run's figures."""
-    print(f"answered 200 with a valid certificate  {figures['valid']} of {figures['count']} ({figures['share']:.2%})")
-    print(f"status optimal                         {figures['optimal']} of {figures['answered']}")
-    print(f"typed refusals                         {figures['refusals'] or 'none'}")
-    for line in figures["refused"][:20]:
+def print_summary(results: dict[str, Any]) -> None:
+    """Prints the statistics of a run."""
+    print(f"valid answers                 {results['valid']} of {results['count']} ({results['valid_fraction']:.2%})")
+    print(f"status optimal                {results['optimal']} of {results['answered']}")
+    print(f"problems                      {results['problems'] or 'none'}")
+    for line in results["refused"][:20]:
         print(f"    {line}")
-    print(f"energy identity, worst                 {figures['identity']:.1e} of the total")
-    gap = figures["gap"]
+    print(f"energy balance, largest error {results['balance_error']:.1e} of the total")
+    gap = results["gap"]
     print(
-        f"proven gap                             p50 {gap.p50:.1%}, p90 {gap.p90:.1%}, widest in {figures['loosest']}"
+        f"gap                           median {gap.p50:.1%}, 90th percentile {gap.p90:.1%}, "
+        f"maximum in {results['widest']}"
     )
-    for kind, gap in figures["gaps"].items():
-        print(f"    {kind:14s}                     p50 {gap.p50:.1%}, p90 {gap.p90:.1%}, most {gap.most:.1%}")
-    for kind, wall in figures["wall"].items():
-        print(f"wall time, {kind:14s}              {wall.times(1e3).told(' ms', 0)}")
-    print(f"slowest                                {figures['slowest']}")
-    print(f"candidates looked at                   {figures['candidates'].told('', 0)}")
-    print(f"programmes solved                      {figures['solves'].told('', 0)}")
+    for kind, gap in results["gaps"].items():
+        print(
+            f"    {kind:14s}            median {gap.p50:.1%}, 90th percentile {gap.p90:.1%}, maximum {gap.maximum:.1%}"
+        )
+    for kind, wall in results["wall"].items():
+        print(f"wall time, {kind:14s}     {wall.times(1e3).formatted(' ms', 0)}")
+    print(f"slowest                       {results['slowest']}")
+    print(f"candidates                    {results['candidates'].formatted('', 0)}")
+    print(f"NLPs solved                   {results['solves'].formatted('', 0)}")
     print(
-        f"B-spline over time-scaled, worst       {figures['relative_excess']:+.2%} of {figures['compared']} compared, "
-        f"same duration {figures['dearest'] and '(' + figures['dearest'] + ')'}"
+        f"excess over time scaling      maximum {results['relative_excess']:+.2%} of {results['compared']} tasks with "
+        f"the same duration {results['worst'] and '(' + results['worst'] + ')'}"
     )
 
 
 def main() -> int:
-    """Run and judge."""
+    """Runs the requests and checks the requirements."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=300, help="requests (%(default)s)")
-    arguments.add_argument("--clients", type=int, default=1, help="requests at a time (%(default)s)")
-    arguments.add_argument("--kind", choices=KINDS, help="all of one kind (in turn)")
-    arguments.add_argument("--line-every", type=int, default=5, help="compare every n-th of a kind with the line")
-    arguments.add_argument("--varied", action="store_true", help="requests that use every field; some are infeasible")
+    arguments.add_argument("--clients", type=int, default=1, help="simultaneous requests (%(default)s)")
+    arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
+    arguments.add_argument("--line-every", type=int, default=5, help="compare every n-th task with time scaling")
+    arguments.add_argument("--varied", action="store_true", help="random other fields; some requests are infeasible")
     given = arguments.parse_args()
-    tasks = list(asks(given.seed, given.count, given.kind, given.varied))
+    tasks = list(request_tasks(given.seed, given.count, given.kind, given.varied))
     with running() as service:
-        outcomes = ask_all(service, tasks, given.clients, 0 if given.varied else given.line_every)
-    figures = summary(outcomes)
-    tell(figures)
-    keep(given.json, figures)
-    missed = misses(figures) if not given.varied else figures["faults"]
-    for line in missed:
-        print(f"MISSED: {line}")
-    return 1 if missed else 0
+        outcomes = send_all(service, tasks, given.clients, 0 if given.varied else given.line_every)
+    results = summary(outcomes)
+    print_summary(results)
+    write_json(given.json, results)
+    failed = failed_requirements(results) if not given.varied else results["errors"]
+    for message in failed:
+        print(f"FAILED: {message}")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

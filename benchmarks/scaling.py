@@ -1,4 +1,4 @@
-"""How the time of a solve grows: with control points, with degrees of freedom, with candidates."""
+"""Growth of the solve time with control points, degrees of freedom and candidates."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.chains import chain
-from benchmarks.command import keep, on_one_core, parser
-from benchmarks.figures import Spread, exponent
-from benchmarks.tasks import ask, move, moves
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread, exponent
+from benchmarks.tasks import move, moves, request_task
 from models.registry import load_robot
 from models.robot import Array, Robot
 from optimizer.deadline import Deadline
@@ -31,16 +31,16 @@ from optimizer.trajectories import bspline
 
 CONTROL_POINTS = (8, 10, 13, 16, 20, 24, 28, 32)
 JOINTS = (2, 3, 4, 5, 6, 7)
-PATIENCE = 60.0  # s
+PATIENCE = 60.0  # longest time of one solve [s]
 
 
 def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
-    """One programme over evenly spaced knots, from the straight line, repairs between the nodes included."""
+    """Times of one NLP over evenly spaced knots from the straight line, including repairs between the nodes."""
     rows = []
     for n in CONTROL_POINTS:
         space = bspline.uniform(n)
         walls, iterations, solved = [], [], 0
-        # the first task once more: what is built once per space is not part of a solve
+        # the first task runs twice: what is built once per spline space is not part of a solve
         for task in (move(seed, 0), *moves(seed, count)):
             points = task.q_start + np.outer(space.quintic, task.q_goal - task.q_start)
             began = time.perf_counter()
@@ -61,7 +61,7 @@ def by_control_points(seed: int, count: int) -> list[dict[str, Any]]:
 
 
 def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
-    """One candidate of an arm with its chain cut short or made longer."""
+    """Times of one candidate of an arm whose chain is shortened or extended."""
     robots = [chain(load_robot("ur5e"), joints) for joints in JOINTS]
     with ThreadPoolExecutor(2) as threads:
         list(threads.map(compile_kernel, robots))
@@ -82,7 +82,7 @@ def by_joints(seed: int, count: int) -> list[dict[str, Any]]:
 
 
 def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
-    """A whole answer, library call, with more and more candidates allowed: one branch, all, full turns too."""
+    """Times of a whole answer by the library, for one or all branches, with and without full-turn alternatives."""
     robot = load_robot("ur5e")
     allowed = {
         "one branch": (True, False),
@@ -94,7 +94,7 @@ def by_candidates(seed: int, count: int) -> list[dict[str, Any]]:
     for name, (one_branch, windings) in allowed.items():
         walls, candidates, solves = [], [], []
         for index in range(count):
-            task = ask(seed, index, "joint to pose")
+            task = request_task(seed, index, "joint to pose")
             q_start, goal = np.array(task.body["start"]["q"]), Pose(_orthonormal(task.T_goal))
             branch = _branch(robot, task.T_goal) if one_branch else None
             began = time.perf_counter()
@@ -134,35 +134,35 @@ def _row(size: float, walls: list[float], iterations: Iterable[float]) -> dict[s
 
 
 def growth(rows: list[dict[str, Any]]) -> float:
-    """Exponent of the median time over the size."""
+    """Exponent of the median time as a function of the size."""
     return exponent([row["size"] for row in rows], [row["wall"].p50 for row in rows])
 
 
 def per_iteration(rows: list[dict[str, Any]]) -> float:
-    """Exponent of the median time of an iteration over the size."""
+    """Exponent of the median time of an iteration as a function of the size."""
     each = [row["wall"].p50 / max(row["iterations"].p50, 1.0) for row in rows]
     return exponent([row["size"] for row in rows], each)
 
 
 def main() -> None:
-    """Measure all three."""
+    """Measures all three."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=25, help="tasks per size (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     warm_up("ur5e")
-    figures: dict[str, Any] = {"count": given.count}
+    results: dict[str, Any] = {"count": given.count}
     for name, measure in (("control_points", by_control_points), ("joints", by_joints), ("candidates", by_candidates)):
         rows = measure(given.seed, given.count)
-        figures[name] = {"rows": rows, "exponent": growth(rows), "exponent_per_iteration": per_iteration(rows)}
-        print(f"{name}: time grows with the power {growth(rows):.2f}, an iteration's with {per_iteration(rows):.2f}")
+        results[name] = {"rows": rows, "exponent": growth(rows), "exponent_per_iteration": per_iteration(rows)}
+        print(f"{name}: time ∝ size^{growth(rows):.2f}, time of an iteration ∝ size^{per_iteration(rows):.2f}")
         for row in rows:
             print(
-                f"    {row['size']:6.0f} {row.get('name', '')} {row['wall'].times(1e3).told(' ms')}, "
+                f"    {row['size']:6.0f} {row.get('name', '')} {row['wall'].times(1e3).formatted(' ms')}, "
                 f"iterations {row['iterations'].p50:.0f}, {row.get('solved', '')}"
             )
-    keep(given.json, figures)
+    write_json(given.json, results)
 
 
 if __name__ == "__main__":

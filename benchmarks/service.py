@@ -1,4 +1,4 @@
-"""The service as its users have it: `python -m app` in a process of its own, spoken to over HTTP."""
+"""The service in a process of its own (`python -m app`), and clients over HTTP."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from typing import IO, Any
 import orjson
 
 ROOT = Path(__file__).parents[1]
-START = 120.0  # until the service is ready, at most [s]
-STOP = 20.0  # from SIGTERM to its end, at most [s]
-PAUSE = 0.005  # between two tries [s]
+START = 120.0  # longest time until the service is ready [s]
+STOP = 20.0  # longest time from SIGTERM to the end of the process [s]
+PAUSE = 0.005  # between two attempts [s]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A response: status, body as sent, headers, and the wall time from sending to the last byte [s]."""
+    """A response: status, raw body, headers in lower case, and wall time from sending to the last byte [s]."""
 
     status: int
     raw: bytes
@@ -35,22 +35,22 @@ class Answer:
 
     @property
     def content(self) -> Any:
-        """The JSON in it."""
+        """The decoded JSON body."""
         return orjson.loads(self.raw)
 
 
 class Client:
-    """One connection, kept alive. Not for several threads at once."""
+    """One persistent connection; not thread-safe."""
 
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120)
 
     def get(self, path: str) -> Answer:
-        """Raises OSError or http.client.HTTPException where nobody answers."""
+        """Raises OSError or http.client.HTTPException if there is no answer."""
         return self._exchange("GET", path, None)
 
     def optimize(self, body: dict[str, Any]) -> Answer:
-        """`POST /optimize`. Raises as `get`."""
+        """`POST /optimize`. Raises the same errors as `get`."""
         return self._exchange("POST", "/optimize", orjson.dumps(body))
 
     def _exchange(self, method: str, path: str, body: bytes | None) -> Answer:
@@ -68,7 +68,7 @@ class Client:
 
 @dataclass(frozen=True)
 class Service:
-    """A running service; `began` is when its process was started [s, perf_counter]."""
+    """A running service; `began` is the start of its process [s] by `perf_counter`."""
 
     process: subprocess.Popen[bytes]
     port: int
@@ -81,11 +81,11 @@ class Service:
 
     @property
     def age(self) -> float:
-        """Time since its process was started [s]."""
+        """Time [s] since the start of its process."""
         return time.perf_counter() - self.began
 
     def wait(self, path: str) -> float:
-        """Wait until `path` answers 200; returns the service's age then [s]."""
+        """Waits until `path` answers 200 and returns the age of the service [s]."""
         client = self.client()
         while True:
             if self.process.poll() is not None:
@@ -105,17 +105,17 @@ class Service:
         return self.log.read()[-4000:].decode(errors="replace")
 
     def worker_pids(self) -> list[int]:
-        """Processes that the service started and that bear its workers' weight: all its descendants but helpers."""
+        """Process ids of the workers: all descendants with more than 32 MiB of memory."""
         return [pid for pid in _descendants(self.process.pid) if resident(pid) > 32]
 
 
 @contextmanager
 def running(ready: bool = True, **environment: str) -> Iterator[Service]:
-    """A service with its default settings on a free port, `ready` unless told otherwise, ended afterwards."""
+    """A service with default settings on a free port; it ends with the context. Waits for `/readyz` if `ready`."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    # so that a SIGTERM to the benchmark ends the service too, on the way out
+    # a SIGTERM to the benchmark then ends the service, too
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
     with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
@@ -137,7 +137,7 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
 
 
 def resident(pid: int) -> float:
-    """Resident memory of a process [MiB]; 0 when there is none."""
+    """Resident memory of a process [MiB]; 0 if it has ended."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except OSError:

@@ -1,8 +1,8 @@
 """Time of one candidate, joint to joint, on one core: the free B-spline and the time-scaled line.
 
-Timed is `optimizer.candidate.Solver` alone, from the two configurations to a motion that holds every limit between the
-nodes too; not the refinement of the winner, the baselines or the certificate. Of the tasks at whose ends the arm is not
-in itself, the B-spline is also timed with its own links kept apart, each task with and without in turn.
+The time is that of the method alone, from two configurations to a motion within all limits, also between the nodes. The
+refinement of the incumbent, the baselines and the certificate are not included. If start and goal have no
+self-collision, the B-spline is also timed with self-collision constraints, each task with and without in turn.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.command import keep, on_one_core, parser
-from benchmarks.figures import Spread
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
 from optimizer.collision.model import CollisionModel
@@ -28,12 +28,12 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import MethodName, Problem
 
-PATIENCE = 60.0  # s
+PATIENCE = 60.0  # longest time of one solve [s]
 METHODS: tuple[MethodName, ...] = ("bspline", "time_scaling")
 
 
 def solve(move: Move, method: MethodName, collisions: bool = False) -> tuple[float, SolveResult]:
-    """Wall time [s] and outcome of one candidate."""
+    """Wall time [s] and result of one candidate."""
     task = PreparedProblem.of(
         Problem(
             arm=Arm(robot=load_robot("ur5e"), collisions=collisions),
@@ -48,7 +48,7 @@ def solve(move: Move, method: MethodName, collisions: bool = False) -> tuple[flo
 
 
 def measure(seed: int, count: int, method: MethodName) -> dict[str, Any]:
-    """All tasks of a seed by one method."""
+    """Statistics of all tasks of a seed by one method."""
     solve(next(moves(seed, 1)), method)
     runs = [(move, *solve(move, method)) for move in moves(seed, count)]
     return {
@@ -59,8 +59,8 @@ def measure(seed: int, count: int, method: MethodName) -> dict[str, Any]:
     }
 
 
-def apart(seed: int, count: int) -> dict[str, Any]:
-    """What it costs to keep the arm's links apart: ratio of the times with and without, task by task."""
+def with_self_collision(seed: int, count: int) -> dict[str, Any]:
+    """Statistics of the time with self-collision constraints, and of its ratio to the time without, task by task."""
     model = CollisionModel(Arm(robot=load_robot("ur5e")))
     ratios, walls = [], []
     for move in moves(seed, count):
@@ -73,20 +73,22 @@ def apart(seed: int, count: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure both methods, and what collisions add."""
+    """Measures both methods, and the effect of self-collision constraints."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=200, help="tasks (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     warm_up("ur5e")
-    figures: dict[str, Any] = {method: measure(given.seed, given.count, method) for method in METHODS}
-    for method, found in figures.items():
-        print(f"{method:13s} {found['wall'].times(1e3).told(' ms')}, iterations {found['iterations'].told('', 0)}")
+    results: dict[str, Any] = {method: measure(given.seed, given.count, method) for method in METHODS}
+    for method, found in results.items():
+        print(f"{method:13s} time {found['wall'].times(1e3).formatted(' ms')}")
+        print(f"{method:13s} iterations {found['iterations'].formatted('', 0)}")
         print(f"{'':13s} {found['statuses']} {', '.join(found['unsolved'])}")
-    figures["apart"] = found = apart(given.seed, given.count)
-    print(f"links apart   {found['wall'].times(1e3).told(' ms')}; times the same without {found['ratio'].told('', 2)}")
-    keep(given.json, figures)
+    results["self_collision"] = found = with_self_collision(given.seed, given.count)
+    print(f"bspline with self-collision constraints: {found['wall'].times(1e3).formatted(' ms')}")
+    print(f"    ratio to the time without: {found['ratio'].formatted('', 2)}")
+    write_json(given.json, results)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The first request after a start, on a warm cache and a cold one, and what is answered while the kernel compiles."""
+"""Times of the first request after a start with a warm and a cold cache, and of requests while the kernel compiles."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.command import keep, parser
-from benchmarks.figures import Spread
+from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Service, running
-from benchmarks.tasks import ask
+from benchmarks.statistics import Spread
+from benchmarks.tasks import request_task
 from models.registry import load_robot
 from optimizer.energy.kernel_cache import compile_kernel
 
-PATIENCE = 90.0  # for the first answer, and for the compiler [s]
-AFTER = 10  # requests answered by the compiled kernel that are measured
+PATIENCE = 90.0  # longest time for the first answer, and for the compiler [s]
+AFTER = 10  # measured requests after the kernel is compiled
 
 
 def first_answer(service: Service, body: dict[str, Any]) -> Answer:
-    """The answer to a request that is sent as soon as the port is open."""
+    """The answer to a request that is sent as soon as the port accepts connections."""
     client = service.client()
     while True:
         try:
@@ -32,9 +32,9 @@ def first_answer(service: Service, body: dict[str, Any]) -> Answer:
 
 
 def warm(seed: int) -> dict[str, Any]:
-    """Starts with compiled kernels in the cache: once for a request at once, once for one after `/readyz`."""
+    """Times with compiled kernels in the cache: a request sent at once, and one sent after `/readyz` answers 200."""
     compile_kernel(load_robot("ur5e"))
-    body = ask(seed, 0).body
+    body = request_task(seed, 0).body
     with running(ready=False) as service:
         at_once = first_answer(service, body)
         answered = service.age
@@ -52,9 +52,9 @@ def warm(seed: int) -> dict[str, Any]:
 
 
 def cold(seed: int) -> dict[str, Any]:
-    """A start with an empty cache: requests one after another, before and after the compiled kernel is there."""
+    """Times with an empty cache: sequential requests before and after the kernel is compiled."""
     with tempfile.TemporaryDirectory() as cache, running(ready=False, JOULEPATH_CACHE_DIR=cache) as service:
-        body = ask(seed, 0).body
+        body = request_task(seed, 0).body
         first = first_answer(service, body)
         answered, ready = service.age, None
         compiled: float | None = None
@@ -67,7 +67,7 @@ def cold(seed: int) -> dict[str, Any]:
             if ready is None and client.get("/readyz").status == 200:
                 ready = service.age
             index += 1
-            answer = client.optimize(ask(seed, index).body)
+            answer = client.optimize(request_task(seed, index).body)
             statuses.append(answer.status)
             (before if compiled is None else after).append(answer.wall)
         return {
@@ -82,21 +82,21 @@ def cold(seed: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure both."""
+    """Measures both."""
     given = parser(__doc__).parse_args()
-    figures = {"warm": warm(given.seed), "cold": cold(given.seed)}
-    one = figures["warm"]
+    results = {"warm": warm(given.seed), "cold": cold(given.seed)}
+    one = results["warm"]
     print(
         f"warm cache: ready after {one['start_to_ready']:.2f} s, first request then {one['first_after_ready']:.3f} s "
         f"(the same again {one['second']:.3f} s); sent at once, answered {one['start_to_answer']:.2f} s after the start"
     )
-    other = figures["cold"]
+    other = results["cold"]
     print(
         f"cold cache: first answer {other['start_to_answer']:.2f} s after the start, kernel compiled after "
         f"{other['compiled_after'] or float('nan'):.2f} s, {other['answered_meanwhile']} requests answered meanwhile "
-        f"({other['wall_meanwhile'].told(' s', 2)}), afterwards {other['wall_afterwards'].told(' s', 2)}"
+        f"({other['wall_meanwhile'].formatted(' s', 2)}), afterwards {other['wall_afterwards'].formatted(' s', 2)}"
     )
-    keep(given.json, figures)
+    write_json(given.json, results)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Seeded random tasks. Nothing is picked: task `index` of a seed is whatever the generator of (seed, index) draws."""
+"""Seeded random tasks. Task `index` of a seed is drawn by a generator with seed (seed, index); none is left out."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ MOUNTS = {"floor": [0.0, 0.0, -9.81], "wall": [9.81, 0.0, 0.0], "ceiling": [0.0,
 
 @dataclass(frozen=True)
 class Move:
-    """A motion between two configurations (nq,) [rad], each joint drawn evenly from one turn within its limits.
+    """A motion between two configurations (nq,) [rad]; each joint is uniform over one turn within its limits.
 
-    What the arm could hit is left out: the peers do not know of it.
+    Collisions are ignored, because the other planners do not check them.
     """
 
     seed: int
@@ -34,8 +34,8 @@ class Move:
 
 
 @dataclass(frozen=True)
-class Ask:
-    """A body for `POST /optimize`, and the poses T_base_flange (4, 4) that it asks for."""
+class RequestTask:
+    """A body for `POST /optimize`, and the poses T_base_flange (4, 4) that it requests."""
 
     seed: int
     index: int
@@ -46,7 +46,7 @@ class Ask:
 
 
 def move(seed: int, index: int, robot: Robot | None = None) -> Move:
-    """PreparedProblem `index` of a seed: joint to joint."""
+    """Task `index` of a seed: joint to joint."""
     limits = (robot or load_robot("ur5e")).limits
     rng = np.random.default_rng([seed, index])
     lower, upper = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
@@ -59,13 +59,12 @@ def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
     return (move(seed, index, robot) for index in range(count))
 
 
-def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -> Ask:
-    """PreparedProblem `index` of a seed: a request with default settings between targets that the arm reaches.
+def request_task(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -> RequestTask:
+    """Task `index` of a seed: a request with default settings between reachable targets.
 
-    A target is the pose, or the joints, of a configuration drawn evenly from the whole joint range, and drawn again
-    where the arm would be in itself. Kinds alternate
-    unless one is asked for. `varied` adds what else a request may hold: payload, mount, tighter limits, another
-    objective, a duration, no windings; such a request may well be infeasible.
+    A target is the pose, or the joint positions, of a configuration that is uniform over the joint ranges and without
+    self-collision. The kinds alternate if `kind` is None. `varied` adds other fields at random: payload, mounting,
+    tighter limits, another objective, a duration, no full-turn alternatives. Such a request can be infeasible.
     """
     robot = load_robot("ur5e")
     rng = np.random.default_rng([seed, index])
@@ -76,11 +75,11 @@ def ask(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -
     body: dict[str, Any] = {"robot": robot.name, "start": start, "goal": {"pose": as_pose(T_goal)}}
     if varied:
         body |= _variation(rng, robot)
-    return Ask(seed, index, kind, body, T_start, T_goal)
+    return RequestTask(seed, index, kind, body, T_start, T_goal)
 
 
 def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
-    """A configuration (nq,) in which no link touches another."""
+    """A random configuration (nq,) [rad] without self-collision."""
     model = CollisionModel(Arm(robot=robot))
     while True:
         q = rng.uniform(robot.limits.q_min, robot.limits.q_max)
@@ -88,9 +87,9 @@ def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
             return np.asarray(q)
 
 
-def asks(seed: int, count: int, kind: Kind | None = None, varied: bool = False) -> Iterator[Ask]:
-    """The first `count` requests of a seed; all of one kind if one is asked for."""
-    return (ask(seed, index, kind, varied) for index in range(count))
+def request_tasks(seed: int, count: int, kind: Kind | None = None, varied: bool = False) -> Iterator[RequestTask]:
+    """The first `count` requests of a seed, all of one kind if `kind` is given."""
+    return (request_task(seed, index, kind, varied) for index in range(count))
 
 
 def flange(robot: Robot, q: Array) -> Array:
@@ -102,13 +101,13 @@ def flange(robot: Robot, q: Array) -> Array:
 
 
 def as_pose(T: Array) -> dict[str, list[float]]:
-    """A pose as requests give it."""
+    """A pose as requests state it: position [m] and quaternion x, y, z, w."""
     quaternion = pin.Quaternion(np.ascontiguousarray(T[:3, :3])).normalized()
     return {"position": T[:3, 3].tolist(), "quaternion": quaternion.coeffs().tolist()}
 
 
 def _variation(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """Fields of a request beside its targets, each present in about half of them."""
+    """Random fields of a request other than its targets."""
     fields: dict[str, Any] = {}
     if rng.random() < 0.5:
         mass = float(rng.uniform(0.0, robot.rated_payload))

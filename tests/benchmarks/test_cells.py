@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from benchmarks.cells import CELLS, cell_task
-from benchmarks.scenes import KINDS, misses, run, summary
+from benchmarks.scenes import KINDS, failed_requirements, run, summary
 from optimizer.collision.model import CollisionModel
 
 
@@ -16,11 +16,11 @@ def test_tasks_repeat_and_both_ends_are_clear(index: int) -> None:
     assert CollisionModel(task.arm).least_distance(np.stack([task.q_start, task.q_goal]), 0.0) > 0
 
 
-def test_an_answer_that_hits_something_is_a_miss() -> None:
+def test_an_answer_in_collision_fails_a_requirement() -> None:
     outcomes = [run(cell_task(5, 0), kind) for kind in KINDS]
-    assert [outcome.hits for outcome in outcomes] == [0, 0]
-    assert misses(summary(outcomes)) == []
-    outcomes[0].hits = 1
-    assert len(misses(summary(outcomes))) == 1
-    outcomes[1].refusal = "NoTrajectory"
-    assert len(misses(summary(outcomes))) == 2
+    assert [outcome.collisions for outcome in outcomes] == [0, 0]
+    assert failed_requirements(summary(outcomes)) == []
+    outcomes[0].collisions = 1
+    assert len(failed_requirements(summary(outcomes))) == 1
+    outcomes[1].error = "NoTrajectory"
+    assert len(failed_requirements(summary(outcomes))) == 2

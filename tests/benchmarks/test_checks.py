@@ -11,9 +11,9 @@ import pytest
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
 from app.schemas.request import OptimizeRequest
-from benchmarks.checks import allowed, beats, faults
+from benchmarks.checks import allowed, beats, errors_found
 from benchmarks.motion import SplineMotion, replay
-from benchmarks.tasks import Ask, ask
+from benchmarks.tasks import RequestTask, request_task
 from optimizer.optimize import optimize
 
 Json = dict[str, Any]
@@ -23,23 +23,23 @@ RATIO_ERROR = 2e-3  # between the certificate's grid and this one
 
 
 @pytest.fixture(scope="module")
-def task() -> Ask:
-    return ask(0, 0)
+def task() -> RequestTask:
+    return request_task(0, 0)
 
 
 @pytest.fixture(scope="module")
-def answered(task: Ask) -> Json:
+def answered(task: RequestTask) -> Json:
     request = OptimizeRequest.model_validate(task.body)
     content = to_optimize_response(request, "id", optimize(to_problem(request, 10.0)))
     answer: Json = orjson.loads(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
     return answer
 
 
-def found(task: Ask, answer: Json) -> list[str]:
-    return faults(task.body, answer, task.T_start, task.T_goal)
+def found(task: RequestTask, answer: Json) -> list[str]:
+    return errors_found(task.body, answer, task.T_start, task.T_goal)
 
 
-def test_nothing_is_wrong_with_an_answer(task: Ask, answered: Json) -> None:
+def test_nothing_is_wrong_with_an_answer(task: RequestTask, answered: Json) -> None:
     assert found(task, answered) == []
 
 
@@ -82,7 +82,7 @@ def be_beaten(answer: Json) -> None:
     "spoil",
     [shift_goal, hurry, lose_energy, boast, break_a_limit, forget_a_limit, miss_the_start, be_beaten],
 )
-def test_what_is_wrong_is_found(task: Ask, answered: Json, spoil: Callable[[Json], None]) -> None:
+def test_what_is_wrong_is_found(task: RequestTask, answered: Json, spoil: Callable[[Json], None]) -> None:
     answer = copy.deepcopy(answered)
     spoil(answer)
     assert found(task, answer)
@@ -105,7 +105,7 @@ def test_allowed_durations() -> None:
     assert allowed(2.0) == (2.0, 2.0)
 
 
-def test_replay_agrees_with_the_certificate(task: Ask, answered: Json) -> None:
+def test_replay_agrees_with_the_certificate(task: RequestTask, answered: Json) -> None:
     spline = answered["trajectory"]["spline"]
     points = np.array(spline["control_points"])
     problem = to_problem(OptimizeRequest.model_validate(task.body), 10.0)

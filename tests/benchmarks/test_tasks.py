@@ -7,8 +7,8 @@ import pytest
 from app.convert.request import to_problem
 from app.schemas.request import OptimizeRequest
 from benchmarks.chains import chain
-from benchmarks.figures import Spread, exponent
-from benchmarks.tasks import KINDS, ask, asks, flange, move, moves
+from benchmarks.statistics import Spread, exponent
+from benchmarks.tasks import KINDS, flange, move, moves, request_task, request_tasks
 from models.registry import load_robot
 from models.robot import Robot
 from optimizer.energy.kernel import Kernel
@@ -29,8 +29,8 @@ def robot() -> Robot:
 def test_a_task_is_its_seed_and_index() -> None:
     again = list(moves(3, 4))[2]
     assert np.array_equal(move(3, 2).q_start, again.q_start) and np.array_equal(move(3, 2).q_goal, again.q_goal)
-    assert ask(3, 2).body == list(asks(3, 4))[2].body
-    assert ask(3, 2).body != ask(3, 3).body != ask(4, 3).body
+    assert request_task(3, 2).body == list(request_tasks(3, 4))[2].body
+    assert request_task(3, 2).body != request_task(3, 3).body != request_task(4, 3).body
 
 
 def test_moves_are_within_one_turn_and_the_limits(robot: Robot) -> None:
@@ -42,7 +42,7 @@ def test_moves_are_within_one_turn_and_the_limits(robot: Robot) -> None:
 
 @pytest.mark.parametrize("index", range(20))
 def test_requests_are_valid_and_reachable(robot: Robot, index: int) -> None:
-    task = ask(0, index)
+    task = request_task(0, index)
     assert task.kind == KINDS[index % 2]
     problem = to_problem(OptimizeRequest.model_validate(task.body), 10.0)
     for target, T in ((problem.start, task.T_start), (problem.goal, task.T_goal)):
@@ -53,7 +53,7 @@ def test_requests_are_valid_and_reachable(robot: Robot, index: int) -> None:
 
 @pytest.mark.parametrize("index", range(40))
 def test_varied_requests_are_valid(index: int) -> None:
-    OptimizeRequest.model_validate(ask(0, index, varied=True).body)
+    OptimizeRequest.model_validate(request_task(0, index, varied=True).body)
 
 
 @pytest.mark.parametrize("joints", range(2, 8))
@@ -78,6 +78,6 @@ def test_exponent_and_spread() -> None:
     x = np.array([8.0, 13.0, 32.0])
     assert exponent(x, 3 * x**2.5) == pytest.approx(2.5)
     spread = Spread.of([1.0, 2.0, 3.0, 4.0, 10.0])
-    assert (spread.count, spread.least, spread.p50, spread.most) == (5, 1.0, 3.0, 10.0)
+    assert (spread.count, spread.minimum, spread.p50, spread.maximum) == (5, 1.0, 3.0, 10.0)
     assert spread.times(1e3).p50 == 3000.0 and spread.times(1e3).count == 5
     assert Spread.of([]).count == 0

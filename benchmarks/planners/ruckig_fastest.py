@@ -1,4 +1,4 @@
-"""Ruckig: time-optimal under limits of speed, acceleration and jerk; what users run today."""
+"""ruckig: time-optimal under limits on speed, acceleration and jerk."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import ruckig
 from benchmarks.motion import Motion
 from models.robot import Array, Robot
 
-INSTANT = 1e-6  # over which jerk is told from acceleration [s]
+INSTANT = 1e-6  # step of the finite difference that gives jerk from acceleration [s]
 
 
 class RuckigMotion:
@@ -19,11 +19,11 @@ class RuckigMotion:
 
     @property
     def duration(self) -> float:
-        """Its length [s]."""
+        """Duration [s]."""
         return float(self.trajectory.duration)
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """As `Motion` has it."""
+        """See `Motion.sample`."""
         states = np.array([self.trajectory.at_time(instant) for instant in t.tolist()])
         before = np.array([self.trajectory.at_time(max(instant - INSTANT, 0.0))[2] for instant in t.tolist()])
         jerk = (states[:, 2] - before) / INSTANT
@@ -31,18 +31,18 @@ class RuckigMotion:
 
 
 class RuckigFastest:
-    """Least time; it knows neither torque nor energy."""
+    """Least time, without limits on torque and without energy."""
 
     title = "ruckig, time-optimal"
     packages: tuple[str, ...] = ("ruckig",)
-    what = "least time under limits of speed, acceleration and jerk, joints ending together; knows no torque"
+    what = "least time under limits of speed, acceleration and jerk, all joints end together; no limit on torque"
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.generator = ruckig.Ruckig(robot.nq)
 
     def plan(self, q_start: Array, q_goal: Array) -> Motion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         limits = self.robot.limits
         given = ruckig.InputParameter(self.robot.nq)
         given.current_position, given.target_position = q_start.tolist(), q_goal.tolist()

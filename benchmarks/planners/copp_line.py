@@ -1,4 +1,4 @@
-"""copp: the straight line with a time law of least idle energy, copper loss and friction, by conic programming."""
+"""copp: a time scaling of the straight line with least idle energy, copper loss and friction, by conic programming."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pinocchio as pin
 from benchmarks.motion import Motion
 from models.robot import Array, Robot
 
-# Stations lie closer near the ends, where the law is slow: evenly spaced ones waste time there.
+# stations are denser near the ends, where the motion is slow: even spacing would cost time there
 _X = np.linspace(0.0, 1.0, 201)
 STATIONS = 3 * _X**2 - 2 * _X**3
 ROUNDS = 3  # of linearising jerk limits and friction around the last profile
 THERMAL = 0.25  # ThermalEnergy of copp 0.2 is four times ∫ Σ (normalize · tau)² dt
-TYPICAL = 0.5  # share of the greatest speed at which concave friction is taken
-FLOOR = 1e-3  # least speed around which friction's work is linearised, relative to the greatest
+TYPICAL = 0.5  # speed at which concave friction is evaluated / largest speed
+FLOOR = 1e-3  # least speed at which friction work is linearised / largest speed
 
 
 class CoppMotion:
@@ -30,7 +30,7 @@ class CoppMotion:
         self.duration, self.times = copp.interpolation.s_to_t_topp3(STATIONS, profile)
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """As `Motion` has it."""
+        """See `Motion.sample`."""
         inner = copp.interpolation.t_to_s_topp3_samples(STATIONS, self.profile, self.times, t[1:-1])
         at = np.concatenate([[0.0], np.clip(inner, 0.0, 1.0), [1.0]])
         v, a, jerk = (np.outer(rate, self.travel) for rate in self._rates(at, t))
@@ -61,7 +61,8 @@ class CoppLine:
     """∫ (idle power + copper loss + viscous friction) dt along the straight line.
 
     The first two are copp's own objectives. Viscous work is concave in its variables and linearised around the last
-    profile, as copp advises for such terms; dry friction works the same whatever the law, and enters the torques.
+    profile, as copp advises for such terms. The work of dry friction does not depend on the time scaling; it enters the
+    torques only.
     """
 
     title = "copp, thermal line"
@@ -75,7 +76,7 @@ class CoppLine:
         self.data = robot.model.createData()
 
     def plan(self, q_start: Array, q_goal: Array) -> Motion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         travel = q_goal - q_start
         arm = self._arm(q_start, travel)
         last = (len(STATIONS) - 1, (0.0, 0.0))

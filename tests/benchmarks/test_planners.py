@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from benchmarks.comparison import Peers
+from benchmarks.comparison import Comparison
 from benchmarks.motion import Replay, replay
-from benchmarks.peers.__main__ import PEERS
-from benchmarks.peers.casadi_opti import derivative_points
-from benchmarks.peers.peer import Peer, versions
+from benchmarks.planners.__main__ import PLANNERS
+from benchmarks.planners.casadi_opti import derivative_points
+from benchmarks.planners.planner import Planner, versions
 from benchmarks.tasks import move
 from models.registry import load_robot
 from optimizer.trajectories.bspline import DEGREE, uniform
@@ -21,23 +21,23 @@ ENDS = 1e-6  # rad
 SLACK = 1e-3  # by which limits may be exceeded
 IDENTITY = 1e-3  # sum of energy's parts against the total: what makes a replay's speeds and torques fit together
 # toppra knows no jerk; bounds on a grid are broken between its points
-HOLDING = [name for name in PEERS if name not in ("toppra", "opti-grid")]
+HOLDING = [name for name in PLANNERS if name not in ("toppra", "opti-grid")]
 
 
 def planned(name: str) -> Replay:
     if name in OPTIONAL:
         pytest.importorskip(OPTIONAL[name])
     robot, task = load_robot("ur5e"), move(0, 0)
-    module, kind = PEERS[name].split(":")
-    peer: Peer = getattr(import_module(f"benchmarks.peers.{module}"), kind)(robot)
-    assert versions(peer)
-    motion = peer.plan(task.q_start, task.q_goal)
+    module, kind = PLANNERS[name].split(":")
+    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), kind)(robot)
+    assert versions(planner)
+    motion = planner.plan(task.q_start, task.q_goal)
     assert motion is not None
     return replay(problem_with(task.q_start, task.q_goal), motion, task.q_start, task.q_goal)
 
 
-@pytest.mark.parametrize("name", PEERS)
-def test_peers_go_where_they_are_sent(name: str) -> None:
+@pytest.mark.parametrize("name", PLANNERS)
+def test_planners_reach_start_and_goal(name: str) -> None:
     found = planned(name)
     electrical = found.energy.electrical
     assert found.end_error < ENDS
@@ -48,15 +48,15 @@ def test_peers_go_where_they_are_sent(name: str) -> None:
 
 def test_gradient_of_the_energy_given_to_drake() -> None:
     pytest.importorskip("pydrake")
-    peer = import_module("benchmarks.peers.drake_trajectory").DrakeTrajectory(load_robot("ur5e"))
+    planner = import_module("benchmarks.planners.drake_trajectory").DrakeTrajectory(load_robot("ur5e"))
     rng = np.random.default_rng(0)
-    x = np.append(rng.normal(size=peer.basis.n * 6), 2.0)
-    _, gradient = peer.energy._evaluate(x)
+    x = np.append(rng.normal(size=planner.basis.n * 6), 2.0)
+    _, gradient = planner.energy._evaluate(x)
     step = 1e-6
     for k in rng.integers(len(x), size=10):
         change = np.zeros(len(x))
         change[k] = step
-        slope = (peer.energy._evaluate(x + change)[0] - peer.energy._evaluate(x - change)[0]) / (2 * step)
+        slope = (planner.energy._evaluate(x + change)[0] - planner.energy._evaluate(x - change)[0]) / (2 * step)
         assert slope == pytest.approx(gradient[k], rel=1e-5, abs=1e-6)
 
 
@@ -69,12 +69,12 @@ def test_control_points_of_derivatives(order: int) -> None:
 
 
 def test_the_best_is_the_least_energy_within_limits() -> None:
-    def figures(energy: float, worst: float | None) -> dict[str, object]:
+    def results(energy: float, worst: float | None) -> dict[str, object]:
         row = {"index": 0, "wall": 0.1, "energy": energy, "duration": 1.0, "worst": worst}
         return {"title": "x", "versions": "y 1", "what": "z", "seed": 0, "rows": [row, {"index": 1, "wall": 0.2}]}
 
-    # JSON has no infinity: an unbounded share comes back as null
-    found = {"a": figures(110.0, 1.0), "b": figures(90.0, 1.2), "c": figures(80.0, None), "d": figures(100.0, 1.0)}
-    peers = Peers.of(found)
-    assert peers.best[0] == 100.0
-    assert [round(float(peers.above(row)[0]), 3) for row in peers.rows] == [0.1, -0.1, -0.2, 0.0]
+    # JSON has no infinity: an unbounded ratio comes back as null
+    found = {"a": results(110.0, 1.0), "b": results(90.0, 1.2), "c": results(80.0, None), "d": results(100.0, 1.0)}
+    planners = Comparison.of(found)
+    assert planners.best[0] == 100.0
+    assert [round(float(planners.above(row)[0]), 3) for row in planners.rows] == [0.1, -0.1, -0.2, 0.0]

@@ -1,4 +1,4 @@
-"""joulepath itself: one candidate alone, the whole answer, and the straight line with an optimised time law."""
+"""joulepath itself: one candidate, the whole answer, and the straight line with an optimised time scaling."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class Candidate:
 
     title = "joulepath, one candidate"
     packages: tuple[str, ...] = ()
-    what = "B-spline of 13 control points, duration free, least electrical energy; limits hold between the nodes too"
+    what = "B-spline of 13 control points, duration free, least electrical energy; within limits between the nodes, too"
 
     def __init__(self, robot: Robot) -> None:
         _prepare(robot)
         self.robot = robot
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         task = PreparedProblem.of(Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal))
         return _motion(solver_for(task, q_start, q_goal, Deadline.after(PATIENCE)).solve().spline)
 
 
 class Answer:
-    """What a caller gets: refined, compared with the baselines, certified."""
+    """The answer that a user gets: refined, compared with the baselines, certified."""
 
     title = "joulepath, whole answer"
     packages: tuple[str, ...] = ()
@@ -46,7 +46,7 @@ class Answer:
         self.robot = robot
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         try:
             return _motion(
                 optimize(
@@ -62,14 +62,14 @@ class Line:
 
     title = "joulepath, time-scaled line"
     packages: tuple[str, ...] = ()
-    what = "straight line in joint space, its time law a B-spline of least electrical energy, duration free"
+    what = "straight line in joint space, time scaling by a B-spline of least electrical energy, duration free"
 
     def __init__(self, robot: Robot) -> None:
         _prepare(robot)
         self.robot = robot
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         task = PreparedProblem.of(
             Problem(arm=Arm(robot=self.robot, collisions=False), start=q_start, goal=q_goal, method="time_scaling")
         )

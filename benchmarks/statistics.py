@@ -1,4 +1,4 @@
-"""What becomes of many measurements: medians, percentiles, spread, and the exponent of a growth."""
+"""Statistics of repeated measurements: quartiles, percentiles, and the exponent of a power-law fit."""
 
 from __future__ import annotations
 
@@ -11,38 +11,38 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Spread:
-    """Count, least, quartiles, percentiles and greatest of a sample, in the sample's unit."""
+    """Size, minimum, quartiles, percentiles and maximum of a sample, in the unit of the sample."""
 
     count: int
-    least: float
+    minimum: float
     p25: float
     p50: float
     p75: float
     p90: float
     p95: float
     p99: float
-    most: float
+    maximum: float
 
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
-        """All NaN where there are no values."""
+        """The statistics of a sample; NaN for an empty one."""
         if not len(values):
             return Spread(0, *[math.nan] * 8)
         return Spread(len(values), *(float(np.percentile(values, p)) for p in (0, 25, 50, 75, 90, 95, 99, 100)))
 
     def times(self, factor: float) -> Spread:
-        """The same in another unit."""
+        """The same statistics in another unit."""
         return Spread(self.count, *(value * factor for value in list(asdict(self).values())[1:]))
 
-    def told(self, unit: str = "", digits: int = 1) -> str:
-        """Median, 95th percentile and middle half in one line."""
+    def formatted(self, unit: str = "", digits: int = 1) -> str:
+        """Median, 95th percentile, quartiles, maximum and size in one line."""
         numbers = {name: f"{value:.{digits}f}" for name, value in asdict(self).items()}
         return (
-            f"p50 {numbers['p50']}{unit}, p95 {numbers['p95']}{unit} "
-            f"(middle half {numbers['p25']} to {numbers['p75']}, most {numbers['most']}, n = {self.count})"
+            f"median {numbers['p50']}{unit}, 95th percentile {numbers['p95']}{unit} "
+            f"(quartiles {numbers['p25']} and {numbers['p75']}, maximum {numbers['maximum']}, n = {self.count})"
         )
 
 
 def exponent(x: Sequence[float], y: Sequence[float]) -> float:
-    """The power k of y = c xᵏ that fits best in logarithms."""
+    """The exponent k of the power law y = c xᵏ fitted by least squares in logarithms."""
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])

@@ -8,27 +8,27 @@ import casadi as ca
 import numpy as np
 
 from benchmarks.motion import SplineMotion
-from benchmarks.peers.peer import CONTROL_POINTS, NODES
+from benchmarks.planners.planner import CONTROL_POINTS, NODES
 from models.robot import Array, FrictionLaw, Robot
 from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
 from optimizer.energy.losses import drawn_power, power_flow
 from optimizer.trajectories.bspline import DEGREE, Basis, basis_matrix, clamped
 from optimizer.trajectories.seven_segment import shortest_duration
 
-WIDTH = 0.5  # of the rounded corners of power [W]
-KNEE = 0.02  # of friction's rounded reversal [rad/s]
-SLOWED = 1.5  # first duration, in multiples of the shortest that speed, acceleration and jerk allow
-RESTING = 3  # control points that coincide at either end
-GRID = np.linspace(0.0, 1.0, 61)  # where limits hold that are not held by the hull
+WIDTH = 0.5  # width of the smoothed corners of the power [W]
+KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]
+RETIMED = 1.5  # duration of the initial guess / shortest duration within the limits on speed, acceleration and jerk
+RESTING = 3  # coinciding control points at each end: standstill
+GRID = np.linspace(0.0, 1.0, 61)  # points at which limits are constraints if the hull does not imply them
 OPTIONS: dict[str, Any] = {"print_time": False}
 IPOPT: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": 300, "tol": 1e-6}
 
 
 class CasadiOpti:
-    """The programme is built once with the two configurations as parameters, as one would for many solves.
+    """The NLP is built once with the two configurations as parameters, as one would for many solves.
 
-    Torque limits hold at Gauss-Legendre nodes, over which the cost is summed; limits on speed, acceleration and jerk
-    hold for the control points of the derivatives, and by the hull everywhere.
+    Torque limits are constraints at the Gauss-Legendre nodes of the cost. Limits on speed, acceleration and jerk are
+    constraints on the control points of the derivatives, whose hull contains the derivatives everywhere.
     """
 
     title = "CasADi Opti with IPOPT, hull bounds"
@@ -58,14 +58,14 @@ class CasadiOpti:
         opti.subject_to(opti.bounded(0.01, self.duration, 600.0))
         opti.solver("ipopt", OPTIONS, IPOPT)
 
-    def plan(self, q_start: Array, q_goal: Array, bulge: Array | None = None) -> SplineMotion | None:
-        """As `Peer` has it; `bulge` (n - 6, nq) is added to the first guess's free control points."""
+    def plan(self, q_start: Array, q_goal: Array, perturbation: Array | None = None) -> SplineMotion | None:
+        """See `Planner.plan`. `perturbation` (n - 6, nq) [rad] is added to the initial guess's free control points."""
         opti, basis = self.opti, self.basis
         free = q_start + np.outer(basis.quintic[RESTING:-RESTING], q_goal - q_start)
         opti.set_value(self.q_start, q_start)
         opti.set_value(self.q_goal, q_goal)
-        opti.set_initial(self.free, (free if bulge is None else free + bulge).T)
-        opti.set_initial(self.duration, SLOWED * float(shortest_duration(q_goal - q_start, self.robot.limits)))
+        opti.set_initial(self.free, (free if perturbation is None else free + perturbation).T)
+        opti.set_initial(self.duration, RETIMED * float(shortest_duration(q_goal - q_start, self.robot.limits)))
         try:
             solution = opti.solve()
         except RuntimeError:  # what Opti raises when the solver gives up
@@ -75,7 +75,7 @@ class CasadiOpti:
 
 
 class CasadiOptiGrid(CasadiOpti):
-    """The same, with limits on speed, acceleration and jerk on a grid: less wary, and broken in between."""
+    """The same, with limits on speed, acceleration and jerk on a grid: less conservative, and violated in between."""
 
     title = "CasADi Opti with IPOPT, bounds on a grid"
     what = "as before, with bounds on speed, acceleration and jerk at 61 points instead of the hull's"
@@ -94,16 +94,16 @@ def derivative_points(knots: Array, order: int) -> Array:
 
 
 def _wide(limit: Array, columns: int) -> Array:
-    """A limit (nq,) for every column, (nq, columns)."""
+    """A limit (nq,) repeated for every column: (nq, columns)."""
     return np.tile(limit[:, None], columns)
 
 
 def _node(robot: Robot) -> ca.Function:
-    """(q, v, a) → drawn power [W] and motor torque (nq,), corners rounded."""
+    """(q, v, a) → power drawn from the supply [W] and motor torque (nq,) [N·m], with smoothed corners."""
     q, v, a = (ca.SX.sym(name, robot.nq) for name in "qva")
-    nothing = SymbolicPayload(ca.SX(0), ca.SX(3, 1), ca.SX(6, 1))
+    no_payload = SymbolicPayload(ca.SX(0), ca.SX(3, 1), ca.SX(6, 1))
     tau = inverse_dynamics(
-        robot.model, q, v, a, nothing, ca.SX(robot.model.gravity.linear), ca.SX(robot.drives.rotor_inertia)
+        robot.model, q, v, a, no_payload, ca.SX(robot.model.gravity.linear), ca.SX(robot.drives.rotor_inertia)
     )
     law = robot.friction
     friction = FrictionLaw(law.name, law.coulomb, law.curved, law.speed, law.viscous, KNEE)

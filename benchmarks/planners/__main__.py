@@ -1,6 +1,6 @@
-"""One peer over the seeded joint-to-joint tasks, in a process of its own, replayed on the fine grid.
+"""One planner on the seeded joint-to-joint tasks, in a process of its own. Its motions are replayed on the fine grid.
 
-python -m benchmarks.peers drake --count 20
+python -m benchmarks.planners drake --count 20
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ import time
 from importlib import import_module
 from typing import Any
 
-from benchmarks.command import keep, on_one_core, parser
-from benchmarks.figures import Spread
+from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.motion import Replay, replay
-from benchmarks.peers.peer import Peer, versions
+from benchmarks.planners.planner import Planner, versions
+from benchmarks.statistics import Spread
 from benchmarks.tasks import Move, moves
 from models.registry import load_robot
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 
-PEERS = {
+PLANNERS = {
     "answer": "joulepath:Answer",
     "candidate": "joulepath:Candidate",
     "line": "joulepath:Line",
@@ -29,15 +29,15 @@ PEERS = {
     "toppra": "toppra_fastest:ToppraFastest",
     "ruckig": "ruckig_fastest:RuckigFastest",
 }
-REACHED = 1e-6  # how far off its ends a motion may be [rad]
+REACHED = 1e-6  # largest joint error at start and goal [rad]
 
 
-def attempt(peer: Peer, task: Move) -> tuple[float, Replay | None]:
-    """Wall time [s] and what came of a task; an exception of the peer counts as no motion."""
+def attempt(planner: Planner, task: Move) -> tuple[float, Replay | None]:
+    """Wall time [s] and the replayed motion of a task; None without a motion or after an exception of the planner."""
     began = time.perf_counter()
     try:
-        motion = peer.plan(task.q_start, task.q_goal)
-    except Exception as error:  # a stranger's failure must not end the comparison
+        motion = planner.plan(task.q_start, task.q_goal)
+    except Exception as error:  # a failure of one planner must not end the comparison
         print(f"index {task.index}: {error!r}")
         motion = None
     wall = time.perf_counter() - began
@@ -53,43 +53,42 @@ def attempt(peer: Peer, task: Move) -> tuple[float, Replay | None]:
 
 
 def main() -> None:
-    """Run one peer."""
+    """Runs one planner on all tasks."""
     arguments = parser(__doc__)
-    arguments.add_argument("peer", choices=PEERS)
+    arguments.add_argument("planner", choices=PLANNERS)
     arguments.add_argument("--count", type=int, default=20, help="tasks (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
-    module, name = PEERS[given.peer].split(":")
+    module, name = PLANNERS[given.planner].split(":")
     began = time.perf_counter()
-    peer: Peer = getattr(import_module(f"benchmarks.peers.{module}"), name)(robot)
+    planner: Planner = getattr(import_module(f"benchmarks.planners.{module}"), name)(robot)
     tasks = list(moves(given.seed, given.count))
-    attempt(peer, tasks[0])  # what is done once, at the first call
+    attempt(planner, tasks[0])  # the first call builds what later calls reuse
     built = time.perf_counter() - began
     rows: list[dict[str, Any]] = []
     for task in tasks:
-        wall, found = attempt(peer, task)
+        wall, found = attempt(planner, task)
         rows.append({"index": task.index, "wall": wall})
         if found is not None:
             rows[-1] |= {
                 "energy": found.energy.electrical.total,
                 "duration": found.duration,
-                "shares": found.ratios,
+                "ratios": found.ratios,
                 "worst": found.worst,
             }
     solved = [row for row in rows if "energy" in row]
-    print(f"{peer.title} ({versions(peer)}): {peer.what}")
-    print(
-        f"solved {len(solved)} of {len(rows)}, wall {Spread.of([row['wall'] for row in rows]).times(1e3).told(' ms')}"
-    )
-    print(f"energy {Spread.of([row['energy'] for row in solved]).told(' J')}")
-    print(f"worst share of a limit {max((row['worst'] for row in solved), default=0.0):.4f}")
-    keep(
+    print(f"{planner.title} ({versions(planner)}): {planner.what}")
+    times = Spread.of([row["wall"] for row in rows]).times(1e3)
+    print(f"solved {len(solved)} of {len(rows)}, wall {times.formatted(' ms')}")
+    print(f"energy {Spread.of([row['energy'] for row in solved]).formatted(' J')}")
+    print(f"largest value / limit {max((row['worst'] for row in solved), default=0.0):.4f}")
+    write_json(
         given.json,
         {
-            "title": peer.title,
-            "versions": versions(peer),
-            "what": peer.what,
+            "title": planner.title,
+            "versions": versions(planner),
+            "what": planner.what,
             "seed": given.seed,
             "built": built,
             "rows": rows,

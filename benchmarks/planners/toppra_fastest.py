@@ -1,4 +1,4 @@
-"""toppra: the time-optimal law along the straight line under limits of speed, acceleration and torque."""
+"""toppra: the time-optimal time scaling of the straight line under limits on speed, acceleration and torque."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ class ToppraMotion:
 
     @property
     def duration(self) -> float:
-        """Its length [s]."""
+        """Duration [s]."""
         return float(self.trajectory.duration)
 
     def sample(self, t: Array) -> tuple[Array, Array, Array, Array | None]:
-        """As `Motion` has it: acceleration jumps, so that jerk has no bound."""
+        """See `Motion.sample`: acceleration is discontinuous, so that jerk is unbounded."""
         q, v, a = (np.asarray(self.trajectory(t, order)) for order in range(3))
         return q, v, a, None
 
 
 class ToppraFastest:
-    """Least time along the straight line; it knows neither jerk nor energy."""
+    """Least time along the straight line, without limits on jerk and without energy."""
 
     title = "toppra, time-optimal line"
     packages: tuple[str, ...] = ("toppra",)
-    what = "straight line in joint space, least time under limits of speed, acceleration and torque; knows no jerk"
+    what = "straight line in joint space, least time under limits of speed, acceleration and torque; no limit on jerk"
 
     def __init__(self, robot: Robot) -> None:
         self.model = robot.model
@@ -58,7 +58,7 @@ class ToppraFastest:
         return np.asarray(pin.rnea(self.model, self.data, q, v, a))
 
     def plan(self, q_start: Array, q_goal: Array) -> Motion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         travel = q_goal - q_start
         path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([travel, travel]))
         instance = algorithm.TOPPRA(self.constraints, path, gridpoints=GRID, parametrizer="ParametrizeConstAccel")

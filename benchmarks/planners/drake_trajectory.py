@@ -16,21 +16,21 @@ from pydrake.solvers import SnoptSolver, SolverOptions
 from pydrake.trajectories import BsplineTrajectory
 
 from benchmarks.motion import SplineMotion
-from benchmarks.peers.peer import CONTROL_POINTS, NODES
+from benchmarks.planners.planner import CONTROL_POINTS, NODES
 from models.robot import Array, Robot
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.seven_segment import shortest_duration
 
-WIDTH = 0.5  # of the rounded corners of power [W]
-KNEE = 0.02  # of friction's rounded reversal [rad/s]
-SLOWED = 1.5  # first duration, in multiples of the shortest that speed, acceleration and jerk allow
+WIDTH = 0.5  # width of the smoothed corners of the power [W]
+KNEE = 0.02  # speed range of the smoothed friction reversal [rad/s]
+RETIMED = 1.5  # duration of the initial guess / shortest duration within the limits on speed, acceleration and jerk
 OPTIONS = {"Major optimality tolerance": 1e-5, "Major feasibility tolerance": 1e-6, "Major iterations limit": 500}
 
 
 class DrakeTrajectory:
     """Hull bounds on speed, acceleration and jerk, and effort bounds at the nodes, as Drake offers them.
 
-    Drake's plant knows no friction of this kind: effort bounds are tightened by the most that friction can take.
+    Drake's plant has no friction of this kind: effort bounds are tightened by the largest friction torque.
     """
 
     title = "Drake with SNOPT"
@@ -47,33 +47,33 @@ class DrakeTrajectory:
             self.options.SetOption(self.solver.solver_id(), name, value)
 
     def plan(self, q_start: Array, q_goal: Array) -> SplineMotion | None:
-        """As `Peer` has it."""
+        """See `Planner.plan`."""
         limits, nq = self.robot.limits, self.robot.nq
-        duration = SLOWED * float(shortest_duration(q_goal - q_start, limits))
+        duration = RETIMED * float(shortest_duration(q_goal - q_start, limits))
         knots = self.basis.knots
         guess = q_start + np.outer(self.basis.quintic, q_goal - q_start)
         trajectory = BsplineTrajectory(
             BsplineBasis(DEGREE + 1, (knots * duration).tolist()), [point[:, None] for point in guess]
         )
-        programme = KinematicTrajectoryOptimization(trajectory)
+        program = KinematicTrajectoryOptimization(trajectory)
         none = np.zeros(nq)
         for s, q in ((0.0, q_start), (1.0, q_goal)):
-            programme.AddPathPositionConstraint(q, q, s)
-            programme.AddPathVelocityConstraint(none, none, s)
-            programme.AddPathAccelerationConstraint(none, none, s)
-        programme.AddPositionBounds(limits.q_min, limits.q_max)
-        programme.AddVelocityBounds(-limits.v_max, limits.v_max)
-        programme.AddAccelerationBounds(-limits.a_max, limits.a_max)
-        programme.AddJerkBounds(-limits.j_max, limits.j_max)
-        programme.AddEffortBoundsAtNormalizedTimes(self.plant, self.basis.nodes)
-        programme.AddDurationConstraint(0.01, 600.0)
-        points = programme.control_points()
-        unknowns = np.append(points.T.ravel(), programme.duration())
-        programme.get_mutable_prog().AddCost(self.energy, unknowns)
-        result = self.solver.Solve(programme.prog(), None, self.options)
+            program.AddPathPositionConstraint(q, q, s)
+            program.AddPathVelocityConstraint(none, none, s)
+            program.AddPathAccelerationConstraint(none, none, s)
+        program.AddPositionBounds(limits.q_min, limits.q_max)
+        program.AddVelocityBounds(-limits.v_max, limits.v_max)
+        program.AddAccelerationBounds(-limits.a_max, limits.a_max)
+        program.AddJerkBounds(-limits.j_max, limits.j_max)
+        program.AddEffortBoundsAtNormalizedTimes(self.plant, self.basis.nodes)
+        program.AddDurationConstraint(0.01, 600.0)
+        points = program.control_points()
+        variables = np.append(points.T.ravel(), program.duration())
+        program.get_mutable_prog().AddCost(self.energy, variables)
+        result = self.solver.Solve(program.prog(), None, self.options)
         if not result.is_success():
             return None
-        found = float(result.GetSolution(programme.duration()))
+        found = float(result.GetSolution(program.duration()))
         return SplineMotion(knots * found, np.asarray(result.GetSolution(points)).T, DEGREE)
 
 
@@ -81,7 +81,7 @@ class _Energy:
     """Drawn electrical energy [J, in hundreds] of control points row by row and a duration.
 
     Torques and their derivatives come from the plant by automatic differentiation over the 3 nq states of a node; from
-    there to power and to the unknowns by the chain rule, which is far cheaper than 79 derivatives all the way.
+    there to power and to the variables by the chain rule, which is far cheaper than 79 derivatives all the way.
     """
 
     SCALE = 1e-2
@@ -93,7 +93,7 @@ class _Energy:
         self.forces = MultibodyForces_[AutoDiffXd](self.plant)
 
     def __call__(self, x: Array) -> Any:
-        """The cost, with its gradient where Drake asks for it."""
+        """The cost, with its gradient where Drake requests it."""
         if x.dtype != object:
             return self._evaluate(x)[0]
         value, gradient = self._evaluate(ExtractValue(x).ravel())
@@ -128,9 +128,9 @@ class _Energy:
         base = electronics.idle_power + electronics.controller_power + float(drives.inverter_constant.sum())
         net = base + (motor * v + loss).sum(axis=1)
         soft = np.hypot(net, WIDTH)
-        share = electronics.regeneration
-        drawn = ((1 - share) * soft + (1 + share) * net) / 2
-        by_net = ((1 - share) * net / soft + (1 + share)) / 2
+        recovered = electronics.regeneration
+        drawn = ((1 - recovered) * soft + (1 + recovered) * net) / 2
+        by_net = ((1 - recovered) * net / soft + (1 + recovered)) / 2
         slopes = np.einsum("kj,kjdi->dki", by_motor, jacobian)
         slopes[1] += motor + by_motor * steepness
         return drawn, slopes * by_net[None, :, None]

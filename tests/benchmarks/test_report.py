@@ -1,0 +1,53 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from benchmarks.energies import RELATIVE, differences
+from benchmarks.requirements import Requirement, requirements
+
+ROW = {"index": 3, "kind": "payload", "task": [0.1, 0.2], "outcome": "optimal", "energy": 50.0, "duration": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("measured", "at_least", "satisfied"),
+    [(1.0, False, True), (1.0, True, True), (1.1, False, False), (0.9, True, False), (math.nan, False, False)],
+)
+def test_a_requirement_is_satisfied_up_to_its_bound(measured: float, at_least: bool, satisfied: bool) -> None:
+    assert Requirement("task", "quantity [1]", "maximum", measured, 1.0, at_least).satisfied is satisfied
+
+
+def test_a_row_has_one_value_per_column() -> None:
+    row = Requirement("one candidate", "time [ms]", "median", 12.34, 10, digits=1).row()
+    assert row == ["one candidate", "time [ms]", "median", "≤ 10", "12.3", "**no**"]
+
+
+def test_sections_without_results_have_no_requirements() -> None:
+    assert requirements({"solver": None}) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"energy": 50.0 * (1 + 2 * RELATIVE)},
+        {"energy": 50.0 * (1 - 2 * RELATIVE)},
+        {"energy": math.nan},
+        {"energy": None, "outcome": "NoTrajectory"},
+        {"outcome": "feasible"},
+        {"task": [0.1, 0.3]},
+        {"task": [0.1]},
+        {"kind": "cell"},
+        {"index": 4},
+    ],
+)
+def test_a_different_energy_outcome_or_task_is_named(change: dict[str, object]) -> None:
+    assert differences([ROW], [ROW]) == []
+    (message,) = differences([ROW | change], [ROW])
+    assert message.startswith(f"index {(ROW | change)['index']} ")
+
+
+def test_rounding_is_no_difference() -> None:
+    assert differences([ROW | {"energy": 50.0 * (1 + 0.5 * RELATIVE), "task": [0.1 + 1e-12, 0.2]}], [ROW]) == []
+    refused = ROW | {"energy": None, "outcome": "NoTrajectory"}
+    assert differences([refused], [refused]) == []
