@@ -43,6 +43,12 @@ class Plant:
         """Pinocchio model of the arm, payload and gravity included."""
         return rigid_body_model(self.arm)
 
+    @cached_property
+    def _data(self) -> pin.Data:
+        # Threads may share it for functions that return a number: Pinocchio's calls hold Python's global lock, so that
+        # no other thread writes into the data before the number is returned.
+        return self.model.createData()
+
     def parameters(
         self,
         electrical: float = 0.0,
@@ -98,8 +104,7 @@ class Plant:
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""
-        # not one for all calls: Pinocchio writes its results into the data
-        return float(pin.computePotentialEnergy(self.model, self.model.createData(), q))
+        return float(pin.computePotentialEnergy(self.model, self._data, q))
 
     def energy(self, spline: Spline) -> Energy:
         """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
