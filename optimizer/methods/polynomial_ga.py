@@ -8,18 +8,16 @@ convergence, so its answers never count as optimal. It does not avoid obstacles:
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import quintic
-from optimizer.trajectories.polynomial import polynomials
+from optimizer.trajectories.polynomial import PolynomialBasis, polynomials
 from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
 
 # degree 9: with more values a few seconds are too short for the search
@@ -47,20 +45,24 @@ class PolynomialGA(Method):
     most_solved: ClassVar[int | None] = 3
     converges: ClassVar[bool] = False
 
-    def __init__(
-        self,
-        prepared: PreparedProblem,
-        q_start: Array,
-        q_goal: Array,
-        deadline: Deadline,
-        interval: DurationInterval | None = None,
-    ) -> None:
-        super().__init__(prepared, q_start, q_goal, deadline, interval)
-        self.space = polynomials(NODES)
-        self._line = q_start + np.outer(quintic.fraction(self.space.at), q_goal - q_start)
-        self._reach = np.maximum(DISPLACEMENT_FRACTION * np.abs(q_goal - q_start), LEAST_REACH)
-        self.generations = 0
-        self.first_cost = np.inf
+    # generations so far, and the least cost [J] of the first population
+    generations: int = 0
+    first_cost: float = np.inf
+
+    @property
+    def space(self) -> PolynomialBasis:
+        """The space of the polynomials."""
+        return polynomials(NODES)
+
+    @cached_property
+    def _line(self) -> Array:
+        """The quintic along the straight line at the nodes, (NODES, nq) [rad]."""
+        return self.q_start + np.outer(quintic.fraction(self.space.at), self.q_goal - self.q_start)
+
+    @cached_property
+    def _reach(self) -> Array:
+        """Greatest deviation (nq,) [rad] of a value from the straight line."""
+        return np.maximum(DISPLACEMENT_FRACTION * np.abs(self.q_goal - self.q_start), LEAST_REACH)
 
     def solve(self) -> SolveResult:
         """Run all generations, or until the deadline, and bring the best motion within the limits."""

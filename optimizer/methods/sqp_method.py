@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import Deadline
-from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.limit_repair import (
     MARGIN,
     LimitCheck,
@@ -24,7 +24,6 @@ from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveRe
 from optimizer.nlp.coordinates import Coordinates
 from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import Result, SqpStatus, solve
-from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Clearance
 from optimizer.trajectories.bspline import Basis
@@ -70,16 +69,10 @@ class _Stage:
 class SqpMethod(Method):
     """A method whose motions form a linear space; the SQP optimises them."""
 
-    def __init__(
-        self,
-        prepared: PreparedProblem,
-        q_start: Array,
-        q_goal: Array,
-        deadline: Deadline,
-        interval: DurationInterval | None = None,
-    ) -> None:
-        super().__init__(prepared, q_start, q_goal, deadline, interval)
-        self.coordinates = self._coordinates(prepared.problem.arm.active_limits.scaled(1 - MARGIN))
+    @cached_property
+    def coordinates(self) -> Coordinates:
+        """The coordinates of the spline, with limits tightened by MARGIN."""
+        return self._coordinates(self.prepared.problem.arm.active_limits.scaled(1 - MARGIN))
 
     def improve(self, guess: Guess, deadline: Deadline | None = None) -> SolveResult:
         """Optimise from a guess. While the motion exceeds a limit between the nodes, tighten the limit and repeat.

@@ -7,14 +7,14 @@ of the controller's motion. Here this is the time-optimal jerk-limited motion of
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
-from optimizer.deadline import Deadline
-from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample
@@ -27,26 +27,35 @@ FACTOR_TOLERANCE = 1e-5
 RATES_USED, TORQUE_USED = 1 - 1e-9, 1 - 1e-4
 
 
+@dataclass(frozen=True)
+class _Samples:
+    """The given motion on the certificate's grid: q [rad], v [rad/s], torques [N·m], (k, nq) each.
+
+    Rigid-body torque is the `static` torque plus the part `moving`, quadratic in speed, which a factor k divides by k².
+    """
+
+    q: Array
+    v: Array
+    static: Array
+    moving: Array
+
+
 class UniformScaling(Method):
     """Solves a candidate by the factor that scales the time of its time-optimal motion."""
 
-    def __init__(
-        self,
-        prepared: PreparedProblem,
-        q_start: Array,
-        q_goal: Array,
-        deadline: Deadline,
-        interval: DurationInterval | None = None,
-    ) -> None:
-        super().__init__(prepared, q_start, q_goal, deadline, interval)
-        self.given = time_optimal_spline(prepared.problem.arm.active_limits, q_start, q_goal)
-        q, self._v, a = sample(self.given, grid(self.given.duration))
-        self._q = q
+    _evaluations: int = 0
+
+    @cached_property
+    def given(self) -> Spline:
+        """The time-optimal motion."""
+        return time_optimal_spline(self.prepared.problem.arm.active_limits, self.q_start, self.q_goal)
+
+    @cached_property
+    def _samples(self) -> _Samples:
+        q, v, a = sample(self.given, grid(self.given.duration))
         still = np.zeros_like(q)
-        # rigid-body torque is the static torque plus a part quadratic in speed, which a factor k divides by k²
-        self._holding = prepared.torques(q, still, still)
-        self._moving = prepared.torques(q, self._v, a) - self._holding
-        self._evaluations = 0
+        static = self.prepared.torques(q, still, still)
+        return _Samples(q, v, static, self.prepared.torques(q, v, a) - static)
 
     def solve(self) -> SolveResult:
         """The factor of least cost within the limits and the allowed durations."""
@@ -85,13 +94,11 @@ class UniformScaling(Method):
     def _cost(self, factor: float) -> float:
         """The cost [J], or the duration [s] for minimum time; infinite if torque or a path constraint is exceeded."""
         self._evaluations += 1
-        tau = self._holding + self._moving / factor**2 + self.prepared.friction.torque(self._v / factor)
+        given, v = self._samples, self._samples.v / factor
+        tau = given.static + given.moving / factor**2 + self.prepared.friction.torque(v)
         if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_USED).any():
             return np.inf
-        if (
-            self.prepared.path is not None
-            and (self.prepared.path.ratios(self._q, self._v / factor) > TORQUE_USED).any()
-        ):
+        if self.prepared.path is not None and (self.prepared.path.ratios(given.q, v) > TORQUE_USED).any():
             return np.inf
         spline = self._retimed(factor)
         return (
