@@ -15,7 +15,7 @@ from app.schemas.whatif import WhatifResponse
 from app.schemas.whatif_examples import WHATIF_EXAMPLES
 from app.tasks import answer_collector
 from app.tasks.answer_collector import AnswerCollector
-from tests.app.requests import HOME, NEAR, move
+from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.optimizer.moves import tcp_pose
 
 # the same computation on another route: sums in another order
@@ -290,5 +290,5 @@ def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("name", WHATIF_EXAMPLES)
 def test_examples_of_the_documentation(client: TestClient, name: str) -> None:
-    answer = client.post("/whatif", json=WHATIF_EXAMPLES[name]["value"])
+    answer = client.post("/whatif", json=PATIENT | WHATIF_EXAMPLES[name]["value"])
     WhatifResponse.model_validate_json(answer.content)
