@@ -1,10 +1,15 @@
-"""What the engine runs."""
+"""Tasks: what the engine runs, here or in another process."""
 
 from __future__ import annotations
 
+import logging
 from typing import Protocol
 
 from app.engine.result import TaskResult
+from app.exceptions import ServiceError, TaskFailed
+from optimizer.exceptions import JoulepathError
+
+logger = logging.getLogger(__name__)
 
 
 class Task(Protocol):
@@ -20,3 +25,14 @@ class Task(Protocol):
         A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other exception is a defect:
         the worker logs it, and the caller gets TaskFailed.
         """
+
+
+def outcome(task: Task, deadline: float) -> TaskResult | JoulepathError | ServiceError:
+    """The task's result, or the error that its caller gets; both can be pickled."""
+    try:
+        return task.run(deadline)
+    except (JoulepathError, ServiceError) as error:
+        return error
+    except Exception:
+        logger.exception("unforeseen error", extra={"request_id": task.request_id})
+        return TaskFailed()

@@ -21,8 +21,8 @@ from typing import TypeVar
 
 from app.engine.forkserver import CONTEXT
 from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.exceptions import ServiceError, TaskFailed, WorkerDied
+from app.engine.task import Task, outcome
+from app.exceptions import ServiceError, WorkerDied
 from app.logs import configure_logging
 from optimizer.exceptions import JoulepathError
 
@@ -124,17 +124,6 @@ def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
         except EOFError:
             return
         pipe.send(outcome(task, deadline))
-
-
-def outcome(task: Task, deadline: float) -> TaskResult | JoulepathError | ServiceError:
-    """The task's result, or the error that its caller gets."""
-    try:
-        return task.run(deadline)
-    except (JoulepathError, ServiceError) as error:
-        return error
-    except Exception:
-        logger.exception("unforeseen error", extra={"request_id": task.request_id})
-        return TaskFailed()
 
 
 def _end_with_parent() -> None:

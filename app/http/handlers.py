@@ -27,7 +27,7 @@ async def problem_response(request: Request, error: Exception) -> Response:
     """The response to a request that failed with `error`: a problem (RFC 9457)."""
     headers: dict[str, str] = {}
     if isinstance(error, RequestValidationError):
-        error = invalid_request(error.errors())
+        error = invalid_request(error)
     elif isinstance(error, HTTPException):
         headers |= error.headers or {}
         if error.status_code == 405:

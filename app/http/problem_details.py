@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Any
+
+from fastapi.exceptions import RequestValidationError
+from pydantic import ValidationError
 
 from app.convert.fields import candidate_fields, fields, unreachable_fields
 from app.exceptions import (
@@ -81,8 +83,8 @@ def problem_content(error: Exception, instance: str) -> dict[str, Any]:
     return content | {name: _own_field(error, name) for name in problem.own_fields()}
 
 
-def invalid_request(errors: Sequence[Any], *where: str) -> InvalidRequest:
-    """The InvalidRequest for pydantic's errors; their locations start with `where`.
+def invalid_request(error: ValidationError | RequestValidationError, *where: str) -> InvalidRequest:
+    """The InvalidRequest for errors of pydantic or FastAPI; their locations start with `where`.
 
     Locations keep only names that the contract knows, and pydantic's `input` is left out: both may repeat what the
     client sent.
@@ -91,10 +93,10 @@ def invalid_request(errors: Sequence[Any], *where: str) -> InvalidRequest:
     return InvalidRequest(
         [
             {
-                "loc": [*where, *(part for part in error["loc"] if isinstance(part, int) or part in known)],
-                "msg": error["msg"],
+                "loc": [*where, *(part for part in each["loc"] if isinstance(part, int) or part in known)],
+                "msg": each["msg"],
             }
-            for error in errors[:MOST_ERRORS]
+            for each in error.errors()[:MOST_ERRORS]
         ]
     )
 

@@ -71,5 +71,4 @@ def _validated(validate: Callable[[], M], where: str) -> M:
     try:
         return validate()
     except ValidationError as error:
-        errors = error.errors(include_url=False, include_context=False, include_input=False)
-        raise invalid_request(errors, where) from None
+        raise invalid_request(error, where) from None

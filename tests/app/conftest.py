@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.live import WARM_UP, Server, serving
+from tests.app.live import GRACE, WARM_UP, Server, serving
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -24,7 +24,9 @@ def _database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture(scope="session")
 def client() -> Iterator[TestClient]:
     """The service in this process, its two workers warm."""
-    with TestClient(create_app(Settings(workers=2, queue_size=4)), raise_server_exceptions=False) as client:
+    with TestClient(
+        create_app(Settings(workers=2, queue_size=4, deadline_grace=GRACE)), raise_server_exceptions=False
+    ) as client:
         end = time.monotonic() + WARM_UP
         while client.get("/readyz").status_code != 200:
             assert time.monotonic() < end, "the workers do not warm up"
@@ -35,5 +37,5 @@ def client() -> Iterator[TestClient]:
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
     """`python -m app` in a process of its own, warm."""
-    with serving(workers=2, queue_size=4, max_deadline=30) as server:
+    with serving(workers=2, queue_size=4, deadline_grace=GRACE) as server:
         yield server

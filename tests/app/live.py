@@ -24,6 +24,8 @@ WARM_UP = 150.0
 """Most that a cold start may take on a busy machine [s]: imports, loading the kernels, a first solve. Alone: 3 s."""
 EXIT = 60.0
 """Most that may pass from SIGTERM to the end of the process on a busy machine [s]."""
+GRACE = 60.0
+"""`deadline_grace` [s]: on a busy machine, no worker that is about to answer is killed."""
 ANSWER = 120.0
 """Most that an answer may take on a busy machine [s]."""
 

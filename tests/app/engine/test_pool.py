@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from app.engine.pool import Engine
-from app.engine.worker import outcome
+from app.engine.task import outcome
 from app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed, WorkerDied
 from app.settings import Settings
 from optimizer.exceptions import DeadlineExceeded, OutsideLimits

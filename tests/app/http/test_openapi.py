@@ -17,7 +17,7 @@ from app import __version__
 from app.main import create_app
 from app.schemas.errors import PROBLEMS
 from app.settings import Settings
-from tests.app.live import ROOT, Server, serving
+from tests.app.live import GRACE, ROOT, Server, serving
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ schema = schemathesis.openapi.from_dict(create_app(Settings(max_deadline=MAX_DEA
 
 @pytest.fixture(scope="module")
 def fuzzed() -> Iterator[Server]:
-    with serving(workers=2, queue_size=16, max_deadline=MAX_DEADLINE) as server:
+    with serving(workers=2, queue_size=16, max_deadline=MAX_DEADLINE, deadline_grace=GRACE) as server:
         yield server
 
 

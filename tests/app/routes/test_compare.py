@@ -9,9 +9,14 @@ from starlette.testclient import TestClient
 
 from app.schemas.compare import CompareResponse
 from optimizer.problem.problem import MethodName
+from tests.app.requests import PATIENT
 
 ALL = list(get_args(MethodName))
-MOVE = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]}}
+MOVE = {
+    "start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+    "goal": {"q": [1.2, -1.1, 1.9, -2.2, -1.3, 0.4]},
+    **PATIENT,
+}
 # two runs of a method do the same, but for where a deadline cuts
 SAME = 1e-9
 # beyond the default, for a machine that is busy [s]

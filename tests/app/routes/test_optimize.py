@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 from app.schemas.response import OptimizeResponse
 from optimizer.solution import Certificate
 from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
-from tests.app.requests import EXAMPLES, HOME, NEAR, long_search, move
+from tests.app.requests import EXAMPLES, long_search, move
 
 # of numbers that are computed in one place and only passed on
 EXACT = 1e-12
@@ -130,7 +130,7 @@ def test_a_quaternion_is_normalised(client: TestClient) -> None:
     def goal(scale: float) -> dict[str, Any]:
         quaternion = [0.0, scale, 0.0, 0.0]
         pose = {"position": [-0.35, 0.4, 0.3], "quaternion": quaternion}
-        return {"start": {"q": HOME}, "goal": {"pose": pose}, "windings": False}
+        return move(goal={"pose": pose}, windings=False)
 
     exact, near = (client.post("/optimize", json=goal(scale)).json() for scale in (1.0, 1.0009))
     assert near["branch"]["goal"]["q"] == pytest.approx(exact["branch"]["goal"]["q"], abs=1e-9)
@@ -148,5 +148,5 @@ def test_deadline_gives_the_best_so_far_or_says_so(client: TestClient, deadline:
 
 
 def test_integers_are_numbers(client: TestClient) -> None:
-    request = {"start": {"q": [0, -1, 1, -1, -1, 0]}, "goal": {"q": NEAR}, "gravity": [0, 0, -10], "duration": 1}
+    request = move(start={"q": [0, -1, 1, -1, -1, 0]}, gravity=[0, 0, -10], duration=1)
     assert client.post("/optimize", json=request).status_code == 200

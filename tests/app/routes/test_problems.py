@@ -14,7 +14,7 @@ from app.main import create_app
 from app.schemas import errors as problems
 from app.schemas.errors import PROBLEMS, ProblemDetails
 from app.settings import Settings
-from tests.app.requests import HOME, move
+from tests.app.requests import move
 from tests.optimizer.chains import serial_chain
 
 DOWN = [0.0, 1.0, 0.0, 0.0]
@@ -32,7 +32,7 @@ def refused(answer: Any, kind: type[ProblemDetails]) -> dict[str, Any]:
 
 
 def to_pose(position: list[float], quaternion: list[float] = DOWN) -> dict[str, Any]:
-    return {"start": {"q": HOME}, "goal": {"pose": {"position": position, "quaternion": quaternion}}}
+    return move(goal={"pose": {"position": position, "quaternion": quaternion}})
 
 
 def test_unknown_robot(client: TestClient) -> None:
