@@ -1,68 +1,29 @@
-"""The per-node functions: against Pinocchio, plain formulas and finite differences; and the compiled file's life.
-
-Tests that compile do it without optimisation, by a compiler that adds a flag and leaves a line for each of its calls.
-"""
+"""The per-node functions: against Pinocchio, plain formulas and finite differences; each thread's memory."""
 
 from __future__ import annotations
 
 import gc
-import shutil
-import subprocess
-import sys
-import threading
-import time
 import weakref
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from pathlib import Path
-from types import FrameType
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
-from models.robot import Array, Robot
+from models.robot import Array
 from optimizer.energy import kernel
 from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
+from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.kernel_expressions import Parameters, build
 from optimizer.energy.losses import drawn_power, power_flow
-from optimizer.optimize import optimize
-from optimizer.prepared_problem import PreparedProblem
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques
+from tests.optimizer.energy.kernel_states import LOSSY, NODES, TASK, TORQUE, states
+from tests.optimizer.moves import ROBOT, torques
 
-NODES = 40
 # relative to the largest candidate; compiler and virtual machine evaluate the same few thousand operations
 ROUNDING = 1e-12
-TORQUE = 1e-9  # N·m, as symbolic inverse dynamics against Pinocchio
 FORMULA = 1e-9  # relative; the same power by another route, with corners rounded over a billionth of a watt
 # relative to the largest candidate; central differences with a step of 1e-6 lose about 1e-6² · f''' and 1e-16 / 1e-6
 # · f
 DIFFERENCE, STEP = 2e-6, 1e-6
-SWAP = 60.0  # s; a compilation without optimisation takes one to three
-
-LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, so that its terms are seen
-    ROBOT.drives,
-    inverter_constant=np.full(6, 0.7),
-    inverter_linear=np.array([0.3, 0.3, 0.3, 0.5, 0.5, 0.5]),
-    inverter_quadratic=np.full(6, 0.02),
-)
-TASK = PreparedProblem.of(
-    problem(
-        robot=replace(
-            ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, controller_power=9, regeneration=0.3)
-        ),
-        payload=PAYLOAD,
-        gravity=TILTED,
-    )
-)
-
-
-def states(seed: int = 1, count: int = NODES) -> Array:
-    """Nodes (count, 18) inside the limits on position, speed and acceleration."""
-    rng, limits = np.random.default_rng(seed), ROBOT.limits
-    bounds = [np.pi * np.ones(6), limits.v_max, limits.a_max]
-    return np.hstack([rng.uniform(-bound, bound, (count, 6)) for bound in bounds])
 
 
 def multipliers() -> Array:
@@ -70,14 +31,8 @@ def multipliers() -> Array:
 
 
 @pytest.fixture(scope="module")
-def whole() -> Path:
-    """The library as it is in use."""
-    return compile_kernel(ROBOT)
-
-
-@pytest.fixture(scope="module")
-def compiled(whole: Path) -> Kernel:
-    assert whole.exists()
+def compiled() -> Kernel:
+    compile_kernel(ROBOT)
     found = kernel_for(ROBOT)
     assert found.compiled
     return found
@@ -164,35 +119,6 @@ def test_derivatives_are_the_slopes(compiled: Kernel, weights: dict[str, float])
     assert np.abs(hessian - hessian.transpose(0, 2, 1)).max() < ROUNDING * np.abs(hessian).max()
 
 
-def test_the_digest_tells_chains_apart() -> None:
-    """What is compiled in changes it; what a request passes as a parameter does not."""
-    same = replace(ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, idle_power=1.0), title="another")
-    assert digest(same) == digest(ROBOT)
-    heavier, longer, turned = ROBOT.model.copy(), ROBOT.model.copy(), ROBOT.model.copy()
-    heavier.inertias[3] = pin.Inertia(1.01 * heavier.inertias[3].mass, heavier.inertias[3].lever, np.eye(3))
-    longer.jointPlacements[2].translation = longer.jointPlacements[2].translation + np.array([1e-4, 0, 0])
-    turned.frames[turned.getFrameId("flange")].placement = pin.SE3.Random()
-    digests = {digest(replace(ROBOT, model=model)) for model in (ROBOT.model, heavier, longer, turned)}
-    assert len(digests) == 4
-
-
-def test_the_digest_covers_every_source_that_runs_while_the_functions_are_built() -> None:
-    ours, ran = Path(__file__).parents[3], set()
-
-    def note(frame: FrameType, event: str, argument: object) -> None:
-        ran.add(Path(frame.f_code.co_filename))
-
-    sys.setprofile(note)
-    try:
-        build(ROBOT)
-    finally:
-        sys.setprofile(None)
-    sources = {Path(str(module.__file__)) for module in SOURCES}
-    assert {
-        path for path in ran if any(path.is_relative_to(ours / part) for part in ("optimizer", "models"))
-    } == sources
-
-
 def test_each_thread_has_memory_of_its_own_until_it_ends(compiled: Kernel) -> None:
     """The results of one thread survive the calls of another, and are freed with the thread."""
     y, p = states(7), TASK.parameters(electrical=1.0)
@@ -204,190 +130,3 @@ def test_each_thread_has_memory_of_its_own_until_it_ends(compiled: Kernel) -> No
         assert memory() is not None
     gc.collect()
     assert memory() is None
-
-
-@dataclass
-class Workshop:
-    """A cache directory of its own and a compiler that counts its calls; `robot` has been loaded by nobody else."""
-
-    folder: Path
-    robot: Robot
-
-    @property
-    def compilations(self) -> int:
-        log = self.folder / "calls"
-        return len(log.read_text().splitlines()) if log.exists() else 0
-
-    @property
-    def library(self) -> Path:
-        (found,) = (self.folder / "cache").glob("*.so")
-        return found
-
-    def leftovers(self) -> list[str]:
-        """What is in the cache besides the library, its seal and its lock."""
-        known = {".so", ".sha256", ".lock"}
-        return [path.name for path in (self.folder / "cache").iterdir() if path.suffix not in known]
-
-
-@pytest.fixture
-def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workshop:
-    real = compiler()
-    assert real is not None, "make installs a compiler where there is none"
-    script = tmp_path / "compiler"
-    script.write_text(f'#!/bin/sh\necho call >> {tmp_path}/calls\nexec {real} "$@" -O0 -fno-sanitize=undefined\n')
-    script.chmod(0o755)
-    monkeypatch.setenv("CC", str(script))
-    monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
-    return Workshop(tmp_path, replace(ROBOT))
-
-
-def no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("CC", "no-such-compiler")
-    monkeypatch.setenv("PATH", str(tmp_path))
-
-
-def wait_until_compiled(robot: Robot) -> Kernel:
-    end = time.monotonic() + SWAP
-    while not (found := kernel_for(robot)).compiled:
-        assert time.monotonic() < end, "the compiled kernel is never swapped in"
-        time.sleep(0.05)
-    return found
-
-
-def assert_right(found: Kernel) -> None:
-    y = states(6)
-    q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
-    assert np.abs(found.torque(q, v, a, TASK.parameters()) - torques(TASK.problem, q, v, a)).max() < TORQUE
-
-
-def test_the_virtual_machine_serves_while_the_compiler_runs(workshop: Workshop) -> None:
-    """The first call does not wait; when the library is there, it is swapped in, and it has been compiled once."""
-    began = time.perf_counter()
-    first = kernel_for(workshop.robot)
-    waited = time.perf_counter() - began
-    assert not first.compiled
-    assert_right(first)
-    assert kernel_for(workshop.robot) is first or kernel_for(workshop.robot).compiled
-    swapped = wait_until_compiled(workshop.robot)
-    assert waited < time.perf_counter() - began
-    assert_right(swapped)
-    assert kernel_for(workshop.robot) is swapped
-    assert workshop.compilations == 1 and workshop.leftovers() == []
-    assert kernel_for(replace(ROBOT)).compiled  # whoever comes later finds it
-
-
-def test_threads_that_come_at_once_share_one_kernel(workshop: Workshop) -> None:
-    """The first to come builds or loads it, and one of them has it compiled."""
-    count = 8
-    together = threading.Barrier(count)
-
-    def first_torques(_: int) -> Kernel:
-        together.wait()
-        found = kernel_for(workshop.robot)
-        for _ in range(20):
-            assert_right(kernel_for(workshop.robot))
-        return found
-
-    with ThreadPoolExecutor(count) as executor:
-        assert len(set(executor.map(first_torques, range(count)))) == 1
-    wait_until_compiled(workshop.robot)
-    assert workshop.compilations == 1
-    with ThreadPoolExecutor(count) as executor:
-        assert {found.compiled for found in executor.map(first_torques, range(count))} == {True}
-
-
-@pytest.mark.parametrize("damage", ["truncated", "flipped", "seal gone", "seal garbled", "library gone"])
-def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Path, damage: str) -> None:
-    library = workshop.folder / "cache" / whole.name
-    library.parent.mkdir()
-    seal = library.with_suffix(".sha256")
-    for original, copy in ((whole, library), (whole.with_suffix(".sha256"), seal)):
-        shutil.copy(original, copy)
-    compile_kernel(workshop.robot)
-    assert workshop.compilations == 0  # nothing wrong with it yet
-    content = library.read_bytes()
-    middle = len(content) // 2
-    match damage:
-        case "truncated":
-            library.write_bytes(content[:middle])
-        case "flipped":
-            library.write_bytes(content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :])
-        case "seal gone":
-            seal.unlink()
-        case "seal garbled":
-            seal.write_bytes(b"\xff" * 64)
-        case "library gone":
-            library.unlink()
-    assert not kernel_for(workshop.robot).compiled
-    assert_right(wait_until_compiled(workshop.robot))
-    compile_kernel(workshop.robot)
-    assert workshop.compilations == 1  # and is whole now
-
-
-def test_several_processes_make_one_library(workshop: Workshop) -> None:
-    """Three at once into an empty folder: one compiles, the others wait for it, nothing is left lying about."""
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile"]
-    processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
-    printed = [process.communicate(timeout=120)[0].strip() for process in processes]
-    assert [process.returncode for process in processes] == [0, 0, 0]
-    assert printed == [str(workshop.library)] * 3
-    assert workshop.compilations == 1 and workshop.leftovers() == []
-    assert kernel_for(workshop.robot).compiled
-
-
-def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
-    """It has its answer from the virtual machine and does not wait for the compiler, nor stumble over it."""
-    code = (
-        "from optimizer import Arm, Problem, load_robot, optimize\n"
-        f"arm, start, goal = Arm(robot=load_robot('ur5e')), {START.tolist()}, {GOAL.tolist()}\n"
-        "print(optimize(Problem(arm=arm, start=start, goal=goal)).certificate.valid)\n"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
-    assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")
-
-
-def test_without_a_compiler_the_virtual_machine_serves(
-    workshop: Workshop, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """And the answer is the same."""
-    no_compiler(monkeypatch, tmp_path)
-    assert compiler() is None
-    with pytest.raises(RuntimeError, match="compiler"):
-        compile_kernel(workshop.robot)
-    assert not kernel_for(workshop.robot).compiled
-    by_hand = optimize(problem(robot=workshop.robot))
-    assert not kernel_for(workshop.robot).compiled
-    assert by_hand.certificate.valid
-    assert by_hand.energy.electrical.total == pytest.approx(optimize(problem()).energy.electrical.total, rel=1e-6)
-
-
-@pytest.mark.parametrize("trouble", ["compiler fails", "cache cannot be written"])
-def test_trouble_while_compiling_is_logged_and_survived(
-    workshop: Workshop,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-    trouble: str,
-) -> None:
-    if trouble == "compiler fails":
-        monkeypatch.setenv("CC", "false")
-    else:
-        (tmp_path / "file").touch()
-        monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "file" / "cache"))
-    assert not kernel_for(workshop.robot).compiled
-    end = time.monotonic() + SWAP
-    while not caplog.records:
-        assert time.monotonic() < end
-        time.sleep(0.02)
-    assert "the virtual machine serves" in caplog.text
-    found = kernel_for(workshop.robot)
-    assert not found.compiled
-    assert_right(found)
-
-
-def test_the_cache_is_where_the_user_says_or_at_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path))
-    assert cache_directory() == tmp_path
-    monkeypatch.delenv("JOULEPATH_CACHE_DIR")
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    assert cache_directory() == tmp_path / "home" / ".cache" / "joulepath"
