@@ -54,8 +54,7 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
     try:
         return model.model_validate_json(body)
     except ValidationError as error:
-        errors = error.errors(include_url=False, include_context=False, include_input=False)
-        raise _refused(invalid_request(errors, "body"), request_id) from None
+        raise _refused(invalid_request(error, "body"), request_id) from None
 
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
