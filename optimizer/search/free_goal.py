@@ -213,14 +213,14 @@ def goal_constraints(
         first = tilted / angle if angle > 1e-9 else np.linalg.svd(pointing[None])[2][1]
         second = np.cross(pointing, first)
         if pose.half_angle == 0:
-            normals, room = np.stack([first, second]), np.array([-angle, 0.0])
+            normals, upper_bound = np.stack([first, second]), np.array([-angle, 0.0])
         else:
             turn = 2 * np.pi * np.arange(SIDES) / SIDES
             normals = np.cos(turn)[:, None] * first + np.sin(turn)[:, None] * second
-            room = np.maximum(pose.half_angle - angle * np.cos(turn), 0.0)
+            upper_bound = np.maximum(pose.half_angle - angle * np.cos(turn), 0.0)
         rows.append(normals @ jacobian[3:])
-        lower.append(room if pose.half_angle == 0 else np.full(SIDES, -1e30))
-        upper.append(room)
+        lower.append(upper_bound if pose.half_angle == 0 else np.full(SIDES, -1e30))
+        upper.append(upper_bound)
     return GoalConstraints(np.concatenate(rows), np.concatenate(lower), np.concatenate(upper), radius)
 
 

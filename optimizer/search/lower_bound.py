@@ -130,8 +130,8 @@ class _Cruise:
         """c (P, nq) for durations T (P,), and the jerk ramp's time that it is subject to."""
         T = T[:, None]
         moving = T - self.jerk_ramp
-        room = moving**2 - 4 * (self.distance - self.jerk_ramp * self.ramp_speed) / self.a
-        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(room, 0.0)))
+        discriminant = moving**2 - 4 * (self.distance - self.jerk_ramp * self.ramp_speed) / self.a
+        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(discriminant, 0.0)))
         without = self.a / 2 * (T - np.sqrt(np.maximum(T**2 - 4 * self.distance / self.a, 0.0)))
         ramped = with_jerk > self.ramp_speed
         return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
