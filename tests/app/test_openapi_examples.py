@@ -78,7 +78,11 @@ def test_every_body_has_an_example() -> None:
         assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
 
 
-@pytest.mark.parametrize("name", BODIES)
+# a front of dozens of durations
+SLOW = "post /pareto application/json branch_switch"
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n == SLOW else n for n in BODIES])
 def test_body_is_answered(name: str, client: TestClient, study: str) -> None:
     operation, media_type, example = BODIES[name]
     content, url = example["value"], operation.path.format(id=study)

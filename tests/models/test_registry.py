@@ -166,7 +166,7 @@ def test_the_elbow_is_a_figure(robot: Robot, monkeypatch: pytest.MonkeyPatch) ->
     figures = load_figures("ur5e")
     del figures["collision"]["elbow"]
     monkeypatch.setattr(registry, "load_figures", lambda _: figures)
-    assert load_robot.__wrapped__("ur5e").elbow is None
+    assert registry._load_robot.__wrapped__("ur5e").elbow is None
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_another_kind_of_chain_is_refused(sound: str, broken: str, monkeypatch: 
     texts["ur5e.urdf"] = texts["ur5e.urdf"].replace(sound, broken)
     monkeypatch.setattr(registry, "_read", lambda _, file: texts[file])
     with pytest.raises(ValueError, match="revolute joints about z"):
-        load_robot.__wrapped__("ur5e")
+        registry._load_robot.__wrapped__("ur5e")
 
 
 # where each link's mesh stands in the URDF's link frame: position and rpy, which the meshes themselves

@@ -1,7 +1,4 @@
-"""Examples of request bodies, in the OpenAPI document by path and media type. Each is a valid request as it is.
-
-A file `examples/<endpoint>/<name>.json` holds the same request as the example of that name.
-"""
+"""Examples of request bodies; a file `examples/<endpoint>/<name>.json` holds the same request as its namesake here."""
 
 from __future__ import annotations
 

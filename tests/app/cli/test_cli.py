@@ -23,7 +23,7 @@ from app.schemas.evaluate import EvaluateResponse
 from app.schemas.examples.evaluate import EVALUATE_EXAMPLES
 from app.schemas.response import OptimizeResponse
 from app.settings import Settings
-from tests.app.requests import NEAR, long_search, move
+from tests.app.requests import AMPLE, NEAR, long_search, move
 
 ROOT = Path(__file__).parents[3]
 COMMAND = [sys.executable, "-c", "from app.cli.main import main; main()"]
@@ -318,7 +318,7 @@ def test_a_terminal_shows_progress_and_a_summary() -> None:
     code, answer, shown = on_a_terminal("optimize", "-", stdin=request())
     assert code == 0
     content = json.loads(answer)
-    assert "Optimising for at most 10 s" in shown
+    assert f"Optimising for at most {AMPLE:g} s" in shown
     # the spinner is gone in the end: its line is erased and the cursor is shown again
     assert shown.rindex("\x1b[2K") > shown.rindex("Optimising")
     assert shown.rindex("\x1b[?25h") > shown.rindex("\x1b[?25l")

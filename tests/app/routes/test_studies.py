@@ -292,7 +292,8 @@ def test_unknown_iteration(client: TestClient, number: str, kind: str) -> None:
 
 def databases() -> list[Any]:
     missing = why_no_postgres()
-    return ["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(missing is not None, reason=str(missing)))]
+    skipped = pytest.mark.skipif(missing is not None, reason=str(missing))
+    return ["sqlite", pytest.param("postgres", marks=[skipped, pytest.mark.long])]
 
 
 class Over:

@@ -176,7 +176,7 @@ def test_buses_make_a_difference() -> None:
     assert total("down", STORE) < 0.97 * total("down", Bus())
 
 
-@pytest.mark.parametrize("name", ["down", "swing"])
+@pytest.mark.parametrize("name", ["down", pytest.param("swing", marks=pytest.mark.long)])
 def test_a_store_lies_between_none_and_all(name: str) -> None:
     """Without capacity it is the shared bus; without a limit it is recuperation at its efficiency."""
     nothing = total(name, Bus("storage", efficiency=1.0, capacity=0.0))

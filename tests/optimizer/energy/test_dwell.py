@@ -109,6 +109,7 @@ def test_braking_early_pays_where_holding_is_dear() -> None:
     assert brakes.energy.electrical.total < 0.8 * motors.energy.electrical.total
 
 
+@pytest.mark.long
 def test_motors_are_never_better_than_cheaper_brakes() -> None:
     for delay in (0.0, 2.9):
         for power in (None, hold()):

@@ -35,9 +35,10 @@ from tests.optimizer.moves import ROBOT
 angles = st.lists(st.floats(-2 * np.pi, 2 * np.pi), min_size=6, max_size=6).map(np.array)
 
 
-def test_ten_thousand_configurations_inside_the_limits() -> None:
+@pytest.mark.parametrize("count", [2_000, pytest.param(10_000, marks=pytest.mark.long)])
+def test_configurations_inside_the_limits(count: int) -> None:
     rng = np.random.default_rng(20240501)
-    for q in rng.uniform(LIMITS.q_min, LIMITS.q_max, (10_000, 6)):
+    for q in rng.uniform(LIMITS.q_min, LIMITS.q_max, (count, 6)):
         T = forward(q)
         solutions = IK.solve(T)
         found = joints(solutions)

@@ -12,8 +12,9 @@ import pytest
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem.arm import Payload
+from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
 from tests.optimizer.moves import GOAL, ROBOT, START, limits, problem, problem_with, tcp_pose
 
 ROTATED = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.4, 2.0), np.array([0.4, 0.1, 0.5])).homogeneous
@@ -26,8 +27,8 @@ def outside(joint: int, by: float) -> Array:
 
 
 def test_defaults() -> None:
-    """The UR5e without a load, upright, electrical energy, free duration."""
-    task = problem()
+    """An arm without a load, upright; electrical energy, free duration."""
+    task = Problem(arm=Arm(robot=ROBOT), start=START, goal=GOAL)
     assert task.arm.robot.name == "ur5e" and task.arm.payload.mass == 0
     assert task.arm.gravity.tolist() == [0, 0, -9.81]
     assert (task.method, task.objective, task.duration_min, task.duration_max) == ("bspline", "electrical", None, None)
