@@ -12,7 +12,7 @@ from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
 from optimizer.solution import Baseline, BaselineName
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
-from optimizer.trajectories.spline import Spline, lasting, least_time_scale, retimed, sampled
+from optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled
 from optimizer.trajectories.time_scalings import quintic_spline
 
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
@@ -37,7 +37,7 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     may_be_slower = problem.objective == "mechanical" and spline.duration < longest * (1 - SLACK)
     if may_be_slower and not deadline.passed:
         # the smoothed |tau v| is above zero at rest, the work is not: a free duration ends too soon
-        slower = lasting(spline, longest)
+        slower = retimed(spline, longest / spline.duration)
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
 
 
@@ -93,7 +93,7 @@ def accept_baseline(incumbent: Incumbent, candidate: Candidate, better: list[Bas
     fastest = time_optimal_spline(limits, candidate.q_start, candidate.q_goal)
     motions: dict[BaselineName, Spline] = {
         "ruckig": fastest,
-        "ruckig_slowed": lasting(fastest, duration),
+        "ruckig_slowed": retimed(fastest, duration / fastest.duration),
         "quintic": quintic_spline(candidate.q_start, candidate.q_goal, duration),
     }
     for name in better:
