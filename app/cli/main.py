@@ -10,6 +10,7 @@ from app import __version__
 from app.cli.answer import Refused
 from app.cli.evaluate import evaluate
 from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
+from app.cli.interrupts import interruptible
 from app.cli.optimize import optimize
 from app.cli.robots import robots
 from app.cli.serve import serve
@@ -45,7 +46,8 @@ for command in (serve, optimize, evaluate, robots):
 def main() -> None:
     """Runs the command and exits with its code."""
     try:
-        code = joulepath.main(prog_name="joulepath", standalone_mode=False) or ANSWERED
+        with interruptible():
+            code = joulepath.main(prog_name="joulepath", standalone_mode=False) or ANSWERED
     except Refused as refusal:
         click.echo(refusal.problem, err=True)
         code = of_problem(refusal.problem)

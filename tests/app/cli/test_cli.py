@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 
+from app.cli.interrupts import interruptible
 from app.cli.main import main
 from app.schemas.evaluate import EvaluateResponse
 from app.schemas.examples.evaluate import EVALUATE_EXAMPLES
@@ -244,6 +245,28 @@ def test_a_reader_that_has_gone_leaves_no_traceback() -> None:
     )
     os.close(writing)
     assert (finished.returncode, finished.stderr) == (-signal.SIGPIPE, b"")
+
+
+def test_an_interrupt_that_is_dropped_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Drops:
+        def __del__(self) -> None:
+            dropped.append(os.getpid())
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(sys, "unraisablehook", lambda _: None)  # it would report what this test expects
+    dropped: list[int] = []
+    one = [Drops()]
+
+    def work() -> None:
+        end = time.process_time() + PATIENCE
+        with interruptible():
+            one.clear()
+            while time.process_time() < end:
+                pass
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert len(dropped) == 1
 
 
 def test_ctrl_c_ends_a_search_with_130() -> None:

@@ -1,0 +1,31 @@
+"""Ctrl-C that ends a command even if compiled code drops it."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+# processor time [s] after which an interrupt that was dropped is raised again
+PERIOD = 0.5
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Raises KeyboardInterrupt at Ctrl-C, and again until it leaves the body.
+
+    Python drops an exception that arrives in a finaliser or in a callback of compiled code.
+    """
+
+    def interrupt(*_: object) -> None:
+        signal.setitimer(signal.ITIMER_VIRTUAL, PERIOD)
+        raise KeyboardInterrupt
+
+    numbers = (signal.SIGINT, signal.SIGVTALRM)
+    previous = [signal.signal(number, interrupt) for number in numbers]
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        for number, handler in zip(numbers, previous, strict=True):
+            signal.signal(number, handler)
