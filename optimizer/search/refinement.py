@@ -37,6 +37,7 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     may_be_slower = problem.objective == "mechanical" and spline.duration < longest * (1 - SLACK)
     if may_be_slower and not deadline.passed:
         # the smoothed |tau v| is above zero at rest, the work is not: a free duration ends too soon
+        # not `lasting`: its other rounding leads the mechanical objective to other local optima
         slower = retimed(spline, longest / spline.duration)
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
 
