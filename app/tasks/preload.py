@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import signal
+from importlib import import_module
 
 from app.tasks import compare, evaluate, ik_path, optimize, pareto, whatif
 
 __all__ = ["compare", "evaluate", "ik_path", "optimize", "pareto", "whatif"]
+
+# imported where they are called, because the process that answers HTTP does not need them
+for name in ("scipy.stats.qmc", "toppra"):
+    import_module(name)
 
 # SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
 # end the workers, which must last until the requests in flight are answered.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from scipy.stats import qmc
 
 from models.robot import Array
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -44,6 +43,8 @@ def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
     The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly over the circle. The
     points are of a Halton sequence.
     """
+    from scipy.stats import qmc  # here, because few problems need it and scipy.stats takes as long as all else to import
+
     points = qmc.Halton(3, scramble=False).random(count) if pose.half_angle > 0 else np.zeros((count, 3))
     if pose.half_angle == 0:
         points[:, 2] = np.arange(count) / count

@@ -2,6 +2,8 @@
 
 toppra limits speed, acceleration and torque, but not jerk. Its duration is therefore a lower bound for every motion
 along the line. Its scaling says whether there is such a motion, and serves as initial guess.
+
+toppra is imported where it is called: it imports matplotlib, and only this method needs it.
 """
 
 from __future__ import annotations
@@ -13,8 +15,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import toppra
-from toppra import algorithm, constraint
 
 from models.robot import Array
 from optimizer.prepared_problem import PreparedProblem
@@ -51,6 +51,8 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
     The limit of the motor torque is relaxed by the greatest friction torque, so that the duration stays a lower bound.
     """
     limits, model = prepared.problem.arm.active_limits, prepared.model
+    from toppra import SimplePath, algorithm, constraint  # see the top of this file
+
     displacement = q_goal - q_start
     if not np.abs(displacement).max() > 0:
         return TimeOptimalScaling(np.linspace(0.0, 1e-9, len(GRID)))
@@ -61,7 +63,7 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
 
     tau = limits.tau_max + prepared.friction.torque(limits.v_max)
     none = np.zeros(len(displacement))
-    path = toppra.SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([displacement, displacement]))
+    path = SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([displacement, displacement]))
     constraints = [
         *_rate_constraints(tuple(limits.v_max.tolist()), tuple(limits.a_max.tolist())),
         constraint.JointTorqueConstraint(torque, np.stack([-tau, tau], axis=1), none),
@@ -76,6 +78,8 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
 @lru_cache(maxsize=32)
 def _rate_constraints(v_max: tuple[float, ...], a_max: tuple[float, ...]) -> tuple[Any, Any]:
     """toppra's constraints on speed and acceleration; cached, since toppra prints the limits of every new one."""
+    from toppra import constraint
+
     v, a = np.array(v_max), np.array(a_max)
     return (
         constraint.JointVelocityConstraint(np.stack([-v, v], axis=1)),
