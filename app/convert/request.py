@@ -12,8 +12,9 @@ from app.schemas.orientation import InCone
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
-from optimizer.problem.problem import Problem
+from optimizer.problem.problem import LONGEST_DURATION, Problem
 from optimizer.problem.targets import AnyOf, Single, Target
+from optimizer.replay.sampler import MOST_SAMPLES
 
 
 def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
@@ -77,5 +78,5 @@ def _duration_bounds(request: asked.MotionRequest) -> tuple[float | None, float 
         return request.duration, request.duration
     given = request.duration or asked.DurationRange()
     if given.max is None and request.objective == "electrical":
-        return given.min, min(asked.MAX_DURATION, request.sample_period * asked.MAX_SAMPLES)
+        return given.min, min(LONGEST_DURATION, request.sample_period * MOST_SAMPLES)
     return given.min, given.max

@@ -9,10 +9,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field
 from pydantic_core import PydanticCustomError
 
 from app.schemas.examples.values import REQUEST_ID
+from optimizer.problem.pose import QUATERNION_TOLERANCE
 
 KEY_HEADER = "Idempotency-Key"
-QUATERNION_TOLERANCE = 1e-3
-"""Largest difference of a quaternion's norm from 1 that is accepted."""
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:

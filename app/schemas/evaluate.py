@@ -11,9 +11,10 @@ from app.schemas.arm import ArmRequest, one_or_each
 from app.schemas.common import Answer, JointPositions, Request, Response, described, part
 from app.schemas.examples.values import PAPER_HOME as _HOME
 from app.schemas.examples.values import PAPER_POSE as _THERE
-from app.schemas.request import MAX_SAMPLES, Seconds
+from app.schemas.request import Seconds
 from app.schemas.response import BODIES, MotionEnergy, SampledMotion
 from optimizer.replay.limit_report import LimitName
+from optimizer.replay.sampler import MOST_SAMPLES
 
 MAX_ROWS = 100_000
 """Largest number of rows of a motion sent as JSON; a CSV file may have more."""
@@ -86,7 +87,7 @@ class EvaluateSettings(ArmRequest):
     )
     sample_period: float | None = described(
         "Time between the returned samples; the last sample is at the end. Null: no samples. At most "
-        f"{MAX_SAMPLES} samples.",
+        f"{MOST_SAMPLES} samples.",
         "s",
         0.05,
         default=None,

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from app.schemas.common import Answer, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH, LABEL
-from app.schemas.request import MAX_DURATION, DurationRange, OptimizeRequest
+from app.schemas.request import DurationRange, OptimizeRequest
 from app.schemas.response import OBJECTIVE
-from optimizer.problem.problem import MethodName
+from optimizer.problem.problem import LONGEST_DURATION, MethodName
 from optimizer.solution import Objective
 
 
@@ -32,7 +32,7 @@ class ParetoRequest(OptimizeRequest):
         30.0,
         default=30.0,
         ge=1e-3,
-        le=MAX_DURATION,
+        le=LONGEST_DURATION,
     )
 
 

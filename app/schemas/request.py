@@ -10,15 +10,11 @@ from pydantic_core import PydanticCustomError
 from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
-from optimizer.problem.problem import MethodName
+from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.replay.sampler import MOST_SAMPLES
 from optimizer.solution import Objective
 
-MAX_DURATION = 600.0
-"""Largest duration of a motion [s]."""
-MAX_SAMPLES = 100_000
-"""Largest number of samples in an answer."""
-
-Seconds = Annotated[float, Field(ge=1e-3, le=MAX_DURATION)]
+Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
 
 
 class JointTarget(Request):
@@ -127,7 +123,7 @@ class Cycle(Request):
         default="motors",
     )
     brake_delay: float = described(
-        "Time between the end of the motion and the brakes.", "s", 0.5, default=0.0, ge=0, le=MAX_DURATION
+        "Time between the end of the motion and the brakes.", "s", 0.5, default=0.0, ge=0, le=LONGEST_DURATION
     )
     brake_power: Annotated[float, Field(ge=0, le=1e4)] | None = described(
         "Power drawn while the brakes hold, electronics included. Null: the power of the electronics.",
@@ -160,7 +156,7 @@ class MotionRequest(ArmRequest):
     duration: Duration | None = described(
         "Duration, or bounds on it. Null: the optimiser chooses the duration. The objective `mechanical` needs a "
         "number, a `max` or a `cycle`, because a slower motion needs less work. The duration is at most "
-        f"{MAX_DURATION:g} s and at most {MAX_SAMPLES} times `sample_period`.",
+        f"{LONGEST_DURATION:g} s and at most {MOST_SAMPLES} times `sample_period`.",
         "s",
         {"max": 3.0},
         default=None,
@@ -198,17 +194,17 @@ class MotionRequest(ArmRequest):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=MAX_DURATION,
+        le=LONGEST_DURATION,
     )
 
     @model_validator(mode="after")
     def _few_enough_samples(self) -> Self:
         longest = self.duration.max or self.duration.min if isinstance(self.duration, DurationRange) else self.duration
-        if longest is not None and longest > self.sample_period * MAX_SAMPLES:
+        if longest is not None and longest > self.sample_period * MOST_SAMPLES:
             raise PydanticCustomError(
                 "too_many_samples",
                 "`duration` divided by `sample_period` must be at most {most}: lengthen `sample_period`",
-                {"most": MAX_SAMPLES},
+                {"most": MOST_SAMPLES},
             )
         return self
 

@@ -8,9 +8,9 @@ from pydantic import Discriminator, Field, Tag
 
 from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
 from app.schemas.examples.values import BOX, TOOL, at
+from optimizer.problem.arm import MOST_PARTS
+from optimizer.problem.scene import MOST_OBSTACLES, MOST_VERTICES
 
-# the library rejects more; repeated here so that the schema shows it
-MOST_OBSTACLES, MOST_VERTICES, MOST_CAPSULES = 64, 256, 16
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 _POSE_TEXT = "Pose of the shape: of an obstacle in the base frame, of a payload in the flange frame."
 Size = Annotated[float, Field(ge=1e-4, le=100)]
@@ -169,7 +169,7 @@ class ToolCapsule(Request):
 class Tool(Request):
     """The shape of the tool, for collision checking."""
 
-    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_CAPSULES)] = described(
+    capsules: Annotated[list[ToolCapsule], Field(max_length=MOST_PARTS)] = described(
         "Capsules that enclose the tool.",
         None,
         TOOL["capsules"],

@@ -11,9 +11,10 @@ from app.schemas.arm import ArmRequest
 from app.schemas.common import Answer, Request, Response, described, part
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
-from app.schemas.request import MAX_DURATION, OptimizeRequest
+from app.schemas.request import OptimizeRequest
 from app.schemas.response import OBJECTIVE, Certificate, ElectricalEnergy
 from app.schemas.studies import Name
+from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Objective
 
 MOST_CHANGES = 16
@@ -71,7 +72,7 @@ class WhatifRequest(Request):
         30.0,
         default=30.0,
         ge=1e-3,
-        le=MAX_DURATION,
+        le=LONGEST_DURATION,
     )
 
     @model_validator(mode="after")

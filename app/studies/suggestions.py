@@ -14,8 +14,9 @@ import numpy as np
 
 from app.convert.arm import to_arm
 from app.schemas.arm import ArmRequest
-from app.schemas.request import MAX_DURATION, OptimizeRequest
+from app.schemas.request import OptimizeRequest
 from optimizer.kinematics.tcp import rotated_poses
+from optimizer.problem.problem import LONGEST_DURATION
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
 Fields = dict[str, Any]
@@ -94,7 +95,7 @@ def _duration(base: Base) -> Iterator[Proposal]:
     if base.request.get("duration") is not None and base.request["objective"] == "electrical":
         yield Proposal("duration", "Let the optimiser choose the duration.", _timed(base, None))
     for factor, word in ((_LONGER, "longer"), (1 / _LONGER, "shorter")):
-        duration = min(base.duration * factor, MAX_DURATION)
+        duration = min(base.duration * factor, LONGEST_DURATION)
         yield Proposal("duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration))
 
 

@@ -43,7 +43,8 @@ def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
     The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly over the circle. The
     points are of a Halton sequence.
     """
-    from scipy.stats import qmc  # here, because few problems need it and scipy.stats takes as long as all else to import
+    # few problems need it, and scipy.stats takes as long to import as the rest of scipy
+    from scipy.stats import qmc
 
     points = qmc.Halton(3, scramble=False).random(count) if pose.half_angle > 0 else np.zeros((count, 3))
     if pose.half_angle == 0:
