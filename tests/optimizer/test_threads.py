@@ -25,8 +25,6 @@ QUICK = (
     "move 4 by uniform_scaling",
     "move 5 by bspline",
     "move 8 by lagrange",
-    "move 11 by bspline",
-    "move 13 by lagrange",
     "uniformly scaled pose",
     "out of reach",
     "replay linear",
@@ -35,7 +33,6 @@ QUICK = (
     "inverse kinematics 1",
     "circle",
     "certificate 1",
-    "certificate 2",
 )
 SLOW = (
     "post",

@@ -31,7 +31,9 @@ def compared(client: TestClient, **given: Any) -> dict[str, Any]:
     return table
 
 
-@pytest.mark.parametrize("objective", [{}, {"objective": "mechanical", "duration": {"max": 1.5}}])
+@pytest.mark.parametrize(
+    "objective", [{}, pytest.param({"objective": "mechanical", "duration": {"max": 1.5}}, marks=pytest.mark.long)]
+)
 def test_the_table_is_what_single_requests_answer(client: TestClient, objective: dict[str, Any]) -> None:
     table = compared(client, **objective)
     assert [row["method"] for row in table["methods"]] == ALL

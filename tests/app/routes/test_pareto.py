@@ -21,7 +21,14 @@ LOCAL = 1e-3
 TIME = 100.0
 
 
-@pytest.fixture(scope="module", params=list(PARETO_EXAMPLES))
+# its front has dozens of durations
+SLOW = "branch_switch"
+
+
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=pytest.mark.long) if name == SLOW else name for name in PARETO_EXAMPLES],
+)
 def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tuple[dict[str, Any], dict[str, Any]]:
     asked: dict[str, Any] = (PARETO_EXAMPLES[request.param]["value"] or {}) | {"deadline": TIME}
     answer = client.post("/pareto", json=asked)

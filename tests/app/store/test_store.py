@@ -175,9 +175,9 @@ def test_unknown_answer(client: TestClient, id: str) -> None:
 @pytest.mark.parametrize(
     "url",
     [
-        "sqlite:////proc/joulepath.db",
         "postgresql://tester:secret-word@127.0.0.1:1/postgres",
-        f"sqlite:///{ROOT}/README.md",
+        pytest.param("sqlite:////proc/joulepath.db", marks=pytest.mark.long),
+        pytest.param(f"sqlite:///{ROOT}/README.md", marks=pytest.mark.long),
     ],
 )
 def test_without_its_database_the_service_goes_on(url: str) -> None:
