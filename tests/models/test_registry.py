@@ -26,9 +26,8 @@ def robot() -> Robot:
     return load_robot("ur5e")
 
 
-def dh_flange(q: Array) -> Array:
+def dh_flange(q: Array, table: dict[str, Any]) -> Array:
     """T_base_flange by the standard Denavit-Hartenberg table, shape (4, 4)."""
-    table = load_figures("ur5e")["kinematics"]
     T = np.eye(4)
     rows = zip(q, table["dh_d"]["value"], table["dh_a"]["value"], table["dh_alpha"]["value"], strict=True)
     for theta, d, a, alpha in rows:
@@ -76,7 +75,7 @@ def test_forward_kinematics_is_the_dh_tables(robot: Robot) -> None:
     data, flange = robot.model.createData(), robot.model.getFrameId("flange")
     for q in configurations():
         pin.framesForwardKinematics(robot.model, data, q)
-        assert np.abs(data.oMf[flange].homogeneous - dh_flange(q)).max() < ROUNDING
+        assert np.abs(data.oMf[flange].homogeneous - dh_flange(q, robot.figures["kinematics"])).max() < ROUNDING
 
 
 def test_inertias_are_the_figures(robot: Robot) -> None:
@@ -130,7 +129,7 @@ def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
         v, a = rng.uniform(-3, 3, (2, robot.nq))
         expected = pin.rnea(by_hand, by_hand.createData(), q, v, a)
         assert pin.rnea(loaded, data, q, v, a) == pytest.approx(expected, abs=TORQUE_ROUNDING)
-        height = (dh_flange(q) @ np.append(com, 1.0))[2]
+        height = (dh_flange(q, robot.figures["kinematics"]) @ np.append(com, 1.0))[2]
         work = pin.computePotentialEnergy(loaded, data, q) - pin.computePotentialEnergy(robot.model, plain, q)
         assert work == pytest.approx(mass * 9.81 * height, abs=TORQUE_ROUNDING)
 
