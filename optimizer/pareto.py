@@ -29,8 +29,8 @@ from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProb
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.problem import Problem
 from optimizer.search.fastest import fastest, fastest_from, fastest_of
-from optimizer.search.free_goal import between
 from optimizer.search.run import Run
+from optimizer.search.sampled_ends import between
 from optimizer.solution import Solution
 from optimizer.trajectories.spline import Spline
 

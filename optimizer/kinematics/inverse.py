@@ -1,5 +1,8 @@
 """Inverse kinematics: every branch of a pose, labelled, with every full turn that the joint ranges allow.
 
+A configuration is singular where two branches meet (shoulder or elbow) or where the arm can move while the pose is
+held (wrist). The first are solutions like any other. The second are members of a self-motion, a curve of solutions.
+
 `InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. So far there is
 one, the closed form of Universal Robots' arms in `ur_closed_form`. For any other arm it returns None: such an arm takes
 joint positions as targets, not poses.
@@ -7,6 +10,7 @@ joint positions as targets, not poses.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -19,16 +23,15 @@ from models.robot import Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.jacobians import geometric_jacobian
+from optimizer.kinematics.self_motion import SelfMotion, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
 from optimizer.problem.branches import Label
 
-# Below this smallest singular value of the Jacobian (rows in m and rad) a solution counts as singular. A pose that is
-# singular on paper, once rounded to double precision, has solutions of up to 2e-8. Above it a pose determines the
-# joints to 1e-8 rad. One configuration in 1.5 million drawn at random lies below it.
-SINGULAR = 3e-8
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9
+# members of a self-motion that stand for it
+MEMBERS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,22 +39,28 @@ class IKSolution:
     """One configuration q (nq,) [rad] that reaches a pose.
 
     `smallest_singular_value` is that of the flange's geometric Jacobian (m and rad mixed, as usual), `limit_distance`
-    [rad] the least distance of any joint to its limits.
+    [rad] the least distance of any joint to its limits. `singular` names the parts of the label that are singular: the
+    configuration is on both branches of such a part. `self_motion` is the curve of solutions that it is a member of,
+    if any.
     """
 
     q: Array
     label: Label
     smallest_singular_value: float
     limit_distance: float
+    singular: tuple[str, ...] = ()
+    self_motion: SelfMotion | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class PrincipalSolution:
-    """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits."""
+    """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits. See `IKSolution`."""
 
     q: Array
     label: Label
     smallest_singular_value: float
+    singular: tuple[str, ...] = ()
+    self_motion: SelfMotion | None = None
 
 
 class InverseKinematics(Protocol):
@@ -61,8 +70,11 @@ class InverseKinematics(Protocol):
         """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
         ...
 
-    def branches(self, T_base_flange: Array) -> list[PrincipalSolution]:
-        """Every branch that reaches the flange pose (4, 4), singular ones too; an empty list if out of reach."""
+    def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
+        """Every branch that reaches the flange pose (4, 4), and `members` of every self-motion or a few more.
+
+        An empty list if the pose is out of reach.
+        """
         ...
 
     def solve(
@@ -72,15 +84,17 @@ class InverseKinematics(Protocol):
         limits: Limits | None = None,
         windings: bool = True,
         target: str = "goal",
+        members: int = MEMBERS,
     ) -> list[IKSolution]:
         """Every configuration inside the limits (default: the robot's) that puts the TCP at T_base_tcp (4, 4).
 
         `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity. With `windings` there
         is one solution for each combination of full turns that the position limits allow. Without, there is one per
-        branch, the one whose joints are nearest to zero. Singular configurations are left out. The solutions of a
-        branch are together, nearest to zero first.
+        branch, the one whose joints are nearest to zero. The solutions of a branch are together, nearest to zero first.
+        Of a self-motion there are `members` solutions or a few more, evenly spread, without full turns.
 
-        Raises UnreachablePose or SingularPose, both naming `target`, if there is no solution.
+        Raises UnreachablePose, which names `target`, if there is no solution; SingularPose if the pose is only reached
+        on a self-motion that this inverse kinematics does not know.
         """
         ...
 
@@ -113,7 +127,15 @@ class ClosedForm(Protocol):
         ...
 
     def solve(self, T: Array) -> tuple[Array, list[Label]]:
-        """Configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their n labels."""
+        """Isolated configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their n labels."""
+        ...
+
+    def singular_parts(self, q: Array) -> tuple[str, ...]:
+        """The parts of the label that are singular at q (nq,) [rad]."""
+        ...
+
+    def self_motions(self, T: Array) -> Sequence[SelfMotion]:
+        """The self-motions that hold the flange at T (4, 4)."""
         ...
 
     def distance_to_reach(self, T: Array) -> float:
@@ -134,24 +156,27 @@ class ClosedFormInverseKinematics:
         """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
         return self._form.label(q)
 
-    def branches(self, T_base_flange: Array) -> list[PrincipalSolution]:
-        """Every branch that reaches the flange pose (4, 4), singular ones too; an empty list if out of reach.
-
-        Of a continuum of solutions (a stretched wrist) one member stands for all.
-        """
+    def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
+        """Every branch that reaches the flange pose (4, 4), and members of every self-motion: `InverseKinematics`."""
         T = _orthonormal(T_base_flange)
-        q, labels = self._form.solve(T)
-        if not labels:
+        isolated, labels = self._form.solve(T)
+        found: list[tuple[Array, Label, SelfMotion | None]]
+        found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
+        for motion in self._form.self_motions(T):
+            found += [(q, motion.label, motion) for q in motion.at(spread(motion, members))]
+        if not found:
             return []
+        q = np.array([each for each, _, _ in found])
         T_reached, jacobian = self._forward(q)
-        singular_values = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
+        singular_values = np.linalg.svd(jacobian, compute_uv=False)[:, -1].tolist()
         # never a wrong answer: a solution that forward kinematics does not confirm is dropped
         position = np.linalg.norm(T_reached[:, :3, 3] - T[:3, 3], axis=1)
         rotation = np.linalg.norm(T_reached[:, :3, :3] - T[:3, :3], axis=(1, 2)) / np.sqrt(2)
         confirmed = np.maximum(position, rotation) < ACCURACY
         q.setflags(write=False)
         return [
-            PrincipalSolution(q[k], labels[k], float(singular_values[k])) for k in np.flatnonzero(confirmed).tolist()
+            PrincipalSolution(q[k], found[k][1], singular_values[k], self._form.singular_parts(q[k]), found[k][2])
+            for k in np.flatnonzero(confirmed).tolist()
         ]
 
     def solve(
@@ -161,42 +186,40 @@ class ClosedFormInverseKinematics:
         limits: Limits | None = None,
         windings: bool = True,
         target: str = "goal",
+        members: int = MEMBERS,
     ) -> list[IKSolution]:
         """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see `InverseKinematics`."""
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
-        branches = self.branches(T)
+        branches = self.branches(T, members)
         if not branches:
             raise self._out_of_reach(T, target)
-        singular, solutions = [], []
+        solutions = []
         for branch in branches:
             choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
             if not all(choices):
                 continue
-            value = branch.smallest_singular_value
-            if value < SINGULAR:
-                singular.append(value)
-                continue
-            wound = np.array(list(product(*choices)) if windings else [[joint[0] for joint in choices]])
+            every_turn = windings and branch.self_motion is None
+            wound = np.array(list(product(*choices)) if every_turn else [[joint[0] for joint in choices]])
             wound.setflags(write=False)
             distances = np.minimum(wound - limits.q_min, limits.q_max - wound).min(axis=1).tolist()
-            label = branch.label
-            solutions += [IKSolution(q, label, value, distance) for q, distance in zip(wound, distances, strict=True)]
-        if solutions:
-            return solutions
-        if not singular and any(branch.smallest_singular_value >= SINGULAR for branch in branches):
+            rest = branch.smallest_singular_value, branch.singular, branch.self_motion
+            solutions += [
+                IKSolution(q, branch.label, rest[0], distance, *rest[1:])
+                for q, distance in zip(wound, distances, strict=True)
+            ]
+        if not solutions:
             raise UnreachablePose(
                 target,
                 None,
                 f"The {target} pose is within reach, but every arm configuration for it violates a position limit: "
                 "widen limits.position or move the pose.",
             )
-        raise SingularPose(target, max(singular or [branch.smallest_singular_value for branch in branches]))
+        return solutions
 
     def _out_of_reach(self, T: Array, target: str) -> UnreachablePose | SingularPose:
         distance = self._form.distance_to_reach(_orthonormal(T))
         if distance <= ROUNDING:
-            # only members of a continuum reach it, other than the one that stands for all
             return SingularPose(target, 0.0)
         return UnreachablePose(
             target,

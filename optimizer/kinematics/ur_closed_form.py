@@ -19,10 +19,20 @@ import pinocchio as pin
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
+from optimizer.kinematics.self_motion import StretchedWrist
 from optimizer.problem.branches import Label
 
 # distance [m, or sine of the wrist angle] beyond the reach at which a pose may lie by rounding alone
 ROUNDING = 1e-10
+# sine of the wrist angle below which the wrist counts as stretched: then every member of its self-motion reaches the
+# pose to half of what is promised of a solution
+STRETCHED = 5e-10
+# distance [m] from an edge of the reach within which the two branches that meet there count as one: a pose on the edge,
+# rounded to double precision, lies that near
+EDGE = 1e-13
+# a part of the label is singular where its sine, or the shoulder's distance [m], is below this: nearer to it, a pose
+# that is rounded to double precision no longer determines the joints to 1e-9 rad
+SINGULAR = 1e-6
 # greatest difference between the table's forward kinematics and the model's [m, 1]
 EQUAL = 1e-12
 # shoulder angles of the search for the nearest reachable position, for each wrist; the best is then refined
@@ -90,6 +100,12 @@ class URClosedForm:
         ahead = self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
         return self._label(ahead, sin(q[2]), sin(q[4]))
 
+    def singular_parts(self, q: Array) -> tuple[str, ...]:
+        """The parts of the label that are singular at a configuration (6,): within SINGULAR of changing."""
+        ahead = self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
+        sizes = {"shoulder": ahead, "elbow": sin(q[2]), "wrist": sin(q[4])}
+        return tuple(part for part, size in sizes.items() if abs(size) < SINGULAR)
+
     def _label(self, ahead: float, sin_elbow: float, sin_wrist: float) -> Label:
         """From the origin of the last axis ahead of the first axis [m], and sines of the third and fifth angle."""
         return Label(
@@ -99,10 +115,10 @@ class URClosedForm:
         )
 
     def solve(self, T: Array) -> tuple[Array, list[Label]]:
-        """All configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their labels.
+        """The isolated configurations (n, 6) [rad] in [-pi, pi] that put the flange at T (4, 4), and their labels.
 
-        n is at most eight, and zero if T is out of reach. At a singularity the branches that meet there count once. Of
-        a continuum (wrist stretched: sin(q5) = 0) one member stands for all.
+        n is at most eight, and zero if T is out of reach. Where shoulder or elbow is singular, the branches that meet
+        there count once. Where the wrist is stretched there are `self_motions` instead.
         """
         rows, labels = [], []
         for q1, ahead in self._shoulders(T):
@@ -122,25 +138,24 @@ class URClosedForm:
         distance = hypot(x, y)
         if distance < abs(self.d4) - ROUNDING:
             return []
-        ahead = sqrt(max(0.0, (distance - self.d4) * (distance + self.d4)))
+        beyond = distance - abs(self.d4)
+        ahead = sqrt(beyond * (distance + abs(self.d4))) if beyond > EDGE else 0.0
         towards = atan2(y, x)
         return [(towards + atan2(self.d4, side), side) for side in ((ahead, -ahead) if ahead > 0 else (0.0,))]
 
     def _wrists(self, T: Array, q1: float, ahead: float) -> list[tuple[float, float, float, float, float, float]]:
         """Fifth and sixth angle, sin(q5), fourth axis ahead of the first and above the second [m], q2 + q3 + q4.
 
-        With the wrist stretched the sixth angle is free: zero stands for all.
+        None with the wrist stretched.
         """
         (r11, r12, r13, _), (r21, r22, r23, _), (r31, r32, r33, pz), _ = T.tolist()
         c1, s1 = cos(q1), sin(q1)
         # the second axis (s1, -c1, 0) in flange axes: (sin q5 cos q6, -sin q5 sin q6, cos q5)
         u, v, w = r11 * s1 - r21 * c1, r12 * s1 - r22 * c1, r13 * s1 - r23 * c1
         sine = hypot(u, v)
-        if sine < ROUNDING:
-            sine, u, v = 0.0, 1.0, 0.0
         found = []
-        for sin_q5 in (sine, -sine) if sine > 0 else (0.0,):
-            sign = 1.0 if sin_q5 >= 0 else -1.0
+        for sin_q5 in (sine, -sine) if sine >= STRETCHED else ():
+            sign = 1.0 if sin_q5 > 0 else -1.0
             q5, q6 = atan2(sin_q5, w), atan2(-sign * v, sign * u)
             # the fifth axis, minus the y axis after it, in the arm's plane: (sin, -cos) of q2 + q3 + q4
             c6, s6 = cos(q6), sin(q6)
@@ -157,9 +172,11 @@ class URClosedForm:
         distance = hypot(x, z)
         if not least - ROUNDING <= distance <= most + ROUNDING:
             return []
+        if distance < STRETCHED:
+            return []  # both links of equal length, folded: the arm turns about its second axis
         # tan²(q3 / 2) = stretched / folded, by the half-angle law of cosines
-        stretched = sqrt(max(0.0, (most - distance) * (most + distance)))
-        folded = sqrt(max(0.0, (distance - least) * (distance + least)))
+        stretched = sqrt((most - distance) * (most + distance)) if most - distance > EDGE else 0.0
+        folded = sqrt((distance - least) * (distance + least)) if distance - least > EDGE else 0.0
         if self.a2 * self.a3 < 0:
             stretched, folded = folded, stretched
         found = []
@@ -168,6 +185,32 @@ class URClosedForm:
             s3 = sin(q3)
             q2 = atan2(z, x) - atan2(self.a3 * s3, self.a2 + self.a3 * cos(q3))
             found.append((q2, q3, s3))
+        return found
+
+    def self_motions(self, T: Array) -> list[StretchedWrist]:
+        """The self-motions that hold the flange at T (4, 4): one for each shoulder that stretches the wrist, and elbow.
+
+        They are empty if no member is in reach.
+        """
+        found = []
+        R = T[:3, :3]
+        for q1, ahead in self._shoulders(T):
+            c1, s1 = cos(q1), sin(q1)
+            u, v, w = R.T @ np.array([s1, -c1, 0.0])
+            if hypot(u, v) >= STRETCHED:
+                continue
+            # the fifth axis in the arm's plane, at q6 = 0 and a quarter turn on: (sin, -cos) of q2 + q3 + q4
+            inward = np.array([[c1, s1, 0.0], [0.0, 0.0, 1.0]])
+            h1, h0 = (atan2(-along, above) for along, above in (inward @ R).T[:2].tolist())
+            above = float(T[2, 3] - self.d6 * T[2, 2] - self.d1)
+            for side in (1.0, -1.0):
+                motion = StretchedWrist(
+                    self._label(ahead, side * (1 if self.a2 * self.a3 > 0 else -1), 0.0),
+                    self.a2, self.a3, self.d5, ahead, above, q1, 0.0 if w > 0 else pi,
+                    h0, 1.0 if sin(h1 - h0) > 0 else -1.0, side,
+                )  # fmt: skip
+                if motion.arcs:
+                    found.append(motion)
         return found
 
     def distance_to_reach(self, T: Array) -> float:

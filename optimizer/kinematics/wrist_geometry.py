@@ -83,13 +83,7 @@ class WristGeometry:
     @cached_property
     def potential_rates(self) -> Array:
         """Greatest change (inner,) of the inner links' potential energy with each inner joint [J/rad]."""
-        lengths = np.linalg.norm(self._placements[1 : self.inner, :3, 3], axis=1)
-        rates = np.zeros(self.inner)
-        for k in range(self.inner):
-            body = self.model.inertias[k + 1]
-            for j in range(k + 1):
-                rates[j] += body.mass * (float(np.linalg.norm(body.lever)) + float(lengths[j:k].sum()))
-        return rates * float(np.linalg.norm(self.gravity))
+        return potential_rates(self.model, self.gravity, self.inner)
 
     def placed(self, q: Array) -> tuple[Array, Array]:
         """Wrist (b, 3) [m] and potential energy (b,) [J] of the inner links at inner joint positions q (b, inner)."""
@@ -147,6 +141,22 @@ class WristGeometry:
         ]
         reach = [levers[k] + float(lengths[:k].sum()) for k in range(len(bodies))]
         return [WristBody(body.mass, far, low) for body, far, low in zip(bodies, reach, least, strict=True)]
+
+
+def potential_rates(model: pin.Model, gravity: Array, links: int | None = None) -> Array:
+    """Greatest change (links,) [J/rad] of the potential energy of the first `links` links with each of their joints.
+
+    A link's centre of mass is no farther from an earlier joint than the joints' origins between them and its own lever.
+    `links` is by default every link; `gravity` (3,) is in m/s².
+    """
+    count = model.nq if links is None else links
+    lengths = np.linalg.norm(joint_placements(model)[1:count, :3, 3], axis=1)
+    rates = np.zeros(count)
+    for k in range(count):
+        body = model.inertias[k + 1]
+        for j in range(k + 1):
+            rates[j] += body.mass * (float(np.linalg.norm(body.lever)) + float(lengths[j:k].sum()))
+    return np.asarray(rates * float(np.linalg.norm(gravity)))
 
 
 def least_potential(arm: Arm) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
@@ -40,11 +41,11 @@ class BranchFilter:
     elbow: Elbow | None = None
     wrist: Wrist | None = None
 
-    def allows(self, label: object) -> bool:
-        """Whether every part that the filter names has its value in `label`.
+    def allows(self, label: object, singular: Sequence[str] = ()) -> bool:
+        """Whether every part that the filter names has its value in `label`, or is one of the `singular` parts.
 
-        The label may be that of any family of arms. If it has no part of a name, a filter that names the part does not
-        allow it.
+        On a singularity a configuration is on both branches that meet there. The label may be that of any family of
+        arms. If it has no part of a name, a filter that names the part does not allow it.
         """
-        named = {part: wanted for part, wanted in asdict(self).items() if wanted is not None}
+        named = {part: wanted for part, wanted in asdict(self).items() if wanted is not None and part not in singular}
         return all(getattr(label, part, None) == wanted for part, wanted in named.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -73,9 +74,9 @@ class Problem:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
 
-    def allows(self, label: object) -> bool:
-        """Whether `branch` allows the inverse kinematics branch of this label."""
-        return self.branch is None or self.branch.allows(label)
+    def allows(self, label: object, singular: Sequence[str] = ()) -> bool:
+        """Whether `branch` allows the inverse kinematics branch of this label, whose `singular` parts are both."""
+        return self.branch is None or self.branch.allows(label, singular)
 
 
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:

@@ -32,7 +32,7 @@ class Reason(Enum):
     """Why a candidate has its status. The value is the message; a candidate may carry a more exact one beside it."""
 
     NOT_REACHED = "not reached before the deadline"
-    DEFERRED = "other orientations have smaller lower bounds"
+    DEFERRED = "other samples of the target have smaller lower bounds"
     ENOUGH_SOLVED = "the method solves no more candidates"
     BOUND = "its lower bound is not below the best energy found"
     INVALID_END = "the arm cannot be at one of its ends"
@@ -62,6 +62,11 @@ class Candidate:
     attempt: SolveResult | None = field(default=None, repr=False)
     holdable: bool = True
     deferred: bool = False
+
+    @property
+    def sampled(self) -> bool:
+        """Whether an end is one of infinitely many configurations that reach its target."""
+        return self.start.sampled or self.goal.sampled
 
     def settle(self, status: CandidateStatus, reason: Reason, message: str | None = None) -> None:
         """Set the status with its reason; the `message` is the reason's own unless given."""
@@ -103,14 +108,14 @@ def pairs(
     The dynamics has period 2π in every joint. If both ends are poses, pairs with equal joint displacement are one
     candidate. Pairs that move a joint by more than 2π are left out: without that full turn, the same branches have less
     displacement in this joint, no more in the others, and a bound that is never higher. Without `windings`, and for
-    samples of a free orientation, only the pair of least displacement is kept.
+    samples of a free orientation or of a self-motion, only the pair of least displacement is kept.
 
     Raises InvalidProblem if several targets make too many pairs.
     """
     result: list[Candidate] = []
     for start in starts:
         for goal in goals:
-            windings = prepared.problem.windings and goal.tolerance is None
+            windings = prepared.problem.windings and not (start.sampled or goal.sampled)
             options = [
                 _joint_options(s, g, start.fixed or goal.fixed, windings)
                 for s, g in zip(start.choices, goal.choices, strict=True)
@@ -123,8 +128,9 @@ def pairs(
                 )
             for combination in product(*options):
                 both = np.array(combination)
-                candidate = Candidate(start, goal, both[:, 0], both[:, 1], deferred=goal.tolerance is not None)
-                if candidate.deferred:
+                candidate = Candidate(start, goal, both[:, 0], both[:, 1])
+                if candidate.sampled:
+                    candidate.deferred = True
                     candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
                 result.append(candidate)
     return result

@@ -14,6 +14,7 @@ from optimizer.kinematics.inverse import (
     required_inverse_kinematics,
 )
 from optimizer.kinematics.orientation_tolerance import sample_orientations
+from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
@@ -22,6 +23,8 @@ from optimizer.solution import UnreachableTarget
 
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least
 SAMPLES, LEAST_SAMPLES = 96, 12
+# members of the self-motion of a pose, and of each sample of a pose of free orientation
+MEMBERS, FEW_MEMBERS = 24, 4
 # share of the tool's cone that a goal of free orientation may use: on its edge the motion could not leave the goal
 INSIDE = 0.999
 # label of joint positions of an arm without named branches
@@ -33,7 +36,8 @@ class EndConfiguration:
     """One branch at the start or goal: its label, and per joint its full-turn alternatives within the limits [rad].
 
     `fixed`: the joint positions are given. `target` is the index of the target that it reaches. `tolerance` is this
-    target if its orientation is free in part: then the configuration is a sample of it.
+    target if its orientation is free in part: then the configuration is a sample of it. Of a pose that is held on a
+    `self_motion`, too, the configuration is a sample.
     """
 
     label: str
@@ -42,17 +46,23 @@ class EndConfiguration:
     fixed: bool
     target: int = 0
     tolerance: ConeOrientedPose | None = None
+    self_motion: SelfMotion | None = None
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it is one of infinitely many configurations that reach the target."""
+        return self.tolerance is not None or self.self_motion is not None
 
 
 def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches at `start` or `goal` that the problem allows, none singular; and the targets without any.
+    """The branches at `start` or `goal` that the problem allows; and the targets without any.
 
     Raises NoReachableTarget if none of several targets has a branch; for a single pose UnreachablePose (also if the
     branch asked for does not reach it) or SingularPose; InvalidProblem for a pose of an arm without inverse kinematics.
     """
     target = getattr(prepared.problem, name)
     if not isinstance(target, AnyOf):
-        return _ends_of(prepared, name, target, 0, SAMPLES), []
+        return _ends_of(prepared, name, target, 0), []
     tolerance = sum(isinstance(member, ConeOrientedPose) for member in target.targets)
     reached: list[EndConfiguration] = []
     unreachable: list[UnreachableTarget] = []
@@ -72,7 +82,10 @@ def label_of(robot: Robot, q: Array) -> str:
     return GIVEN if kinematics is None else str(kinematics.label(q))
 
 
-def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, samples: int) -> list[EndConfiguration]:
+def _ends_of(
+    prepared: PreparedProblem, name: str, target: Single, index: int, samples: int = SAMPLES, on_curve: int = MEMBERS
+) -> list[EndConfiguration]:
+    """The branches of one target: `samples` orientations of a free one, `on_curve` members of a self-motion."""
     problem = prepared.problem
     robot, limits = problem.arm.robot, problem.arm.active_limits
     if not isinstance(target, Pose | ConeOrientedPose):
@@ -81,14 +94,23 @@ def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, s
     kinematics = required_inverse_kinematics(robot, name)
     if isinstance(target, ConeOrientedPose):
         return _ends_of_samples(prepared, name, target, index, samples)
-    solutions = kinematics.solve(target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name)
-    solutions = [s for s in solutions if problem.allows(s.label)]
+    solutions = kinematics.solve(
+        target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name, members=on_curve
+    )
+    solutions = [s for s in solutions if problem.allows(s.label, s.singular)]
     if not solutions:
         raise UnreachablePose(
             name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."
         )
     return [
-        EndConfiguration(str(s.label), s.q, full_turn_alternatives(s.q, limits.q_min, limits.q_max), False, index)
+        EndConfiguration(
+            str(s.label),
+            s.q,
+            full_turn_alternatives(s.q, limits.q_min, limits.q_max),
+            fixed=False,
+            target=index,
+            self_motion=s.self_motion,
+        )
         for s in solutions
     ]
 
@@ -104,8 +126,8 @@ def _ends_of_samples(
     for R in sample_orientations(pose, tried):
         try:
             found += [
-                replace(end, tolerance=pose)
-                for end in _ends_of(prepared, name, pose.with_orientation(R), index, samples)
+                replace(end, tolerance=pose, self_motion=None)
+                for end in _ends_of(prepared, name, pose.with_orientation(R), index, on_curve=FEW_MEMBERS)
             ]
         except (UnreachablePose, SingularPose) as error:
             errors.append(error)

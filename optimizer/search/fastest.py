@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from optimizer.exceptions import DurationTooShort
 from optimizer.methods.duration_intervals import fastest as all_durations
-from optimizer.search import free_goal
 from optimizer.search.attempts import solve_from, solver_of
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.sampled_ends import activate_deferred
 from optimizer.trajectories.spline import Spline, sampled
 
 
@@ -36,7 +36,7 @@ def fastest(incumbent: Incumbent) -> tuple[Candidate, Spline] | None:
 
     The durations that the problem allows do not count.
     """
-    free_goal.activate_deferred(incumbent.candidates)
+    activate_deferred(incumbent.candidates)
     winner, best = None, None
     open_candidates = [each for each in incumbent.candidates if each.holdable and not each.deferred]
     for candidate in sorted(open_candidates, key=lambda each: each.shortest):

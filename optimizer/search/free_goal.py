@@ -1,24 +1,18 @@
-"""Goals whose orientation is free in part: which samples are solved, and how the best of them are refined.
+"""Goals whose orientation is free in part: how the best samples are refined.
 
-The configurations of such a goal form a manifold. Its samples are ordered by lower bound, and those of least bound are
-solved. From the best of these, the goal configuration becomes a decision variable of the nonlinear program, restricted
-to the tangent space of the goal manifold. Inverse kinematics projects the new goal onto the manifold, and the motion is
-solved again with this goal fixed, until the energy no longer decreases.
+The configurations of such a goal form a manifold. From the best solved samples, the goal configuration becomes a
+decision variable of the nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics
+projects the new goal onto the manifold, and the motion is solved again with this goal fixed, until the energy no longer
+decreases.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
 from models.robot import Array
-from optimizer.exceptions import JoulepathError
-from optimizer.kinematics.inverse import SINGULAR, required_inverse_kinematics
-from optimizer.kinematics.orientation_tolerance import nearest_orientation, tilt
-from optimizer.kinematics.tcp import flange_pose, tcp_jacobian, tcp_pose
+from optimizer.kinematics.orientation_tolerance import tilt
+from optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.free_spline import COARSE, FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
@@ -29,16 +23,14 @@ from optimizer.nlp.sqp import solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.attempts import solver_of
-from optimizer.search.candidates import Candidate, Reason, bound
-from optimizer.search.ends import EndConfiguration, label_of
+from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.sampled_ends import nearest_configuration, with_ends
 from optimizer.solution import CandidateStatus
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import REST_POINTS
 from optimizer.trajectories.spline import sample
 
-# samples solved before any is refined: in all, and of one pair of branches
-BATCH, ALIKE = 12, 2
 # solved samples that are refined, each of a pair of branches of its own
 MOST_REFINED = 4
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
@@ -48,69 +40,8 @@ GAIN = 2e-4
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
 # instants at which a motion of another method is sampled
 FIT_SAMPLES = 201
-# configurations that differ by less are the same [rad]
-SAME = 1e-6
 # sides of the polygon that stands for a cone's circle
 SIDES = 12
-
-
-def activate_deferred(candidates: Sequence[Candidate]) -> bool:
-    """Activate the deferred samples of least lower bound; false if there are none."""
-    alike: Counter[tuple[str, str, int]] = Counter()
-    opened = 0
-    for candidate in sorted((e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)):
-        kind = (candidate.start.label, candidate.goal.label, candidate.goal.target)
-        if candidate.status is not CandidateStatus.UNVISITED or alike[kind] == ALIKE:
-            continue
-        alike[kind] += 1
-        candidate.deferred = False
-        candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
-        opened += 1
-        if opened == BATCH:
-            break
-    return opened > 0
-
-
-def between(
-    prepared: PreparedProblem,
-    candidates: list[Candidate],
-    q_start: Array,
-    q_goal: Array,
-    among: Sequence[Candidate] | None = None,
-) -> Candidate:
-    """The candidate (of `among`, default all) between two configurations (nq,) [rad], else the nearest one.
-
-    If it is missing only because q_goal is not among the samples of a free orientation, it is added to `candidates`.
-    """
-    known = candidates if among is None else among
-    nearest = min(known, key=lambda e: _distance(e.q_start, q_start) + _distance(e.q_goal, q_goal))
-    if _distance(nearest.q_start, q_start) + _distance(nearest.q_goal, q_goal) < SAME:
-        return nearest
-    kinds = {e.goal.target: e for e in known if e.goal.tolerance is not None and _distance(e.q_start, q_start) < SAME}
-    for candidate in kinds.values():
-        on_it = project_to_goal(prepared, candidate.goal, q_goal)
-        if on_it is not None and _distance(on_it, q_goal) < SAME:
-            fresh = _with_goal(prepared, candidate, q_goal)
-            if fresh is not None:
-                candidates.append(fresh)
-                return fresh
-    return nearest
-
-
-def _distance(a: Array, b: Array) -> float:
-    return float(np.abs(a - b).max())
-
-
-def _with_goal(prepared: PreparedProblem, candidate: Candidate, q_goal: Array) -> Candidate | None:
-    """The candidate with another goal configuration, with its bounds; None if that is infeasible."""
-    label = label_of(prepared.problem.arm.robot, q_goal)
-    goal = replace(candidate.goal, label=label, q=q_goal, choices=[[value] for value in q_goal.tolist()], fixed=True)
-    fresh = Candidate(candidate.start, goal, candidate.q_start, q_goal)
-    try:
-        bound(prepared, [fresh])
-    except JoulepathError:
-        return None
-    return fresh
 
 
 def refine_goals(incumbent: Incumbent) -> list[Candidate]:
@@ -138,7 +69,7 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
         if incumbent.deadline.passed or radius < LEAST_RADIUS:
             break
         guess = _proposal(incumbent, best, radius)
-        q_goal = None if guess is None else project_to_goal(incumbent.prepared, best.goal, guess.points[-1])
+        q_goal = None if guess is None else nearest_configuration(incumbent.prepared, best.goal, guess.points[-1])
         fresh = None if guess is None or q_goal is None else _solved(incumbent, best, q_goal, guess)
         if fresh is None or (fresh.energy or 0.0) >= (best.energy or 0.0):
             radius /= 4
@@ -153,7 +84,7 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
 def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Guess) -> Candidate | None:
     """The candidate with another goal (nq,) [rad], solved; None if it has no motion."""
     prepared = incumbent.prepared
-    fresh = _with_goal(prepared, candidate, q_goal)
+    fresh = with_ends(prepared, candidate, candidate.q_start, q_goal)
     if fresh is None:
         return None
     solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))
@@ -222,20 +153,3 @@ def goal_constraints(
         lower.append(upper_bound if pose.half_angle == 0 else np.full(SIDES, -1e30))
         upper.append(upper_bound)
     return GoalConstraints(np.concatenate(rows), np.concatenate(lower), np.concatenate(upper), radius)
-
-
-def project_to_goal(prepared: PreparedProblem, goal: EndConfiguration, q: Array) -> Array | None:
-    """The configuration (nq,) nearest to q (nq,) that has the TCP in place and an orientation allowed, if any."""
-    pose, problem = goal.tolerance, prepared.problem
-    assert pose is not None
-    arm, limits = problem.arm, problem.arm.active_limits
-    T_base_tcp = pose.with_orientation(nearest_orientation(pose, tcp_pose(arm, q)[:3, :3])).T
-    kinematics = required_inverse_kinematics(arm.robot, "goal")
-    found = []
-    for branch in kinematics.branches(flange_pose(T_base_tcp, arm.T_flange_tcp)):
-        if branch.smallest_singular_value < SINGULAR:
-            continue
-        near = branch.q + 2 * np.pi * np.round((q - branch.q) / (2 * np.pi))
-        if problem.allows(branch.label) and ((near >= limits.q_min) & (near <= limits.q_max)).all():
-            found.append(near)
-    return min(found, key=lambda near: float(np.abs(near - q).max()), default=None)

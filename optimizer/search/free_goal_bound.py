@@ -20,12 +20,12 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import NEVER, Deadline
-from optimizer.energy.dwell import holding_power
-from optimizer.kinematics.wrist_geometry import Shell, WristBody, WristGeometry, least_potential
+from optimizer.kinematics.wrist_geometry import Shell, WristBody, WristGeometry, least_potential, potential_rates
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import Candidate
-from optimizer.search.lower_bound import lower_bounds
+from optimizer.search.lower_bound import LeastBound
+from optimizer.search.self_motion_bound import EndCurves
 
 # boxes along each joint at first, boxes split in a round, rounds
 FIRST_BOXES, SPLIT, ROUNDS = 4, 160, 20
@@ -36,24 +36,40 @@ SMALLEST = 0.01
 def family_bound_of(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> float:
     """Bound [J] on the motions to those goals whose orientation is free in part; inf if there are none."""
     poses = {each.goal.target: each.goal.tolerance for each in candidates if each.goal.tolerance is not None}
-    starts = np.array(list({id(each.start): each.start.q for each in candidates}.values()))
-    rounds = ROUNDS // max(len(poses), 1)
-    return min((family_bound(prepared, pose, starts, rounds, deadline) for pose in poses.values()), default=np.inf)
+    if not poses:
+        return np.inf
+    curves = EndCurves.of([each.start for each in candidates])
+    starts, half = curves.boxes(curves.first())
+    rounds = ROUNDS // len(poses)
+    return min(family_bound(prepared, pose, starts, rounds, deadline, half) for pose in poses.values())
 
 
 def family_bound(
-    prepared: PreparedProblem, pose: ConeOrientedPose, starts: Array, rounds: int = ROUNDS, deadline: Deadline = NEVER
+    prepared: PreparedProblem,
+    pose: ConeOrientedPose,
+    starts: Array,
+    rounds: int = ROUNDS,
+    deadline: Deadline = NEVER,
+    half: Array | None = None,
 ) -> float:
     """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration of `pose`.
 
-    Fewer rounds, or a deadline, give a weaker bound. For a chain without inner joints the bound is that of motions to
-    anywhere.
+    With `half` (s, nq) [rad] the starts are boxes, `starts` their middles and `half` their half sides. Fewer rounds, or
+    a deadline, give a weaker bound. For a chain without inner joints the bound is that of motions to anywhere.
     """
     geometry = WristGeometry.of(prepared.arm)
     if geometry is None:
-        gain = least_potential(prepared.arm) - np.array([prepared.potential(q) for q in starts])
-        return float(_Bound(prepared).of(np.zeros_like(starts), gain).min())
-    return _BoxSearch(_Family(prepared, pose, geometry), starts).run(rounds, deadline)
+        gain = least_potential(prepared.arm) - _greatest_potentials(prepared, starts, half)
+        return float(LeastBound(prepared).of(np.zeros_like(starts), gain).min())
+    return _BoxSearch(_Family(prepared, pose, geometry), starts, half).run(rounds, deadline)
+
+
+def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array | None) -> Array:
+    """The greatest potential energy (s,) [J] in boxes around configurations (s, nq)."""
+    potentials = np.array([prepared.potential(q) for q in centre])
+    if half is None:
+        return potentials
+    return np.asarray(potentials + half @ potential_rates(prepared.model, prepared.arm.gravity))
 
 
 @dataclass(frozen=True)
@@ -82,9 +98,10 @@ class _Boxes:
 class _BoxSearch:
     """Branch and bound over boxes for one family of goal configurations."""
 
-    def __init__(self, family: _Family, starts: Array) -> None:
+    def __init__(self, family: _Family, starts: Array, half: Array | None) -> None:
         self.family, self.starts = family, starts
-        self.potentials = np.array([family.prepared.potential(q) for q in starts])
+        self.start_half = np.zeros_like(starts) if half is None else half
+        self.potentials = _greatest_potentials(family.prepared, starts, half)
 
     def run(self, rounds: int, deadline: Deadline) -> float:
         """The least bound [J] of any box after at most so many rounds of splitting."""
@@ -120,25 +137,8 @@ class _BoxSearch:
 
     def bounded(self, start: Indices, centre: Array, half: Array) -> _Boxes:
         """The boxes with their bounds."""
-        return _Boxes(start, centre, half, self.family.bounds(self.starts[start], self.potentials[start], centre, half))
-
-
-@dataclass(frozen=True)
-class _Bound:
-    """`lower_bounds` of a problem for motions of which only the least displacement and potential gain are known."""
-
-    prepared: PreparedProblem
-
-    def of(self, displacement: Array, potential_gain: Array) -> Array:
-        """Bounds (b,) [J] for joint displacements (b, nq) [rad] and gains of potential energy (b,) [J], or more."""
-        if self.prepared.problem.objective == "mechanical":
-            potential_gain = np.maximum(potential_gain, 0.0)  # that bound is |gain|, of which zero is the least
-        return lower_bounds(self.prepared, displacement, potential_gain, np.full_like(potential_gain, self._hold))[0]
-
-    @cached_property
-    def _hold(self) -> float:
-        """Least power [W] to stand still: with no torque to hold."""
-        return float(holding_power(self.prepared.arm, np.zeros(self.prepared.arm.robot.nq)))
+        starts, start_half, potentials = self.starts[start], self.start_half[start], self.potentials[start]
+        return _Boxes(start, centre, half, self.family.bounds(starts, start_half, potentials, centre, half))
 
 
 @dataclass(frozen=True)
@@ -158,11 +158,12 @@ class _Family:
         return self.geometry.bodies(self.pose)
 
     @cached_property
-    def _bound(self) -> _Bound:
-        return _Bound(self.prepared)
+    def _bound(self) -> LeastBound:
+        return LeastBound(self.prepared)
 
-    def bounds(self, starts: Array, potentials: Array, centres: Array, halves: Array) -> Array:
-        """Bounds (b,) [J] on motions from starts (b, nq), of potential energy (b,) [J], into boxes (b, inner).
+    def bounds(self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array) -> Array:
+        """Bounds (b,) [J] on motions from boxes around starts (b, nq), of potential energy at most (b,) [J], into boxes
+        (b, inner).
 
         inf for a box that holds no configuration.
         """
@@ -179,7 +180,7 @@ class _Family:
         away = starts[inside, :inner] - centres[inside]
         away = np.abs(away - 2 * np.pi * np.round(away / (2 * np.pi)))
         displacement = np.zeros((int(inside.sum()), starts.shape[1]))
-        displacement[:, :inner] = np.maximum(away - halves[inside], 0.0)
+        displacement[:, :inner] = np.maximum(away - halves[inside] - start_halves[inside, :inner], 0.0)
         lowest = lowest[inside] - halves[inside] @ self.geometry.potential_rates
         hanging = -wrist[inside] @ self.geometry.gravity - blur[inside] * strength
         for body in self._bodies:

@@ -5,10 +5,13 @@ Each term below is proven in its function's docstring; their sum is minimised ov
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
 from models.robot import Array, FrictionLaw, Limits
-from optimizer.energy.dwell import linear_dwells
+from optimizer.energy.dwell import holding_power, linear_dwells
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.trajectories.seven_segment import shortest_duration
@@ -47,6 +50,24 @@ def lower_bounds(
             value = piece.constant + _least_drawn(prepared, displacement, potential_gain, low, high, piece.power)
             bound = np.where(low <= high, np.minimum(bound, value), bound)
     return np.where(t_min > t_max, np.inf, bound), shortest
+
+
+@dataclass(frozen=True)
+class LeastBound:
+    """`lower_bounds` of a problem for motions of which only the least displacement and potential gain are known."""
+
+    prepared: PreparedProblem
+
+    def of(self, displacement: Array, potential_gain: Array) -> Array:
+        """Bounds (b,) [J] for joint displacements (b, nq) [rad] and gains of potential energy (b,) [J], or more."""
+        if self.prepared.problem.objective == "mechanical":
+            potential_gain = np.maximum(potential_gain, 0.0)  # that bound is |gain|, of which zero is the least
+        return lower_bounds(self.prepared, displacement, potential_gain, np.full_like(potential_gain, self._hold))[0]
+
+    @cached_property
+    def _hold(self) -> float:
+        """Least power [W] to stand still: with no torque to hold."""
+        return float(holding_power(self.prepared.arm, np.zeros(self.prepared.arm.robot.nq)))
 
 
 def mechanical(potential_gain: Array) -> Array:

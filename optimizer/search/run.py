@@ -14,7 +14,7 @@ from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
 from optimizer.problem.problem import Problem
-from optimizer.search import free_goal
+from optimizer.search import free_goal, self_motions
 from optimizer.search.attempts import solve, solve_from
 from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
@@ -23,6 +23,8 @@ from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.refinement import compare_with_baselines, refine
+from optimizer.search.sampled_ends import activate_deferred, between
+from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.solution import (
     Baseline,
     Branch,
@@ -74,7 +76,7 @@ class Run:
         if incumbent.best() is None:
             find_fastest(incumbent)
         if incumbent.method.most_solved is None:
-            incumbent.candidates += free_goal.refine_goals(incumbent)
+            incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(incumbent)
         while (best := incumbent.best()) is not None:
             refine(incumbent, best)
             table = compare_with_baselines(incumbent, best)
@@ -103,7 +105,7 @@ class Run:
         """Solve candidates until no lower bound is below the incumbent; deferred ones too while nothing is solved."""
         incumbent = self.incumbent
         candidates, most_solved = incumbent.candidates, incumbent.method.most_solved
-        free_goal.activate_deferred(candidates)
+        activate_deferred(candidates)
         while True:
             explore(
                 incumbent.prepared,
@@ -112,7 +114,7 @@ class Run:
                 incumbent.deadline,
                 most_solved,
             )
-            if incumbent.best() is not None or not free_goal.activate_deferred(candidates):
+            if incumbent.best() is not None or not activate_deferred(candidates):
                 break
 
     def without_storage(self) -> tuple[Candidate, SolveResult, Energy] | None:
@@ -133,7 +135,7 @@ class Run:
         incumbent.solves += found.solver.nlp_solves
         targets = found.start.target, found.goal.target
         same = [each for each in incumbent.candidates if (each.start.target, each.goal.target) == targets]
-        candidate = free_goal.between(incumbent.prepared, incumbent.candidates, found.start.q, found.goal.q, same)
+        candidate = between(incumbent.prepared, incumbent.candidates, found.start.q, found.goal.q, same)
         spline = found.trajectory.spline
         result = SolveResult(SolveStatus.SOLVED, "converged", spline=spline, stationarity=found.solver.stationarity)
         return candidate, result, incumbent.prepared.energy(spline)
@@ -146,7 +148,7 @@ class Run:
         incumbent = self.incumbent
         prepared = incumbent.prepared
         q_start, q_goal = spline.control_points[0], spline.control_points[-1]
-        candidate = free_goal.between(prepared, incumbent.candidates, q_start, q_goal)
+        candidate = between(prepared, incumbent.candidates, q_start, q_goal)
         if candidate.status is CandidateStatus.INFEASIBLE or incumbent.deadline.passed:
             return
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
@@ -178,8 +180,12 @@ class Run:
         for candidate in open_:
             if candidate.lower_bound >= objective:
                 candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
-        # of a goal of free orientation only samples are solved: it is done only if its bound rules all of it out
-        family = family_bound_of(prepared, candidates, incumbent.deadline)
+        # of a target that infinitely many configurations reach, only samples are solved: it is done only if a bound
+        # rules all of it out
+        family = min(
+            family_bound_of(prepared, candidates, incumbent.deadline),
+            self_motion_bound(prepared, candidates, incumbent.deadline),
+        )
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
         assert best.attempt is not None
         return Solution(
@@ -188,7 +194,7 @@ class Run:
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=prepared.trajectory(spline, self.problem.sample_period),
             energy=energy,
-            lower_bound=min([family, *(each.lower_bound for each in candidates if each.goal.tolerance is None)]),
+            lower_bound=min([family, *(each.lower_bound for each in candidates if not each.sampled)]),
             baselines=table,
             candidates=[each.report() for each in candidates],
             unreachable=self.unreachable,

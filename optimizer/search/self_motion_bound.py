@@ -1,0 +1,156 @@
+"""A lower bound on the motions from or to a pose that the arm holds on a self-motion: over all of its members at once.
+
+The arcs of a self-motion are cut into cells, and `SelfMotion.boxes` holds every member of a cell in a box of joint
+positions. The joint displacement between two boxes is at least the distance between them, and the gain of potential
+energy at least that between their middles less what it can change within them (`potential_rates`). `lower_bounds` falls
+with neither, so that its value there bounds every motion between the boxes. The pairs of least bound are halved until
+their boxes are small. The least value over all pairs bounds the family.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.robot import Array
+from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.self_motion import SelfMotion
+from optimizer.kinematics.wrist_geometry import potential_rates
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.candidates import Candidate
+from optimizer.search.ends import EndConfiguration
+from optimizer.search.lower_bound import LeastBound
+
+# half side of the first cells, and of cells that are not halved again [rad]; pairs halved in a round, rounds
+FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-3, 64, 40
+
+
+def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
+    """Bound [J] on motions between targets of which at least one is held on a self-motion; inf if there are none.
+
+    Goals of free orientation are left to `free_goal_bound`.
+    """
+    pairs = [each for each in candidates if each.sampled and each.goal.tolerance is None]
+    if not pairs:
+        return np.inf
+    return _CellSearch(
+        prepared, EndCurves.of([each.start for each in pairs]), EndCurves.of([each.goal for each in pairs])
+    ).run(deadline)
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of the curves of one end: `curve` (n,) the index of each one's, its middle and half side (n,) [rad]."""
+
+    curve: NDArray[np.intp]
+    parameter: Array
+    half: Array
+
+    def __getitem__(self, chosen: NDArray[np.intp]) -> Cells:
+        return Cells(self.curve[chosen], self.parameter[chosen], self.half[chosen])
+
+    def halved(self, which: NDArray[np.bool]) -> tuple[Cells, Cells]:
+        """Both halves of the cells where `which` (n,) is true; the others twice."""
+        half = np.where(which, self.half / 2, self.half)
+        step = np.where(which, half, 0.0)
+        return Cells(self.curve, self.parameter - step, half), Cells(self.curve, self.parameter + step, half)
+
+    def joined(self, other: Cells) -> Cells:
+        """These cells, then the others."""
+        return Cells(
+            np.concatenate([self.curve, other.curve]),
+            np.concatenate([self.parameter, other.parameter]),
+            np.concatenate([self.half, other.half]),
+        )
+
+
+@dataclass(frozen=True)
+class EndCurves:
+    """What reaches the targets at one end: isolated configurations, and self-motions."""
+
+    curves: list[Array | SelfMotion]
+
+    @staticmethod
+    def of(ends: Sequence[EndConfiguration]) -> EndCurves:
+        """The curves of configurations at one end, each once."""
+        curves: dict[int, Array | SelfMotion] = {}
+        for end in ends:
+            curve = end.q if end.self_motion is None else end.self_motion
+            curves[id(curve)] = curve
+        return EndCurves(list(curves.values()))
+
+    def first(self) -> Cells:
+        """Cells that cover every curve; one without extent for an isolated configuration."""
+        curve, parameter, half = list[int](), list[float](), list[float]()
+        for k, each in enumerate(self.curves):
+            for lower, upper in [(0.0, 0.0)] if isinstance(each, np.ndarray) else each.arcs:
+                count = max(1, int(np.ceil((upper - lower) / 2 / FIRST_HALF)))
+                side = (upper - lower) / 2 / count
+                curve += [k] * count
+                parameter += [lower + side * (2 * n + 1) for n in range(count)]
+                half += [side] * count
+        return Cells(np.array(curve), np.array(parameter), np.array(half))
+
+    def boxes(self, cells: Cells) -> tuple[Array, Array]:
+        """Middle and half sides (n, nq) [rad] of a box around every cell."""
+        shape = (len(cells.curve), _joints(self.curves[0]))
+        centre, half = np.zeros(shape), np.zeros(shape)
+        for k, each in enumerate(self.curves):
+            own = np.flatnonzero(cells.curve == k)
+            if isinstance(each, np.ndarray):
+                centre[own] = each
+            elif len(own):
+                centre[own], half[own] = each.boxes(cells.parameter[own], cells.half[own])
+        return centre, half
+
+
+def _joints(curve: Array | SelfMotion) -> int:
+    return len(curve) if isinstance(curve, np.ndarray) else curve.at(np.array([curve.arcs[0][0]])).shape[1]
+
+
+class _CellSearch:
+    """Branch and bound over pairs of cells."""
+
+    def __init__(self, prepared: PreparedProblem, start: EndCurves, goal: EndCurves) -> None:
+        self.prepared, self.start, self.goal = prepared, start, goal
+        self.bound = LeastBound(prepared)
+        self.rates = potential_rates(prepared.model, prepared.arm.gravity)
+
+    def run(self, deadline: Deadline) -> float:
+        """The least bound [J] of any pair after at most ROUNDS rounds of halving."""
+        starts, goals = self.first()
+        value = self.bounds(starts, goals)
+        for _ in range(ROUNDS):
+            order = np.argsort(value, kind="stable")
+            lowest, rest = order[:SPLIT], order[SPLIT:]
+            if deadline.passed or max(starts.half[order[0]], goals.half[order[0]]) < LAST_HALF:
+                break
+            at_start = starts.half[lowest] > goals.half[lowest]
+            (s0, s1), (g0, g1) = starts[lowest].halved(at_start), goals[lowest].halved(~at_start)
+            fresh_starts, fresh_goals = s0.joined(s1), g0.joined(g1)
+            # the bound of a part is at least that of the whole
+            fresh = np.maximum(self.bounds(fresh_starts, fresh_goals), np.tile(value[lowest], 2))
+            starts, goals = starts[rest].joined(fresh_starts), goals[rest].joined(fresh_goals)
+            value = np.concatenate([value[rest], fresh])
+        return float(value.min())
+
+    def first(self) -> tuple[Cells, Cells]:
+        """Every pair of cells of which at least one is of a self-motion."""
+        starts, goals = self.start.first(), self.goal.first()
+        s, g = (
+            each.ravel() for each in np.meshgrid(*(np.arange(len(c.curve)) for c in (starts, goals)), indexing="ij")
+        )
+        moving = np.flatnonzero((starts.half[s] > 0) | (goals.half[g] > 0))
+        return starts[s[moving]], goals[g[moving]]
+
+    def bounds(self, starts: Cells, goals: Cells) -> Array:
+        """Bounds (n,) [J] on motions from the cells of one end to those of the other."""
+        (q_start, start_half), (q_goal, goal_half) = self.start.boxes(starts), self.goal.boxes(goals)
+        half = start_half + goal_half
+        # a full turn of a joint changes neither the pose nor the potential energy
+        away = (q_goal - q_start + np.pi) % (2 * np.pi) - np.pi
+        potentials = [np.array([self.prepared.potential(q) for q in each]) for each in (q_start, q_goal)]
+        return self.bound.of(np.maximum(np.abs(away) - half, 0.0), potentials[1] - potentials[0] - half @ self.rates)

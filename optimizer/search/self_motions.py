@@ -1,0 +1,91 @@
+"""Poses that the arm holds on a self-motion: how the best of their samples are refined.
+
+The parameter of the self-motion moves in steps while the energy decreases; each step is solved as a candidate of its
+own. The steps are halved until they tell nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from optimizer.search.attempts import solve
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.ends import MEMBERS
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.sampled_ends import nearest_configuration, with_ends
+from optimizer.solution import CandidateStatus
+
+# solved samples that are refined, each of a pair of branches of its own
+MOST_REFINED = 4
+# first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
+FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
+REFINED = "converged; refined along the self-motion that holds the pose"
+
+
+def refine(incumbent: Incumbent) -> list[Candidate]:
+    """New candidates, found by moving the best solved samples along their self-motions.
+
+    One sample per pair of branches is refined, at most MOST_REFINED of them; only candidates of less energy than their
+    sample are returned.
+    """
+    solved = [each for each in incumbent.candidates if each.energy is not None and _sides(each)]
+    chosen: dict[tuple[int, int, str, str], Candidate] = {}
+    for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
+        start, goal = candidate.start, candidate.goal
+        chosen.setdefault((id(start.self_motion), id(goal.self_motion), start.label, goal.label), candidate)
+    samples = list(chosen.values())[:MOST_REFINED]
+    refined = [(candidate, _descend(incumbent, candidate)) for candidate in samples]
+    return [better for candidate, better in refined if better is not candidate]
+
+
+def _sides(candidate: Candidate) -> list[Literal["start", "goal"]]:
+    """The ends that a self-motion can move."""
+    sides: list[Literal["start", "goal"]] = []
+    if candidate.start.self_motion is not None:
+        sides.append("start")
+    if candidate.goal.self_motion is not None:
+        sides.append("goal")
+    return sides
+
+
+def _descend(incumbent: Incumbent, candidate: Candidate) -> Candidate:
+    """The candidate of least energy found along the self-motions of its ends; itself if no step is better."""
+    best, step = candidate, float(FIRST_STEP)
+    while step > LEAST_STEP and not incumbent.deadline.passed:
+        steps = [(side, sign * step) for side in _sides(best) for sign in (1, -1)]
+        tried = (_moved(incumbent, best, side, by) for side, by in steps)
+        better = next(
+            (each for each in tried if each is not None and (each.energy or 0.0) < (best.energy or 0.0)), None
+        )
+        if better is None:
+            step /= 2
+        else:
+            best = better
+    return best
+
+
+def _moved(incumbent: Incumbent, candidate: Candidate, side: Literal["start", "goal"], step: float) -> Candidate | None:
+    """The candidate with one end moved by `step` [rad] along its self-motion, solved; None if it has no motion."""
+    if incumbent.deadline.passed:
+        return None
+    ends = {"start": (candidate.start, candidate.q_start), "goal": (candidate.goal, candidate.q_goal)}
+    end, q = ends[side]
+    motion = end.self_motion
+    assert motion is not None
+    member = motion.at(np.array([motion.clipped(motion.parameter(q) + step)]))[0]
+    near = nearest_configuration(incumbent.prepared, end, member + 2 * np.pi * np.round((q - member) / (2 * np.pi)))
+    if near is None or (near == q).all():
+        return None
+    moved = {"start": candidate.q_start, "goal": candidate.q_goal, side: near}
+    fresh = with_ends(incumbent.prepared, candidate, moved["start"], moved["goal"])
+    if fresh is None or fresh.lower_bound >= (candidate.energy or 0.0):
+        return None
+    result = solve(incumbent, fresh)
+    if result.spline is None:
+        return None
+    fresh.attempt = result
+    fresh.settle(CandidateStatus.SOLVED, Reason.METHOD, REFINED)
+    fresh.energy = incumbent.prepared.objective_of(incumbent.prepared.energy(result.spline))
+    return fresh
