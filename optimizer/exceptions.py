@@ -6,7 +6,7 @@ JoulepathError
 │   └── InvalidTable        a row of a given motion, or its table as a whole
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
-├── SingularPose            every solution is singular
+├── SingularPose            reached on a self-motion of unknown form only
 ├── NoReachableTarget       none of several targets has a solution
 ├── InCollision             every arm configuration at the start or goal is in collision
 │   ├── StartInCollision
@@ -108,12 +108,12 @@ class UnreachablePose(JoulepathError):
 
 
 class SingularPose(JoulepathError):
-    """Every solution of a pose is singular."""
+    """A pose is reached only on a self-motion that the inverse kinematics does not know."""
 
     def __init__(self, target: str, smallest_singular_value: float) -> None:
         super().__init__(
-            f"Every arm configuration that reaches the {target} pose is singular: move the pose a few millimetres, "
-            "tilt it by a degree, or give joint angles."
+            f"At the {target} pose the arm can turn about an axis of its own while the TCP stays, and its inverse "
+            "kinematics does not cover this: move the pose a few millimetres, or give joint positions."
         )
         self.target, self.smallest_singular_value = target, smallest_singular_value
 

@@ -15,7 +15,7 @@ from optimizer.problem.arm import Arm, Payload
 
 
 def to_ik_response(
-    request: IKRequest, request_id: str, solutions: Sequence[IKSolution], contacts: Sequence[ClosestPair]
+    request: IKRequest, request_id: str, robot: Robot, solutions: Sequence[IKSolution], contacts: Sequence[ClosestPair]
 ) -> dict[str, Any]:
     """The answer of `POST /ik`."""
     return {
@@ -24,7 +24,8 @@ def to_ik_response(
         "solutions": [
             {
                 "label": str(solution.label),
-                **fields(solution, "q", "limit_distance", "smallest_singular_value"),
+                **fields(solution, "q", "limit_distance", "smallest_singular_value", "singular"),
+                "free": [robot.joint_names[j] for j in solution.self_motion.free] if solution.self_motion else [],
                 "collides": contact.distance < 0,
                 "nearest": fields(contact, "pair", "distance"),
             }

@@ -32,9 +32,10 @@ router = APIRouter(tags=["motion"])
 )
 def solve(request: Request, body: IKRequest) -> Response:
     """Every solution within the joint range, with its branch, its distance to the limits and its smallest singular
-    value. Also the nearest or colliding pair of bodies in each: links, tool, payload and obstacles."""
+    value. Of a pose that the arm holds in infinitely many configurations (wrist stretched), some, with the joints that
+    are `free`. Also the nearest or colliding pair of bodies in each: links, tool, payload and obstacles."""
     robot = robot_named(body.robot)
     kinematics = required_inverse_kinematics(robot, "pose")
     solutions = kinematics.solve(to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal")
     contacts = collision_model(to_collision_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
-    return result_response(TaskResult.of_json(to_ik_response(body, request.state.id, solutions, contacts)))
+    return result_response(TaskResult.of_json(to_ik_response(body, request.state.id, robot, solutions, contacts)))

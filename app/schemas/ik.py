@@ -53,6 +53,17 @@ class IKSolution(Response):
         "1",
         0.12,
     )
+    singular: list[str] = described(
+        "Parts of the branch that are singular here: the configuration is on both branches of such a part.",
+        None,
+        ["wrist"],
+    )
+    free: list[str] = described(
+        "Joints that can move together while the TCP keeps its pose; empty if the configuration is isolated. Then "
+        "infinitely many configurations reach the pose, and `solutions` has some of them, evenly spread.",
+        None,
+        ["shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_3_joint"],
+    )
     collides: bool = described("Whether `nearest.distance` is negative.", None, False)
     nearest: ClosestPair = part("The two bodies with the smallest clearance.")
 

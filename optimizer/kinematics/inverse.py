@@ -23,7 +23,7 @@ from models.robot import Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.jacobians import geometric_jacobian
-from optimizer.kinematics.self_motion import SelfMotion, spread
+from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
 from optimizer.problem.branches import Label
@@ -163,7 +163,8 @@ class ClosedFormInverseKinematics:
         found: list[tuple[Array, Label, SelfMotion | None]]
         found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
         for motion in self._form.self_motions(T):
-            found += [(q, motion.label, motion) for q in motion.at(spread(motion, members))]
+            curve = None if is_point(motion) else motion
+            found += [(q, motion.label, curve) for q in motion.at(spread(motion, members))]
         if not found:
             return []
         q = np.array([each for each, _, _ in found])

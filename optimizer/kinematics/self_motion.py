@@ -14,7 +14,6 @@ import numpy as np
 from models.robot import Array
 from optimizer.problem.branches import Label
 
-
 # distance [m] beyond the reach at which the fourth axis may lie by rounding alone
 ROUNDING = 1e-10
 # an arc shorter than this is one configuration, up to rounding [rad]
@@ -60,6 +59,11 @@ class SelfMotion(Protocol):
         """Middle (n, nq) and half sides (n, nq) [rad] of boxes that hold every configuration of the curve whose
         parameter lies within `half` (n,) of `parameter` (n,). A full turn of a joint counts as none."""
         ...
+
+
+def is_point(motion: SelfMotion) -> bool:
+    """Whether the curve is one configuration, up to rounding."""
+    return sum(upper - lower for lower, upper in motion.arcs) < POINT
 
 
 def spread(motion: SelfMotion, count: int) -> Array:

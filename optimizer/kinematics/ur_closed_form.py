@@ -19,7 +19,7 @@ import pinocchio as pin
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
-from optimizer.kinematics.self_motion import StretchedWrist
+from optimizer.kinematics.self_motion import StretchedWrist, is_point
 from optimizer.problem.branches import Label
 
 # distance [m, or sine of the wrist angle] beyond the reach at which a pose may lie by rounding alone
@@ -211,6 +211,8 @@ class URClosedForm:
                 )  # fmt: skip
                 if motion.arcs:
                     found.append(motion)
+                    if is_point(motion):
+                        break  # stretched or folded: the elbow has one side
         return found
 
     def distance_to_reach(self, T: Array) -> float:

@@ -40,8 +40,9 @@ class UnreachablePose(_TargetError):
 
 
 class SingularPose(_TargetError):
-    """Every arm configuration that reaches the pose is singular: the TCP cannot move in some direction there. Move the
-    pose by a few millimetres, tilt it by a degree, or give joint positions."""
+    """The arm reaches the pose only where it can turn about an axis of its own while the TCP stays, in a way that its
+    inverse kinematics does not cover. Move the pose by a few millimetres, or give joint positions. Poses with a
+    stretched elbow or wrist are answered."""
 
     type: Literal["/problems/singular-pose"] = fixed("type", "/problems/singular-pose")
     title: Literal["Singular pose"] = fixed("title", "Singular pose")

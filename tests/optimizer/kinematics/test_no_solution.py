@@ -11,9 +11,10 @@ from scipy.optimize import minimize
 
 from models.robot import Array
 from optimizer.exceptions import SingularPose, UnreachablePose
-from optimizer.kinematics.inverse import SINGULAR
+from optimizer.kinematics.inverse import ClosedFormInverseKinematics, required_inverse_kinematics
+from optimizer.kinematics.self_motion import SelfMotion
+from optimizer.problem.branches import Label
 from tests.optimizer.kinematics.flange import (
-    ACCURACY,
     DATA,
     EVERYDAY,
     FLANGE,
@@ -22,12 +23,12 @@ from tests.optimizer.kinematics.flange import (
     LIMITS,
     MODEL,
     ROUNDING,
-    errors,
     forward,
     jacobian,
     joints,
     pose,
 )
+from tests.optimizer.moves import ROBOT
 
 # the search that judges the distance to reach converges to this [m]
 SEARCH = 1e-5
@@ -90,53 +91,6 @@ def nearest_by_search(T: Array) -> float:
     return float(min(found))
 
 
-@pytest.mark.parametrize(
-    "q",
-    [
-        np.array([0.4, -0.7, 0.0, 0.5, 1.0, 0.3]),
-        np.array([0.4, -1.3, 1.5, 0.5, 0.0, 0.3]),
-        np.array([0.4, -1.3, 1.5, 0.5, np.pi, 0.3]),
-    ],
-    ids=["stretched elbow", "stretched wrist", "folded wrist"],
-)
-def test_singular_solutions_are_left_out_where_there_are_others(q: Array) -> None:
-    T = forward(q)
-    assert any(branch.smallest_singular_value < SINGULAR for branch in IK.branches(T))
-    solutions = IK.solve(T)
-    for solution in solutions:
-        assert solution.smallest_singular_value >= SINGULAR
-        assert max(errors(T, solution.q)) < ACCURACY
-
-
-def test_rounding_does_not_hide_a_singularity() -> None:
-    """A stretched elbow, and a tool's transform there and back, which moves the pose by its last digit."""
-    rng = np.random.default_rng(5)
-    for q in rng.uniform(-np.pi, np.pi, (300, 6)):
-        q[2] = 0.0
-        tool = pose([0.1, -0.2, 0.3], pin.rpy.rpyToMatrix(*rng.uniform(-1, 1, 3)))
-        try:
-            solutions = IK.solve(forward(q) @ tool, tool)
-        except SingularPose:
-            continue
-        assert np.abs(np.exp(1j * joints(solutions)) - np.exp(1j * q)).max(axis=1).min() > FOUND
-
-
-def test_upright_home_is_singular() -> None:
-    home = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
-    with pytest.raises(SingularPose) as caught:
-        IK.solve(forward(home), target="start")
-    assert caught.value.target == "start"
-    assert caught.value.smallest_singular_value < SINGULAR
-
-
-def test_only_singular_solutions_inside_the_limits_are_no_answer() -> None:
-    q = np.array([0.4, -0.7, 0.0, 0.5, 1.0, 0.3])
-    tight = replace(LIMITS, q_min=q - 0.1, q_max=q + 0.1)
-    with pytest.raises(SingularPose) as caught:
-        IK.solve(forward(q), limits=tight)
-    assert caught.value.smallest_singular_value < SINGULAR
-
-
 @pytest.mark.parametrize("far", [1e3, 1e9, 1e160, 1e300])
 def test_any_finite_pose_is_answered(far: float) -> None:
     with pytest.raises(UnreachablePose) as caught:
@@ -144,27 +98,40 @@ def test_any_finite_pose_is_answered(far: float) -> None:
     assert caught.value.distance == pytest.approx(np.sqrt(3) * far, rel=1e-2)
 
 
-def test_a_pose_that_only_a_continuum_reaches_is_singular() -> None:
-    """A stretched wrist at every split of its turn between the fourth and sixth joint, never out of reach."""
-    rng = np.random.default_rng(2)
-    seen = 0
-    for _ in range(300):
-        q = np.array([rng.uniform(-3, 3), rng.uniform(-3, 3), rng.uniform(-0.2, 0.2), *rng.uniform(-3, 3, 3)])
-        q[4] = rng.choice([0.0, np.pi])
-        try:
-            IK.solve(forward(q))
-        except SingularPose:
-            seen += 1
-    assert seen > 10
+def test_an_arm_folded_onto_its_own_axis_is_no_isolated_solution() -> None:
+    """Links of equal length put the fourth axis on the second: the arm turns about it, at every q2."""
+    model = ROBOT.model.copy()
+    model.jointPlacements[4].translation = np.array([-0.425, 0.0, 0.1333])
+    kinematics = required_inverse_kinematics(replace(ROBOT, model=model), "goal")
+    data = model.createData()
+    for q in np.random.default_rng(6).uniform(-3, 3, (50, 6)):
+        q[2] = np.pi
+        pin.framesForwardKinematics(model, data, q)
+        # those with the other wrist or shoulder are
+        found = joints(kinematics.solve(np.array(data.oMf[FLANGE].homogeneous)))
+        assert (np.abs(np.sin(found[:, 2])) > FOUND).all()
 
 
-def test_a_pose_within_rounding_of_the_edge_of_reach_is_singular() -> None:
-    stretched = forward(np.array([0.4, -0.7, 0.0, 0.5, 1.0, 0.3]))
-    for shift in (-1e-14, 1e-14):
-        T = stretched.copy()
-        T[:3, 3] *= 1 + shift
-        try:
-            solutions = IK.solve(T)
-        except SingularPose:
-            continue
-        assert all(solution.smallest_singular_value >= SINGULAR for solution in solutions)
+class NothingKnown:
+    """A closed form that finds nothing of a pose within reach, like one that does not know its self-motion."""
+
+    def label(self, q: Array) -> Label:
+        return IK.label(q)
+
+    def solve(self, T: Array) -> tuple[Array, list[Label]]:
+        return np.zeros((0, 6)), []
+
+    def singular_parts(self, q: Array) -> tuple[str, ...]:
+        return ()
+
+    def self_motions(self, T: Array) -> list[SelfMotion]:
+        return []
+
+    def distance_to_reach(self, T: Array) -> float:
+        return 0.0
+
+
+def test_a_self_motion_of_unknown_form_is_a_singular_pose() -> None:
+    with pytest.raises(SingularPose) as caught:
+        ClosedFormInverseKinematics(ROBOT, NothingKnown()).solve(forward(EVERYDAY), target="start")
+    assert (caught.value.target, caught.value.smallest_singular_value) == ("start", 0.0)

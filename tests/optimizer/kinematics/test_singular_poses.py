@@ -1,0 +1,186 @@
+"""Singular poses: an edge of elbow or shoulder is a solution like any other, a stretched wrist has a curve of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from models.robot import Array
+from optimizer.kinematics.inverse import MEMBERS, IKSolution
+from optimizer.kinematics.self_motion import SelfMotion
+from optimizer.problem.branches import BranchFilter
+from tests.optimizer.kinematics.flange import (
+    ACCURACY,
+    EVERYDAY,
+    FOUND,
+    IK,
+    ROUNDING,
+    errors,
+    forward,
+    jacobian,
+    joints,
+    pose,
+)
+
+# next to an edge of the reach, a rounding of the pose by 1e-16 m moves elbow and shoulder by its square root [rad]
+FOUND_ON_AN_EDGE = 2e-6
+# distance [m] of the last axis from the first, at which the shoulder is singular
+OFFSET = 0.1333
+
+angles = st.lists(st.floats(-3.1, 3.1), min_size=6, max_size=6).map(np.array)
+
+
+def self_motions(solutions: list[IKSolution]) -> list[SelfMotion]:
+    """Every self-motion among the solutions, once."""
+    return list({id(each.self_motion): each.self_motion for each in solutions if each.self_motion is not None}.values())
+
+
+def apart(a: Array, b: Array) -> Array:
+    """Greatest difference (n,) of joints between configurations (n, nq) or (nq,), full turns left out [rad]."""
+    return np.asarray(np.abs(np.exp(1j * a) - np.exp(1j * b)).max(axis=-1))
+
+
+@given(q=angles, elbow=st.sampled_from([0.0, np.pi, -np.pi]))
+@settings(deadline=None)
+def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -> None:
+    q[2] = elbow
+    solutions = IK.solve(forward(q), windings=False)
+    nearest = min(solutions, key=lambda each: float(apart(each.q, q)))
+    if abs(np.sin(q[4])) < 1e-4:
+        return  # wrist and elbow at once: the tests of self-motions
+    assert apart(nearest.q, q) < FOUND_ON_AN_EDGE
+    assert "elbow" in nearest.singular
+    assert nearest.self_motion is None
+    for part in ("up", "down"):
+        assert BranchFilter(elbow=part).allows(nearest.label, nearest.singular)
+
+
+def test_on_an_edge_the_branches_that_meet_count_once() -> None:
+    rng = np.random.default_rng(3)
+    for q in rng.uniform(-3, 3, (200, 6)):
+        q[2] = 0.0
+        found = joints(IK.solve(forward(q), windings=False))
+        assert (apart(found, q) < FOUND_ON_AN_EDGE).sum() == 1
+
+
+def test_rounding_does_not_hide_an_edge() -> None:
+    """A stretched elbow, and a tool's transform there and back, which moves the pose by its last digit."""
+    rng = np.random.default_rng(5)
+    for q in rng.uniform(-np.pi, np.pi, (300, 6)):
+        q[2] = 0.0
+        tool = pose([0.1, -0.2, 0.3])
+        assert apart(joints(IK.solve(forward(q) @ tool, tool)), q).min() < FOUND_ON_AN_EDGE
+
+
+def test_a_singular_shoulder_is_a_solution_like_any_other() -> None:
+    """The last axis right beside the first: both shoulders are one."""
+    rng = np.random.default_rng(8)
+    for q in rng.uniform(-3, 3, (200, 6)):
+        # the last axis' origin level with the first axis: a2 c2 + a3 c23 + d5 s234 = 0, solved for q4
+        ahead = -0.425 * np.cos(q[1]) - 0.3922 * np.cos(q[1] + q[2])
+        if abs(ahead) > 0.0997:
+            continue
+        q[3] = np.arcsin(-ahead / 0.0997) - q[1] - q[2]
+        solutions = IK.solve(forward(q), windings=False)
+        nearest = min(solutions, key=lambda each: float(apart(each.q, q)))
+        assert apart(nearest.q, q) < FOUND_ON_AN_EDGE
+        assert "shoulder" in nearest.singular
+
+
+@given(q=angles, wrist=st.sampled_from([0.0, np.pi, -np.pi]))
+@settings(deadline=None)
+def test_a_stretched_wrist_holds_its_pose_on_a_curve(q: Array, wrist: float) -> None:
+    q[4] = wrist
+    T = forward(q)
+    solutions = IK.solve(T, windings=False)
+    curves = self_motions(solutions)
+    assert curves
+    for motion in curves:
+        own = [each for each in solutions if each.self_motion is motion]
+        assert len(own) >= MEMBERS
+        for each in own:
+            assert max(errors(T, each.q)) < ACCURACY
+            assert "wrist" in each.singular
+        moved = np.ptp(motion.at(np.linspace(*motion.arcs[0], 9)), axis=0)
+        assert set(np.flatnonzero(moved > ROUNDING)) <= set(motion.free)
+    # the configuration that the pose is of lies on one of the curves
+    members = [motion.at(np.array([motion.parameter(q)]))[0] for motion in curves]
+    assert min(float(apart(member, q)) for member in members) < FOUND
+
+
+def test_on_a_self_motion_the_jacobian_loses_a_rank() -> None:
+    """The tangent of the curve is in its null space."""
+    q = np.array([0.4, -1.3, 1.5, 0.5, 0.0, 0.3])
+    for motion in self_motions(IK.solve(forward(q))):
+        lower, upper = motion.arcs[0]
+        for parameter in np.linspace(lower, upper, 7)[1:-1]:
+            before, here, after = motion.at(parameter + np.array([-1e-6, 0.0, 1e-6]))
+            tangent = after - before
+            # full turns left out; central differences are exact to their step squared, and to rounding over the step
+            tangent -= 2 * np.pi * np.round(tangent / (2 * np.pi))
+            assert np.abs(jacobian(here) @ tangent).max() < 1e-6 * np.abs(tangent).max()
+
+
+@given(q=angles, seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=50)
+def test_boxes_hold_every_member_of_their_cell(q: Array, seed: int) -> None:
+    q[4] = 0.0
+    rng = np.random.default_rng(seed)
+    for motion in self_motions(IK.solve(forward(q))):
+        for lower, upper in motion.arcs:
+            parameter = rng.uniform(lower, upper, 40)
+            half = 10 ** rng.uniform(-5, 0, 40)
+            centre, sides = motion.boxes(parameter, half)
+            inside = np.clip(parameter + half * rng.uniform(-1, 1, 40), lower, upper)
+            for at in (inside, np.clip(parameter + half, lower, upper), np.clip(parameter - half, lower, upper)):
+                away = motion.at(at) - centre
+                away -= 2 * np.pi * np.round(away / (2 * np.pi))
+                assert (np.abs(away) <= sides + ROUNDING).all()
+
+
+def test_upright_all_singularities_meet_in_one_configuration() -> None:
+    home = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
+    solutions = IK.solve(forward(home), windings=False)
+    # the wrist's self-motion has shrunk to a point, as the arm can reach no farther; rounding leaves 1e-5 rad of it
+    assert apart(joints(solutions), home).max() < 1e-4
+    for each in solutions:
+        assert set(each.singular) == {"shoulder", "elbow", "wrist"}
+        assert each.self_motion is None
+        assert max(errors(forward(home), each.q)) < ACCURACY
+
+
+def test_the_curve_and_the_isolated_solutions_beside_it_agree() -> None:
+    """Just beyond the tolerance a pose has two isolated solutions; both lie next to the curve."""
+    for bend in (1e-9, 1e-8, 1e-6):
+        q = np.array([0.4, -1.3, 1.5, 0.5, bend, 0.3])
+        solutions = IK.solve(forward(q), windings=False)
+        assert not self_motions(solutions)
+        assert apart(joints(solutions), q).min() < FOUND
+        stretched = q.copy()
+        stretched[4] = 0.0
+        curves = self_motions(IK.solve(forward(stretched), windings=False))
+        near = [each.q for each in solutions if abs(np.sin(each.q[4])) < 2 * bend]
+        assert len(near) >= 2
+        for other in near:
+            members = [motion.at(np.array([motion.parameter(other)]))[0] for motion in curves]
+            assert min(float(apart(member, other)) for member in members) < 2 * bend + FOUND
+
+
+def test_everyday_postures_are_not_singular() -> None:
+    for solution in IK.solve(forward(EVERYDAY)):
+        assert solution.singular == () and solution.self_motion is None
+
+
+@pytest.mark.parametrize("members", [8, 24, 96])
+def test_members_are_evenly_spread(members: int) -> None:
+    q = np.array([0.4, -1.3, 1.5, 0.5, 0.0, 0.3])
+    solutions = IK.solve(forward(q), windings=False, members=members)
+    for motion in self_motions(solutions):
+        own = joints([each for each in solutions if each.self_motion is motion])
+        length = sum(upper - lower for lower, upper in motion.arcs)
+        sixth = np.sort(own[:, 5] % (2 * np.pi))
+        assert len(own) >= members
+        # by at most an even step, except where the curve has a gap
+        assert np.diff(sixth).max() <= length / members + (2 * np.pi - length) + FOUND
