@@ -1,0 +1,221 @@
+"""Attacks the proven lower bound: motions that the service did not find, none of which may spend less than the bound.
+
+    python -m benchmarks.bound_attack --count 1000 --starts 20
+
+Every request is solved, and its lower bound kept. Then motions are optimised from random starts on POINTS control
+points, each to a random configuration that reaches the goal, from one that reaches the start: any branch, any full
+turn, any member of a self-motion, any allowed orientation. The kinds of targets take turns, and half of the requests
+has other conditions: payload, mounting, bus, cycle, a fixed duration, the mechanical objective.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.reference import perturbation
+from benchmarks.statistics import Spread
+from benchmarks.tasks import MOUNTS
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer.deadline import Deadline
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.exceptions import JoulepathError
+from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.kinematics.orientation_tolerance import sample_orientations
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.methods.free_spline import FreeSpline
+from optimizer.methods.sqp_method import Guess
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.bus import Bus
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import AnyOf
+from optimizer.search.ends import label_of
+from optimizer.trajectories import bspline
+
+POINTS = 40
+# members of each self-motion, and orientations of each free goal, among which the attack draws
+MEMBERS, ORIENTATIONS = 64, 64
+# share of the starts that take the nearest goal, of the rest that take the next, and so on
+ODDS = 0.4
+# time for a request, and for one start [s]
+DEADLINE, PATIENCE = 60.0, 20.0
+# relative rounding of an energy and of a bound
+ROUNDING = 1e-9
+
+
+def _general(robot: Robot, rng: np.random.Generator) -> Array:
+    return np.asarray(rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi)))
+
+
+def _at(*joints: tuple[int, float]) -> Callable[[Robot, np.random.Generator], Array]:
+    """Configurations with some joints at, or next to, given angles."""
+
+    def draw(robot: Robot, rng: np.random.Generator) -> Array:
+        q = _general(robot, rng)
+        beside = 0.0 if rng.random() < 0.5 else 10 ** rng.uniform(-9, -2)
+        for joint, angle in joints:
+            q[joint] = angle + beside
+        return q
+
+    return draw
+
+
+CONFIGURATIONS: dict[str, Callable[[Robot, np.random.Generator], Array]] = {
+    "general": _general,
+    "wrist": _at((4, 0.0)),
+    "folded wrist": _at((4, np.pi)),
+    "elbow": _at((2, 0.0)),
+    "elbow and wrist": _at((2, 0.0), (4, 0.0)),
+    "upright": _at((1, -np.pi / 2), (2, 0.0), (3, -np.pi / 2), (4, 0.0)),
+}
+TARGETS = ("pose", "start and goal", "free about", "cone", "free", "several")
+
+
+def request(robot: Robot, seed: int, index: int) -> tuple[str, Problem]:
+    """Request `index` of a seed and the name of its kind."""
+    rng = np.random.default_rng([seed, index])
+    where, what = (
+        list(CONFIGURATIONS)[index % len(CONFIGURATIONS)],
+        TARGETS[index // len(CONFIGURATIONS) % len(TARGETS)],
+    )
+    arm, fields = _conditions(robot, rng) if rng.random() < 0.5 else (Arm(robot=robot, collisions=False), {})
+    start = _general(robot, rng)
+    q_goal = CONFIGURATIONS[where](robot, rng)
+    T = tcp_pose(arm, q_goal)
+    axis = np.array([0.0, 0.0, 1.0])
+    targets: dict[str, Any] = {
+        "pose": Pose(T),
+        "start and goal": Pose(T),
+        "free about": ConeOrientedPose.about(Pose(T), axis),
+        "cone": ConeOrientedPose(T[:3, 3], axis, T[:3, :3] @ axis, float(rng.uniform(0.1, 1.0))),
+        "free": ConeOrientedPose(T[:3, 3], axis, T[:3, :3] @ axis, np.pi),
+        "several": AnyOf((Pose(T), Pose(tcp_pose(arm, _general(robot, rng))))),
+    }
+    begin: Any = Pose(tcp_pose(arm, CONFIGURATIONS[where](robot, rng))) if what == "start and goal" else start
+    return f"{what}, {where}", Problem(arm=arm, start=begin, goal=targets[what], deadline=DEADLINE, **fields)
+
+
+def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, Any]]:
+    """Random conditions: the arm, and fields of the problem."""
+    mass = float(rng.uniform(0.0, robot.rated_payload))
+    com = rng.uniform([-0.05, -0.05, 0.0], [0.05, 0.05, 0.1])
+    buses = [Bus(), Bus(mode="isolated"), Bus(mode="recuperating", efficiency=float(rng.uniform(0.3, 1.0)))]
+    arm = Arm(
+        robot=robot,
+        collisions=False,
+        payload=Payload(mass=mass, com=com),
+        gravity=np.array(MOUNTS[str(rng.choice(list(MOUNTS)))]),
+        bus=buses[int(rng.integers(len(buses)))],
+    )
+    fields: dict[str, Any] = {}
+    kind = rng.integers(4)
+    if kind == 0:
+        fields = {"objective": "mechanical", "duration_max": float(rng.uniform(2.0, 5.0))}
+    elif kind == 1:
+        duration = float(rng.uniform(1.5, 5.0))
+        fields = {"duration_min": duration, "duration_max": duration}
+    elif kind == 2:
+        fields = {"cycle": Cycle(time=float(rng.uniform(4.0, 8.0)), hold="motors")}
+    return arm, fields
+
+
+def configurations(problem: Problem, target: Any, rng: np.random.Generator) -> Array:
+    """Configurations (n, nq) [rad] that reach a target: every branch, every full turn, members of self-motions."""
+    if isinstance(target, np.ndarray):
+        return target[None]
+    if isinstance(target, AnyOf):
+        target = target.targets[int(rng.integers(len(target.targets)))]
+    if isinstance(target, ConeOrientedPose):
+        R = sample_orientations(target, ORIENTATIONS)
+        target = target.with_orientation(R[int(rng.integers(len(R)))])
+    arm = problem.arm
+    kinematics = required_inverse_kinematics(arm.robot, "goal")
+    try:
+        found = kinematics.solve(target.T, arm.T_flange_tcp, arm.active_limits, members=MEMBERS)
+    except JoulepathError:
+        return np.zeros((0, arm.robot.nq))
+    return np.array([each.q for each in found])
+
+
+def attack(problem: Problem, starts: int, rng: np.random.Generator) -> tuple[float, str]:
+    """The least energy [J] of motions from random starts, and the label of the goal configuration that has it."""
+    prepared, least, label = PreparedProblem.of(problem), np.inf, ""
+    arm, space = problem.arm, bspline.uniform(POINTS)
+    for _ in range(starts):
+        begins, ends = (configurations(problem, getattr(problem, name), rng) for name in ("start", "goal"))
+        if not len(begins) or not len(ends):
+            continue
+        q_start = begins[int(rng.integers(len(begins)))]
+        q_goal = _near(ends, q_start, arm.friction_law.coulomb, rng)
+        points = q_start + np.outer(space.quintic, q_goal - q_start)
+        if rng.random() < 0.7:
+            points[space.free] += perturbation(rng, space, len(q_start))
+        limits = arm.active_limits
+        guess = Guess(space, np.clip(points, limits.q_min, limits.q_max), problem.duration_min or 0.0)
+        direct = replace(problem, start=q_start, goal=q_goal)
+        solver = FreeSpline(replace(prepared, problem=direct), q_start, q_goal, Deadline.after(PATIENCE))
+        spline = solver.improve(guess).spline
+        if spline is None:
+            continue
+        energy = prepared.objective_of(prepared.energy(spline))
+        if energy < least:
+            least, label = energy, label_of(arm.robot, q_goal)
+    return least, label
+
+
+def _near(choices: Array, q: Array, coulomb: Array, rng: np.random.Generator) -> Array:
+    """One of the choices (n, nq), with odds that fall with the friction of the way to it."""
+    order = np.argsort(np.abs(choices - q) @ coulomb)
+    return np.asarray(choices[order[min(int(rng.geometric(ODDS)) - 1, len(order) - 1)]])
+
+
+def main() -> int:
+    """Prints every broken bound, and how near the attack came; returns 1 if one is broken."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--count", type=int, default=60, help="requests (%(default)s)")
+    arguments.add_argument("--starts", type=int, default=20, help="motions for each request (%(default)s)")
+    given = arguments.parse_args()
+    on_one_core()
+    robot = load_robot("ur5e")
+    compile_kernel(robot)
+    rows: list[dict[str, Any]] = []
+    refused, broken = 0, list[str]()
+    for index in range(given.count):
+        kind, problem = request(robot, given.seed, index)
+        try:
+            solution = optimize(problem)
+        except JoulepathError as error:
+            refused += 1
+            print(f"index {index} ({kind}): {type(error).__name__}")
+            continue
+        energy = solution.energy.of(problem.objective)
+        rng = np.random.default_rng([given.seed, index, 1])
+        least, label = attack(problem, given.starts, rng)
+        row = {"index": index, "kind": kind, "energy": energy, "bound": solution.lower_bound, "attack": least}
+        rows.append(row | {"status": solution.status})
+        summary = f"index {index} ({kind}, {solution.status}): {energy:.4f} J, attack {least:.4f} J"
+        print(f"{summary}, bound {solution.lower_bound:.4f} J", flush=True)
+        if min(least, energy) < solution.lower_bound - ROUNDING * abs(energy):
+            broken.append(f"{summary} to {label}, bound {solution.lower_bound:.9f} J")
+            print("BROKEN", broken[-1])
+    excess = [row["energy"] / row["attack"] - 1 for row in rows if np.isfinite(row["attack"]) and row["attack"] > 0]
+    print(f"requests                 {len(rows)} solved, {refused} refused; {given.starts} starts each")
+    print(f"bounds broken            {len(broken)}")
+    print(f"answer above the attack  {Spread.of(excess).times(100).formatted(' %', 2)}")
+    write_json(given.json, {"seed": given.seed, "starts": given.starts, "rows": rows, "broken": broken})
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
