@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag
 
 from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
 from app.schemas.examples.values import BOX, TOOL, at
+from optimizer.problem.scene import DEFAULT_MARGIN
 
 # the library rejects more; repeated here so that the schema shows it
 MOST_OBSTACLES, MOST_VERTICES, MOST_CAPSULES = 64, 256, 16
@@ -74,7 +75,12 @@ class _Obstacle(Request):
         "Name of the obstacle in answers; each name is used once.", None, "table"
     )
     margin: float = described(
-        "Required clearance between the arm and this obstacle.", "m", 0.02, default=0.0, ge=0, le=1
+        "Required clearance between the arm and this obstacle; 0 allows contact.",
+        "m",
+        0.02,
+        default=DEFAULT_MARGIN,
+        ge=0,
+        le=1,
     )
 
 
@@ -126,6 +132,20 @@ CarriedShape = Annotated[
 ]
 
 
+LinkNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=16)]
+
+
+def touched_links(body: str) -> Any:
+    """The field `touches` of a body that is fixed to the flange."""
+    return described(
+        f"Names of the links that the {body} touches by design: their distance from it is not checked. Null: the link "
+        "that carries the flange (`wrist_3`). An empty list: none.",
+        None,
+        ["wrist_3"],
+        default=None,
+    )
+
+
 class CarriedBody(Request):
     """A payload for collision checking, without a mass."""
 
@@ -134,6 +154,7 @@ class CarriedBody(Request):
         None,
         BOX,
     )
+    touches: LinkNames | None = touched_links("payload")
 
 
 Obstacle = Annotated[
@@ -164,6 +185,7 @@ class ToolCapsule(Request):
     start: Vector3 = described("First end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.03])
     end: Vector3 = described("Second end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.12])
     radius: Size = described("Radius.", "m", 0.04)
+    touches: LinkNames | None = touched_links("capsule")
 
 
 class Tool(Request):
