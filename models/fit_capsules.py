@@ -1,12 +1,12 @@
 """Fit capsules to the links: `python -m models.fit_capsules ROBOT MESHES [link …]` prints rows for figures.yaml.
 
-MESHES is a folder as in `models.meshes`. The fit starts from the capsules in figures.yaml and is local: how many capsules
-a link has, and where each of them begins, is the choice of who writes the rows.
+MESHES is a folder as in `models.meshes`. The fit starts from the capsules in figures.yaml and is local: how many
+capsules a link has, and where each of them begins, is the choice of who writes the rows.
 
 It minimises ∫ (OFFSET + d) dV over what is inside of a capsule and outside of the link: d [m] is the distance from the
-link, so that far overhang costs most. What lies inside of an adjacent link at every angle of the joint costs nothing, as
-nothing else can be there. Samples of the surfaces outside of all capsules are penalised. Both are smoothed, more and more
-sharply. Radii then grow until every triangle is held: see `capsule_cover`.
+link, so that far overhang costs most. What lies inside of an adjacent link at every angle of the joint costs nothing,
+as nothing else can be there. Samples of the surfaces outside of all capsules are penalised. Both are smoothed, more
+and more sharply. Radii then grow until every triangle is held: see `capsule_cover`.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class _Solid:
 
 @dataclass(frozen=True)
 class _Task:
-    """What the fit of a link sees: cells (c, 3) [m] outside of it, their weights (c,), and surface points (p, 3) [m]."""
+    """What the fit sees of a link: cells (c, 3) [m] outside, their weights (c,), and points of surfaces (p, 3) [m]."""
 
     cells: Array
     weights: Array
@@ -131,7 +131,7 @@ def _outermost(points: Array, surfaces: list[Array]) -> Array:
 
 
 def _cost(scaled: Array, task: _Task, width: float, penalty: float) -> tuple[float, Array]:
-    """Overhang [cm³ · m, OFFSET included] and penalty, and the gradient in the scaled variables: rows of two ends and a radius."""
+    """Weighed overhang [cm³ · m] and penalty, and the gradient in the scaled variables: two ends and a radius each."""
     rows = (scaled * UNIT).reshape(-1, 7)
     gradient = np.zeros_like(rows)
     depth, pull = _nearest(rows, task.cells)

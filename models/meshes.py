@@ -16,8 +16,8 @@ from models.robot import Array
 # what is shown, in detail, and the coarser surfaces that the maker made for collision checking
 KINDS = ("visual", "collision")
 _QUARTER = np.pi / 2
-# for each link its mesh, and the mesh's position [m] and roll, pitch, yaw [rad] in the link frame: the meshes do not say
-# where they stand. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
+# for each link its mesh, and the mesh's position [m] and roll, pitch, yaw [rad] in the link frame: the meshes do not
+# say where they stand. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
 PLACEMENTS: dict[str, dict[str, tuple[str, list[float], list[float]]]] = {
     "ur5e": {
         "base": ("base", [0, 0, 0], [0, 0, np.pi]),

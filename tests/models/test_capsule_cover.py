@@ -85,7 +85,7 @@ def test_a_gap_below_the_resolution_is_found() -> None:
 
 
 def test_what_is_held_has_no_point_outside() -> None:
-    """Random capsules and triangles: the proof and dense samples agree, and what is not held is outside or on the rim."""
+    """Random capsules and triangles: the proof and dense samples agree; what is not held is outside or on the rim."""
     rng = np.random.default_rng(8)
     held = 0
     for _ in range(200):

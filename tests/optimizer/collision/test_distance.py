@@ -13,8 +13,9 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.collision.coal_distance import _lower_bound, coal_shape
 from optimizer.collision.model import CollisionModel
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Cylinder, Mesh, Obstacle, Scene, Shape
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.scene import Attachment, Cylinder, Mesh, Obstacle, Scene, Shape, Sphere, capsule_between
 from tests.optimizer.cells import LOADS, arm_in_cell
 from tests.optimizer.moves import ROBOT
 
@@ -129,8 +130,36 @@ def test_what_is_compared() -> None:
     assert not any((a, b) in pairs for a, b in pairwise(links)), "neighbours touch"
     assert ("base", "wrist_3") in pairs and ("shoulder", "forearm") in pairs
     assert ("forearm", "wrist_2") not in pairs
-    assert ("wrist_1", "tool") in pairs and ("wrist_2", "tool") not in pairs and ("tool", "payload") not in pairs
+    for part in ("tool", "payload"):
+        assert {a for a, b in pairs if b == part} & set(links) == set(links[:-1]), "all but the link that carries it"
+    assert ("tool", "payload") not in pairs
     assert {b for a, b in pairs if a == "floor"} == {*links[1:], "tool", "payload"}, "the base does not move"
+
+
+@pytest.mark.parametrize("touches", [(), ("wrist_3",), ("wrist_2", "wrist_3"), ("forearm",)])
+def test_what_touches_by_design_is_not_compared(touches: tuple[str, ...]) -> None:
+    """Declared for each body: another capsule of the tool touches the last link, as it does unless told otherwise."""
+    ends = np.zeros(3), np.array([0, 0, 0.1])
+    loaded = Arm(
+        robot=ROBOT,
+        tool=[capsule_between(*ends, 0.03, touches), capsule_between(*ends, 0.02)],
+        payload=Payload(shape=Attachment(Sphere(0.05), touches=touches)),
+    )
+    model = CollisionModel(loaded)
+    links = load_robot("ur5e").link_names
+    first = len(ROBOT.capsules)
+    compared = [{model.names(p)[0] for p in np.flatnonzero(model.pairs[:, 1] == first + k)} for k in range(3)]
+    assert compared == [set(links) - set(touches), set(links[:-1]), set(links) - set(touches)]
+
+
+def test_what_touches_must_be_a_link() -> None:
+    part = capsule_between(np.zeros(3), np.array([0, 0, 0.1]), 0.03, ["wrist_3", "table"])
+    with pytest.raises(InvalidProblem, match="links of the robot") as refused:
+        Arm(robot=ROBOT, tool=[capsule_between(np.zeros(3), np.ones(3), 0.03), part])
+    assert refused.value.field == "tool.capsules.1.touches"
+    with pytest.raises(InvalidProblem) as refused:
+        Arm(robot=ROBOT, payload=Payload(shape=part))
+    assert refused.value.field == "payload.touches"
 
 
 @pytest.mark.parametrize("capsules", [0, 1])
