@@ -43,11 +43,11 @@ def not_held(triangles: Array, capsules: Sequence[LinkCapsule]) -> Array:
         is_done = ~is_held & (has_corner_outside | (edges.max(axis=1) < SMALLEST))
         found.append(pieces[is_done])
         is_open = ~is_held & ~is_done
-        pieces = _cut(pieces[is_open], edges[is_open].argmax(axis=1))
+        pieces = cut(pieces[is_open], edges[is_open].argmax(axis=1))
     return np.concatenate(found)
 
 
-def _cut(triangles: Array, edge: np.ndarray[tuple[int, ...], np.dtype[np.intp]]) -> Array:
+def cut(triangles: Array, edge: np.ndarray[tuple[int, ...], np.dtype[np.intp]]) -> Array:
     """Both halves (2 k, 3, 3) of triangles (k, 3, 3), cut at the middle of edge (k,): 0 joins corners 0 and 1."""
     rows = np.arange(len(triangles))
     a, b, c = (triangles[rows, (edge + k) % 3] for k in range(3))

@@ -82,7 +82,11 @@ def fit(robot: Robot, folder: Path, link: int) -> list[LinkCapsule]:
         z = found.x * UNIT
         missed = checked[outside(checked, _capsules(z, link)).min(axis=0) > -INSIDE]
         task = replace(task, points=np.vstack([task.points, missed[rng.permutation(len(missed))[:1000]]]))
-    return _grown(_rounded(_capsules(z, link), checked), np.concatenate(surfaces))
+    capsules = _capsules(z, link)
+    for _ in range(2):
+        # where one had to grow, another may be larger than it has to be
+        capsules = _grown(_rounded(capsules, checked), np.concatenate(surfaces))
+    return capsules
 
 
 _RANGES = ((-1.0, LEAST_RADIUS), (1.0, GREATEST_RADIUS))
@@ -182,12 +186,15 @@ def _capsules(z: Array, link: int) -> list[LinkCapsule]:
 
 
 def _rounded(capsules: list[LinkCapsule], samples: Array) -> list[LinkCapsule]:
-    """Axes to DIGIT, and each radius in turn as small as the samples (k, 3) [m] that no other capsule holds allow."""
-    result = [replace(c, axis=np.round(c.axis / DIGIT) * DIGIT) for c in capsules]
+    """Axes to DIGIT, and each radius in turn as small as the samples (k, 3) [m] that no other capsule holds allow.
+
+    A sample that no capsule holds belongs to the nearest.
+    """
+    result = [replace(c, axis=np.round(c.axis / DIGIT) * DIGIT + 0.0) for c in capsules]
     for k, capsule in enumerate(result):
-        others = result[:k] + result[k + 1 :]
-        own = samples[(outside(samples, others) > 0).all(axis=0)] if others else samples
-        reach = float(outside(own, [capsule]).max(initial=-capsule.radius)) + capsule.radius
+        distances = outside(samples, result)
+        is_own = (np.delete(distances, k, axis=0) > 0).all(axis=0) & (distances.argmin(axis=0) == k)
+        reach = capsule.radius + float(distances[k, is_own].max(initial=-capsule.radius))
         result[k] = replace(capsule, radius=_up(max(reach, LEAST_RADIUS)))
     return result
 

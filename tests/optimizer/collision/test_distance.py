@@ -170,21 +170,6 @@ def test_nothing_to_compare(capsules: int) -> None:
     assert model.closest_pairs(np.zeros((2, 6))) == []
 
 
-def test_links_that_never_meet() -> None:
-    """Over every angle of the two joints between: a grid of three degrees and how far they move between its points."""
-    robot = replace(load_robot("ur5e"), never_in_collision=frozenset())
-    model = CollisionModel(Arm(robot=robot))
-    angles = np.deg2rad(np.arange(0, 360, 3))
-    for first, second in load_robot("ur5e").never_in_collision - {(0, 2)}:
-        q = np.zeros((len(angles) ** 2, 6))
-        q[:, first], q[:, first + 1] = (x.ravel() for x in np.meshgrid(angles, angles))
-        for p in np.flatnonzero((model.geometry.links[model.pairs] == [first, second]).all(axis=1)):
-            at: Array = np.arange(len(q))
-            distance = model.geometry.witness_points(model.frames(q), at, np.full(len(q), p)).distance
-            moved = (model.levers() * model.joints_between)[p].sum() * np.deg2rad(1.5)
-            assert distance.min() - moved > 0.004
-
-
 def test_a_contact_known_by_hand() -> None:
     """The elbow folded flat: forearm on upper arm."""
     folded, stretched = np.array([[0.0, -1.57, 3.1, 0.0, 0.0, 0.0], [0.0, -1.57, 0.0, -1.57, 0.5, 0.0]])
