@@ -29,7 +29,7 @@ from models.robot import Array, LinkCapsule, Robot
 CELL, REACH = 0.003, 0.08
 OFFSET = 0.002
 # smoothing [m] and weight of the penalty of each stage, and its most iterations
-STAGES = ((0.002, 5e-2, 40), (0.001, 3e-1, 60), (0.001, 3e-1, 60), (0.001, 3e-1, 60))
+STAGES = ((0.004, 1e-2, 40), (0.002, 5e-2, 40), (0.001, 3e-1, 60), (0.001, 3e-1, 60), (0.001, 3e-1, 60))
 # surface samples stay this far inside [m]; what the last stage leaves outside is mended by larger radii
 INSIDE = 3e-4
 # unit of the variables [m]: the first step of the solver is of length 1
@@ -99,7 +99,8 @@ def _weighed(robot: Robot, folder: Path, link: int, rng: np.random.Generator) ->
     cells, distance = solid.corner + (index + 0.5) * CELL, solid.distance[tuple(index.T)]
     placements = [placement.homogeneous for placement in robot.model.jointPlacements]
     is_free = np.ones(len(cells), dtype=bool)
-    for other in {link - 1, link + 1} & set(range(robot.nq + 1)):
+    # not the last link: a tool may reach into its capsule, and is compared with the link before it
+    for other in {link - 1, link + 1} & set(range(robot.nq)):
         neighbour, always = _solid(folder, robot, other), np.ones(len(cells), dtype=bool)
         for angle in np.linspace(0, 2 * np.pi, TURNS, endpoint=False):
             turned = placements[max(link, other)] @ _about_z(angle)
