@@ -28,11 +28,11 @@ ROBOT = load_robot("ur5e")
 PLACEMENTS = joint_placements(ROBOT.model)
 # distances [m] that the links keep, as figures.yaml states them
 BY_HULLS = {(3, 5): 0.005, (4, 6): 0.010}
-BY_SURFACE = {(0, 2): 0.007}
+BY_SURFACE = {(0, 2): 0.005}
 # largest edge of a piece of a surface [m], and between two angles [rad]
 EDGE, STEP = 4e-3, np.deg2rad(0.5)
 # height [m] of the base below which it is widest
-FOOT = 0.082
+FOOT = 0.074
 
 
 def hull(link: int) -> Array:
