@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from models.robot import Array
 from optimizer.collision.clearance_proof import proven_clearance
+from optimizer.collision.close_pass import close_pass
 from optimizer.collision.model import collision_model
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.losses import breakdown, relative_error
@@ -45,6 +46,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
     if problem.cycle is not None:
         dwell = dwell_energy(problem.cycle, arm, replay.final_holding_power, spline.duration)
         energy = energy.with_dwell(dwell)
+    clearance = proven_clearance(collision_model(arm), spline) if arm.collisions else None
     return Certificate(
         worst_ratio=replay.limit_ratios | replay.path_ratios,
         start_error=replay.end_error(single(problem.start), q_start, replay.q[0]),
@@ -57,7 +59,8 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         balance_error=_worst(
             *(relative_error(each.electrical.parts_sum, each.electrical.total) for each in (energy, reported))
         ),
-        clearance=proven_clearance(collision_model(arm), spline) if arm.collisions else None,
+        clearance=clearance,
+        close_pass=close_pass(arm, spline, clearance),
     )
 
 

@@ -64,7 +64,7 @@ def _to_payload(payload: asked.Payload | None) -> Payload:
         return Payload()
     ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6
     inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    shape = None if payload.shape is None else to_attachment(payload.shape)
+    shape = None if payload.shape is None else to_attachment(payload.shape, payload.touches)
     return Payload(payload.mass, np.array(payload.com), inertia, shape)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from app.convert.fields import fields
 from app.convert.motion_csv import FIRST_ROW, MotionCsv
 from app.convert.solution import energy_fields
+from app.convert.warnings import sampled_warnings
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
 from optimizer.exceptions import InvalidProblem
 from optimizer.replay.evaluate import Evaluation
@@ -67,6 +68,7 @@ def to_evaluate_response(request_id: str, robot: str, result: Evaluation) -> dic
         ],
         "collides": None if nearest is None else nearest.distance < 0,
         "nearest": None if nearest is None else fields(nearest, *SampledClearance.model_fields),
+        "warnings": sampled_warnings(result.close_pass),
         "samples": None if samples is None else fields(samples, *Samples.__dataclass_fields__),
     }
 

@@ -36,9 +36,10 @@ def to_ik_response(
 
 def to_collision_arm(request: IKRequest, robot: Robot) -> Arm:
     """The arm with its shapes, for collision checking only. Raises InvalidProblem."""
+    carried = request.payload
     return Arm(
         robot=robot,
         tool=to_tool(request.tool),
-        payload=Payload(shape=None if request.payload is None else to_attachment(request.payload.shape)),
+        payload=Payload(shape=None if carried is None else to_attachment(carried.shape, carried.touches)),
         scene=to_scene(request.scene),
     )

@@ -39,12 +39,12 @@ def to_scene(scene: asked.Scene) -> Scene:
 
 def to_tool(tool: asked.Tool) -> list[Attachment]:
     """The capsules of a tool, in the flange frame."""
-    return [capsule_between(np.array(c.start), np.array(c.end), c.radius) for c in tool.capsules]
+    return [capsule_between(np.array(c.start), np.array(c.end), c.radius, c.touches) for c in tool.capsules]
 
 
-def to_attachment(shape: asked.CarriedShape) -> Attachment:
+def to_attachment(shape: asked.CarriedShape, touches: list[str] | None) -> Attachment:
     """The shape of a payload, fixed to the flange. Raises InvalidProblem."""
-    return _named("payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose)))
+    return _named("payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose), touches))
 
 
 def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.convert.fields import candidate_fields, fields, unreachable_fields
+from app.convert.warnings import certified_warnings
 from app.schemas import request as asked
 from app.schemas.response import Clearance
 from optimizer.solution import Certificate, ElectricalEnergy, Energy, Solution, StorageUse
@@ -34,6 +35,7 @@ def to_optimize_response(request: asked.OptimizeRequest, request_id: str, soluti
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
         "unreachable": [unreachable_fields(target) for target in solution.unreachable],
         "certificate": certificate_fields(solution.certificate),
+        "warnings": certified_warnings(solution.certificate.close_pass),
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
     }
 

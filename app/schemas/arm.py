@@ -10,7 +10,7 @@ from pydantic import Discriminator, Field, Tag
 from app.schemas.common import Request, Vector3, described
 from app.schemas.examples.values import BOX
 from app.schemas.orientation import Cone
-from app.schemas.scene import CarriedShape, CellRequest
+from app.schemas.scene import CarriedShape, CellRequest, LinkNames, touched_links
 
 # with a smaller limit, a motion would exceed the largest duration
 Rate = Annotated[float, Field(ge=1e-2, le=1e6)]
@@ -59,6 +59,7 @@ class Payload(Request):
         BOX,
         default=None,
     )
+    touches: LinkNames | None = touched_links("payload")
 
 
 # with a smaller limit, a motion would exceed the largest duration

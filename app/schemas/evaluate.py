@@ -12,7 +12,7 @@ from app.schemas.common import Answer, JointPositions, Request, Response, descri
 from app.schemas.examples.values import PAPER_HOME as _HOME
 from app.schemas.examples.values import PAPER_POSE as _THERE
 from app.schemas.request import Seconds
-from app.schemas.response import BODIES, MotionEnergy, SampledMotion
+from app.schemas.response import BODIES, WARNINGS, MotionEnergy, SampledMotion
 from optimizer.replay.limit_report import LimitName
 from optimizer.replay.sampler import MOST_SAMPLES
 
@@ -206,4 +206,5 @@ class EvaluateResponse(Answer):
         "Whether a clearance is negative at a sample; null if `collisions` is false.", None, False
     )
     nearest: SampledClearance | None = part("Smallest clearance at sample points; null if `collisions` is false.")
+    warnings: list[str] = described(WARNINGS, None, [])
     samples: SampledMotion | None = part("Samples of the motion; null without `sample_period`.")

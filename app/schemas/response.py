@@ -22,6 +22,10 @@ LOWER_BOUND = (
     "Lower bound of the objective: no motion of any shape and any allowed duration between these targets needs less."
 )
 GAP = "1 - lower_bound / energy of the objective; 0 if this energy is not positive."
+WARNINGS = (
+    "Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2 mm, a remark names "
+    "them, their distance without margins, and the time."
+)
 OBJECTIVE = "Energy that was minimised: electrical energy drawn from the supply, or mechanical work."
 
 
@@ -304,4 +308,5 @@ class OptimizeResponse(Answer):
     )
     unreachable: list[UnreachableTarget] = part("Targets of an `any_of` without candidates, each with the cause.")
     certificate: Certificate = part("Independent check of the motion.")
+    warnings: list[str] = described(WARNINGS, None, [])
     solver: Solver = part("Effort of the computation.")

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag
 from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
 from app.schemas.examples.values import BOX, TOOL, at
 from optimizer.problem.arm import MOST_PARTS
-from optimizer.problem.scene import MOST_OBSTACLES, MOST_VERTICES
+from optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 _POSE_TEXT = "Pose of the shape: of an obstacle in the base frame, of a payload in the flange frame."
@@ -74,7 +74,12 @@ class _Obstacle(Request):
         "Name of the obstacle in answers; each name is used once.", None, "table"
     )
     margin: float = described(
-        "Required clearance between the arm and this obstacle.", "m", 0.02, default=0.0, ge=0, le=1
+        "Required clearance between the arm and this obstacle; 0 allows contact.",
+        "m",
+        0.02,
+        default=DEFAULT_MARGIN,
+        ge=0,
+        le=1,
     )
 
 
@@ -126,6 +131,20 @@ CarriedShape = Annotated[
 ]
 
 
+LinkNames = Annotated[list[Annotated[str, Field(min_length=1, max_length=64)]], Field(max_length=16)]
+
+
+def touched_links(body: str) -> Any:
+    """The field `touches` of a body that is fixed to the flange."""
+    return described(
+        f"Names of the links that the {body} touches by design: their distance from it is not checked. Null: the link "
+        "that carries the flange (`wrist_3`). An empty list: none.",
+        None,
+        ["wrist_3"],
+        default=None,
+    )
+
+
 class CarriedBody(Request):
     """A payload for collision checking, without a mass."""
 
@@ -134,6 +153,7 @@ class CarriedBody(Request):
         None,
         BOX,
     )
+    touches: LinkNames | None = touched_links("payload")
 
 
 Obstacle = Annotated[
@@ -164,6 +184,7 @@ class ToolCapsule(Request):
     start: Vector3 = described("First end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.03])
     end: Vector3 = described("Second end of the axis, [x, y, z] in the flange frame.", "m", [0.0, 0.0, 0.12])
     radius: Size = described("Radius.", "m", 0.04)
+    touches: LinkNames | None = touched_links("capsule")
 
 
 class Tool(Request):

@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Robot
 from optimizer.collision.cores import Core, core_of
 from optimizer.problem.arm import Arm
+from optimizer.problem.scene import Attachment
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 TOOL, PAYLOAD = "tool", "payload"
@@ -19,7 +20,7 @@ TOOL, PAYLOAD = "tool", "payload"
 class Body:
     """A core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
 
-    Other bodies must stay at least `margin` [m] away from it.
+    Other bodies must stay at least `margin` [m] away from it. `touches` are the links that it touches by design.
     """
 
     name: str
@@ -27,6 +28,7 @@ class Body:
     core: Core
     T_link_core: Array
     margin: float = 0.0
+    touches: frozenset[int] = frozenset()
 
     @cached_property
     def points(self) -> Array:
@@ -58,9 +60,18 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
         Body(robot.link_names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
         for capsule in robot.capsules
     ]
-    attached = [Body(TOOL, last, core_of(part.shape), T_last_flange @ part.T_flange_shape) for part in arm.tool]
+    parts = [(TOOL, part) for part in arm.tool]
     if arm.payload.shape is not None:
-        attachment = arm.payload.shape
-        attached.append(Body(PAYLOAD, last, core_of(attachment.shape), T_last_flange @ attachment.T_flange_shape))
+        parts.append((PAYLOAD, arm.payload.shape))
+    attached = [
+        Body(name, last, core_of(p.shape), T_last_flange @ p.T_flange_shape, touches=_touched(p, robot))
+        for name, p in parts
+    ]
     obstacles = [Body(o.name, 0, core_of(o.shape), o.T_base_shape, o.margin) for o in arm.scene.obstacles]
     return (*links, *attached, *obstacles)
+
+
+def _touched(part: Attachment, robot: Robot) -> frozenset[int]:
+    """The links that a tool or payload touches by design: those declared, else the one that carries the flange."""
+    names = robot.link_names
+    return frozenset([robot.nq] if part.touches is None else [names.index(name) for name in part.touches])

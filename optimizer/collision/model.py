@@ -45,8 +45,8 @@ class CollisionModel:
     """The bodies of an arm, and the `pairs` (p, 2) of them that are checked, the body nearer to the base first.
 
     Two links are checked unless they are adjacent or can never be in collision. Tool and payload are checked against
-    all links but the last two, to which they are close. The scene is checked against every moving body. All distances
-    have the margin of the obstacle subtracted.
+    all links but those that they touch by design. The scene is checked against every moving body. All distances have
+    the margin of the obstacle subtracted.
     """
 
     def __init__(self, arm: Arm) -> None:
@@ -154,9 +154,14 @@ def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
     pairs: list[tuple[int, int]] = []
     for k in moving:
         link = bodies[k].link
-        apart = [i for i in links if link - bodies[i].link > 1]
         if k in links:
-            apart = [i for i in apart if (bodies[i].link, link) not in arm.robot.never_in_collision]
+            apart = [
+                i
+                for i in links
+                if link - bodies[i].link > 1 and (bodies[i].link, link) not in arm.robot.never_in_collision
+            ]
+        else:
+            apart = [i for i in links if bodies[i].link not in bodies[k].touches]
         obstacles = range(len(moving), len(bodies)) if link > 0 else ()
         pairs += [(i, k) for i in (*apart, *obstacles)]
     return np.array(pairs, dtype=np.intp).reshape(-1, 2)

@@ -108,6 +108,7 @@ class Arm:
         object.__setattr__(self, "tool", tuple(self.tool))
         if len(self.tool) > MOST_PARTS:
             raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_PARTS} capsules.")
+        self._check_touches()
         self._check_limits()
         for name in ("tcp_speed", "elbow_speed"):
             speed = getattr(self, name)
@@ -165,6 +166,16 @@ class Arm:
         if outside.size:
             j = int(outside[0])
             raise OutsideLimits(target, self.robot.joint_names[j], float(q[j]), float(lower[j]), float(upper[j]))
+
+    def _check_touches(self) -> None:
+        """Raises InvalidProblem if a part of the tool, or the payload, touches a link that the robot does not have."""
+        parts = [(f"tool.capsules.{k}.touches", part) for k, part in enumerate(self.tool)]
+        if self.payload.shape is not None:
+            parts.append(("payload.touches", self.payload.shape))
+        known = self.robot.link_names
+        for name, part in parts:
+            if part.touches is not None and not set(part.touches) <= set(known):
+                raise InvalidProblem(name, f"{name} may name only links of the robot: {', '.join(known)}.")
 
     def _check_limits(self) -> None:
         limits, robot = self.active_limits, self.robot.limits

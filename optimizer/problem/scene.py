@@ -17,6 +17,8 @@ from optimizer.problem.arrays import LARGEST, SMALLEST, frozen, placement
 MOST_OBSTACLES, MOST_VERTICES = 64, 256
 # least ratio of the smallest to the largest extent of a hull: below it, the hull is flat
 FLAT = 1e-6
+# clearance [m] that an obstacle asks for unless told otherwise: what the place of a body in a cell is known to
+DEFAULT_MARGIN = 5e-3
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ class Obstacle:
     name: str
     shape: Shape
     T_base_shape: Array = field(default_factory=lambda: np.eye(4))
-    margin: float = 0.0
+    margin: float = DEFAULT_MARGIN
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -113,15 +115,22 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Attachment:
-    """A shape fixed to the flange at `T_flange_shape` (4, 4): part of a tool, or the payload."""
+    """A shape fixed to the flange at `T_flange_shape` (4, 4): part of a tool, or the payload.
+
+    `touches` names the links that it touches by design: their distance from it is not checked. None stands for the
+    link that carries the flange.
+    """
 
     shape: Shape
     T_flange_shape: Array = field(default_factory=lambda: np.eye(4))
+    touches: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.shape, HalfSpace):
             raise InvalidProblem("shape", "A half-space cannot be carried: use a box.")
         object.__setattr__(self, "T_flange_shape", placement(self.T_flange_shape, "shape"))
+        if self.touches is not None:
+            object.__setattr__(self, "touches", tuple(self.touches))
 
 
 @dataclass(frozen=True)
@@ -138,10 +147,10 @@ class Scene:
             raise InvalidProblem("scene.obstacles", "Two obstacles have the same name: name each differently.")
 
 
-def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
+def capsule_between(first: Array, second: Array, radius: float, touches: Sequence[str] | None = None) -> Attachment:
     """A capsule fixed to the flange, around the segment from `first` to `second` (3,) [m] in the flange frame.
 
-    If the two points coincide, it is a sphere. Raises InvalidProblem.
+    If the two points coincide, it is a sphere. `touches` is that of `Attachment`. Raises InvalidProblem.
     """
     ends = frozen([first, second], (2, 3), "tool.capsules")
     along = ends[1] - ends[0]
@@ -149,13 +158,13 @@ def capsule_between(first: Array, second: Array, radius: float) -> Attachment:
     T = np.eye(4)
     T[:3, 3] = ends.mean(axis=0)
     if length < SMALLEST:
-        return Attachment(Sphere(radius + length / 2), T)
+        return Attachment(Sphere(radius + length / 2), T, touches)
     z = along / length
     # any x axis normal to z
     x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    return Attachment(Capsule(radius, length), T)
+    return Attachment(Capsule(radius, length), T, touches)
 
 
 def _size(name: str, value: float) -> None:

@@ -41,7 +41,8 @@ MOST_SEGMENTS = 10_000
 class Evaluation:
     """Energy and limits of a given motion. `segments` is empty if `segment_count` exceeds MOST_SEGMENTS.
 
-    `speed_jumps` counts the velocity steps inside the motion. `nearest` is None if collisions are not checked.
+    `speed_jumps` counts the velocity steps inside the motion. `nearest` has the margins subtracted; it is None if
+    collisions are not checked. `close_pass` has none subtracted; it is None unless it is below 2 mm.
     """
 
     total: IntervalEnergy
@@ -51,6 +52,7 @@ class Evaluation:
     limits: list[LimitReport]
     samples: Samples | None
     nearest: LeastClearance | None
+    close_pass: LeastClearance | None
 
 
 @one_thread()
@@ -146,6 +148,7 @@ class _Evaluator:
             limits=self._limits.report(),
             samples=None if self._sampler is None else self._sampler.finish(self._last, self._charge),
             nearest=None if self._clearance is None else self._clearance.nearest,
+            close_pass=None if self._clearance is None else self._clearance.close_pass,
         )
 
     def _charge_course(self, nodes: _Nodes) -> Array:

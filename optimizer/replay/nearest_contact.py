@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.model import collision_model
+from optimizer.collision.close_pass import CLOSE, model_without_margins
+from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from optimizer.problem.arm import Arm
 from optimizer.replay.piecewise_motion import PiecewiseMotion
 
@@ -21,7 +23,7 @@ CHECKS = 100_000
 
 @dataclass(frozen=True)
 class LeastClearance:
-    """The least sampled distance [m] less the margin of the obstacle, between the bodies of `pair` at `time` [s].
+    """The least sampled distance [m] between the bodies of `pair`, at `time` [s].
 
     Samples are at most `spacing` [s] apart: between two of them the distance may be smaller.
     """
@@ -33,29 +35,71 @@ class LeastClearance:
 
 
 class ClearanceMonitor:
-    """Updates the least clearance of a motion, block after block. `nearest` is None if no pair is checked."""
+    """Updates the least clearance of a motion, block after block.
+
+    `nearest` has the margins subtracted; None if no pair is checked. `close_pass` is the least distance without
+    margins; None unless it is below CLOSE at a sample.
+    """
 
     def __init__(self, arm: Arm) -> None:
-        self._model = collision_model(arm)
-        self.nearest: LeastClearance | None = None
+        self._arm = arm
+        self._beyond_margins = _LeastSampled(collision_model(arm))
+        self._spacing = 0.0
+
+    @cached_property
+    def _without_margins(self) -> _LeastSampled:
+        return _LeastSampled(model_without_margins(self._arm))
 
     def update(self, motion: PiecewiseMotion) -> None:
         """Add the next block."""
         begin, end = float(motion.breakpoints[0]), float(motion.breakpoints[-1])
         t = np.linspace(begin, end, min(int(np.ceil((end - begin) / PERIOD)), MOST_INTERVALS) + 1)
-        spacing = max((end - begin) / (len(t) - 1), 0.0 if self.nearest is None else self.nearest.spacing)
-        self._add(t, motion.at_times(t)[0], spacing)
-        if self.nearest is not None:
-            self.nearest = replace(self.nearest, spacing=spacing)
+        self._spacing = max((end - begin) / (len(t) - 1), self._spacing)
+        q = motion.at_times(t)[0]
+        if self._beyond_margins.add(t, q) < CLOSE:
+            self._without_margins.add(t, q)
 
-    def _add(self, t: Array, q: Array, spacing: float) -> None:
-        """Check samples q (k, nq) [rad] at times t (k,) [s]."""
+    @property
+    def nearest(self) -> LeastClearance | None:
+        """The least clearance of all blocks."""
+        return self._beyond_margins.least(self._spacing)
+
+    @property
+    def close_pass(self) -> LeastClearance | None:
+        """The least distance of all blocks, if below CLOSE."""
+        if self.nearest is None or self.nearest.distance >= CLOSE:
+            return None
+        least = self._without_margins.least(self._spacing)
+        return least if least is not None and least.distance < CLOSE else None
+
+
+class _LeastSampled:
+    """The least distance of a collision model over samples."""
+
+    def __init__(self, model: CollisionModel) -> None:
+        self._model = model
+        self._closest: ClosestPair | None = None
+        self._time = 0.0
+
+    def least(self, spacing: float) -> LeastClearance | None:
+        """The least distance of all samples, which are at most `spacing` [s] apart; None if no pair is checked."""
+        found = self._closest
+        return None if found is None else LeastClearance(found.distance, found.pair, self._time, spacing)
+
+    def add(self, t: Array, q: Array) -> float:
+        """Check samples q (k, nq) [rad] at times t (k,) [s].
+
+        Returns their least distance [m]: exact if it is the least of all so far, else a lower bound above that.
+        """
         # for bodies farther apart than the least distance known, the distance of their enclosing balls is enough
         coarse = self._model.closest_pairs(q[:: max(len(q) // COARSE, 1)])
         within = min((closest.distance for closest in coarse), default=np.inf)
         at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
+        least = np.inf
         for low in range(0, len(q), at_once):
             for k, closest in enumerate(self._model.closest_pairs(q[low : low + at_once], within), low):
-                if self.nearest is None or closest.distance < self.nearest.distance:
-                    self.nearest = LeastClearance(closest.distance, closest.pair, float(t[k]), spacing)
-            within = within if self.nearest is None else min(within, self.nearest.distance)
+                least = min(least, closest.distance)
+                if self._closest is None or closest.distance < self._closest.distance:
+                    self._closest, self._time = closest, float(t[k])
+            within = within if self._closest is None else min(within, self._closest.distance)
+        return least

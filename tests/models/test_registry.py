@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -187,40 +186,8 @@ def test_another_kind_of_chain_is_refused(sound: str, broken: str, monkeypatch: 
         registry._load_robot.__wrapped__("ur5e")
 
 
-# where each link's mesh stands in the URDF's link frame: position and rpy, which the meshes themselves
-# do not say; from the maker's own description
-MESHES: dict[str, tuple[str, list[float], list[float]]] = {
-    "base": ("base", [0, 0, 0], [0, 0, np.pi]),
-    "shoulder": ("shoulder", [0, 0, 0], [0, 0, np.pi]),
-    "upper_arm": ("upperarm", [0, 0, 0.138], [np.pi / 2, 0, -np.pi / 2]),
-    "forearm": ("forearm", [0, 0, 0.007], [np.pi / 2, 0, -np.pi / 2]),
-    "wrist_1": ("wrist1", [0, 0, -0.127], [np.pi / 2, 0, 0]),
-    "wrist_2": ("wrist2", [0, 0, -0.0997], [0, 0, 0]),
-    "wrist_3": ("wrist3", [0, 0, -0.0989], [np.pi / 2, 0, 0]),
-}
-
-
-@pytest.mark.parametrize("link", MESHES)
-def test_capsules_hold_the_meshes(robot: Robot, link: str) -> None:
-    """Only where the package `airo-models` is installed: it ships the maker's meshes, and is no dependency."""
-    package = pytest.importorskip("airo_models")
-    file, position, rpy = MESHES[link]
-    path = Path(package.__file__).parent / "arms" / "ur5e" / "visual" / f"{file}.obj"
-    lines = path.read_text(encoding="utf-8").splitlines()
-    vertices = np.array([[float(x) for x in line.split()[1:4]] for line in lines if line.startswith("v ")])
-    points = vertices @ pin.rpy.rpyToMatrix(*rpy).T + position
-    outside = []
-    for capsule in robot.capsules:
-        if robot.link_names[capsule.link] == link:
-            start, along = capsule.axis[0], capsule.axis[1] - capsule.axis[0]
-            share = np.clip((points - start) @ along / max(along @ along, 1e-12), 0, 1)
-            outside.append(np.linalg.norm(points - start - share[:, None] * along, axis=1) - capsule.radius)
-    # a tenth of a millimetre: the figures' last digit
-    assert np.min(outside, axis=0).max() < 1e-4
-
-
 def test_every_link_has_capsules(robot: Robot) -> None:
-    assert robot.link_names == tuple(MESHES)
+    assert robot.link_names == ("base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
     assert {capsule.link for capsule in robot.capsules} == set(range(7))
     assert all(0.02 < capsule.radius < 0.1 and not capsule.axis.flags.writeable for capsule in robot.capsules)
     assert all(first + 1 < second for first, second in robot.never_in_collision)

@@ -59,7 +59,7 @@ def test_a_motion_that_passes_closely_needs_its_proof() -> None:
     assert near.worst_violation(MOTION) is None
     (post,) = near.arm.scene.obstacles
     # the proof ends when its bound is at most GAP below the least sample: here that leaves it below zero
-    margin = proof.sampled - GAP / 4
+    margin = post.margin + proof.sampled - GAP / 4
     closer = Surroundings(replace(near.arm, scene=Scene([replace(post, margin=margin)])))
     assert closer.is_collision_free(sample(MOTION, np.linspace(0, 1, 500))[0])
     found = closer.worst_violation(MOTION)

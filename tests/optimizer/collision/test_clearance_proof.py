@@ -79,7 +79,7 @@ def test_turning_above_a_floor_costs_little_though_nothing_changes() -> None:
     spline = Spline(5, np.array([0.0] * 6 + [2.5] * 6), np.array([q_start] * 3 + [q_goal] * 3))
     hand = replace(load_robot("ur5e"), capsules=load_robot("ur5e").capsules[-1:])
     height = CollisionModel(Arm(robot=hand)).frames(q_start[None])[0, 6]
-    floor = Obstacle("floor", HalfSpace(), at([0, 0, height[2, 3] - 0.2]))
+    floor = Obstacle("floor", HalfSpace(), at([0, 0, height[2, 3] - 0.2]), margin=0.0)
     model = CollisionModel(Arm(robot=hand, scene=Scene([floor])))
     proof = proven_clearance(model, spline)
     assert proof is not None

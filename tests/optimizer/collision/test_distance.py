@@ -13,8 +13,9 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.collision.coal_distance import _lower_bound, coal_shape
 from optimizer.collision.model import CollisionModel
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import Cylinder, Mesh, Obstacle, Scene, Shape
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.scene import Attachment, Cylinder, Mesh, Obstacle, Scene, Shape, Sphere, capsule_between
 from tests.optimizer.cells import LOADS, arm_in_cell
 from tests.optimizer.moves import ROBOT
 
@@ -129,8 +130,36 @@ def test_what_is_compared() -> None:
     assert not any((a, b) in pairs for a, b in pairwise(links)), "neighbours touch"
     assert ("base", "wrist_3") in pairs and ("shoulder", "forearm") in pairs
     assert ("forearm", "wrist_2") not in pairs
-    assert ("wrist_1", "tool") in pairs and ("wrist_2", "tool") not in pairs and ("tool", "payload") not in pairs
+    for part in ("tool", "payload"):
+        assert {a for a, b in pairs if b == part} & set(links) == set(links[:-1]), "all but the link that carries it"
+    assert ("tool", "payload") not in pairs
     assert {b for a, b in pairs if a == "floor"} == {*links[1:], "tool", "payload"}, "the base does not move"
+
+
+@pytest.mark.parametrize("touches", [(), ("wrist_3",), ("wrist_2", "wrist_3"), ("forearm",)])
+def test_what_touches_by_design_is_not_compared(touches: tuple[str, ...]) -> None:
+    """Declared for each body: another capsule of the tool touches the last link, as it does unless told otherwise."""
+    ends = np.zeros(3), np.array([0, 0, 0.1])
+    loaded = Arm(
+        robot=ROBOT,
+        tool=[capsule_between(*ends, 0.03, touches), capsule_between(*ends, 0.02)],
+        payload=Payload(shape=Attachment(Sphere(0.05), touches=touches)),
+    )
+    model = CollisionModel(loaded)
+    links = load_robot("ur5e").link_names
+    first = len(ROBOT.capsules)
+    compared = [{model.names(p)[0] for p in np.flatnonzero(model.pairs[:, 1] == first + k)} for k in range(3)]
+    assert compared == [set(links) - set(touches), set(links[:-1]), set(links) - set(touches)]
+
+
+def test_what_touches_must_be_a_link() -> None:
+    part = capsule_between(np.zeros(3), np.array([0, 0, 0.1]), 0.03, ["wrist_3", "table"])
+    with pytest.raises(InvalidProblem, match="links of the robot") as refused:
+        Arm(robot=ROBOT, tool=[capsule_between(np.zeros(3), np.ones(3), 0.03), part])
+    assert refused.value.field == "tool.capsules.1.touches"
+    with pytest.raises(InvalidProblem) as refused:
+        Arm(robot=ROBOT, payload=Payload(shape=part))
+    assert refused.value.field == "payload.touches"
 
 
 @pytest.mark.parametrize("capsules", [0, 1])
@@ -139,21 +168,6 @@ def test_nothing_to_compare(capsules: int) -> None:
     model = CollisionModel(Arm(robot=robot))
     assert model.signed_distances(np.zeros((3, 6)))[0].shape == (3, 0)
     assert model.closest_pairs(np.zeros((2, 6))) == []
-
-
-def test_links_that_never_meet() -> None:
-    """Over every angle of the two joints between: a grid of three degrees and how far they move between its points."""
-    robot = replace(load_robot("ur5e"), never_in_collision=frozenset())
-    model = CollisionModel(Arm(robot=robot))
-    angles = np.deg2rad(np.arange(0, 360, 3))
-    for first, second in load_robot("ur5e").never_in_collision - {(0, 2)}:
-        q = np.zeros((len(angles) ** 2, 6))
-        q[:, first], q[:, first + 1] = (x.ravel() for x in np.meshgrid(angles, angles))
-        for p in np.flatnonzero((model.geometry.links[model.pairs] == [first, second]).all(axis=1)):
-            at: Array = np.arange(len(q))
-            distance = model.geometry.witness_points(model.frames(q), at, np.full(len(q), p)).distance
-            moved = (model.levers() * model.joints_between)[p].sum() * np.deg2rad(1.5)
-            assert distance.min() - moved > 0.004
 
 
 def test_a_contact_known_by_hand() -> None:

@@ -81,9 +81,14 @@ def test_scenes() -> None:
 
 
 @pytest.mark.parametrize("margin", [-0.1, NAN, 2.0])
-def test_margins(margin: float) -> None:
+def test_margins_out_of_range(margin: float) -> None:
     with pytest.raises(InvalidProblem, match="margin"):
         Obstacle("post", Sphere(0.1), margin=margin)
+
+
+def test_an_obstacle_asks_for_five_millimetres_unless_told_otherwise() -> None:
+    assert Obstacle("post", Sphere(0.1)).margin == 0.005
+    assert Obstacle("post", Sphere(0.1), margin=0.0).margin == 0.0
 
 
 @pytest.mark.parametrize("T", [np.eye(3), 2 * np.eye(4), np.diag([1.0, 1, -1, 1]), np.full((4, 4), NAN)])

@@ -1,0 +1,33 @@
+"""What an answer warns of, in words."""
+
+from __future__ import annotations
+
+from optimizer.collision.close_pass import CLOSE
+from optimizer.replay.nearest_contact import LeastClearance
+from optimizer.solution import Clearance
+
+ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
+
+
+def certified_warnings(close_pass: Clearance | None) -> list[str]:
+    """The warnings of a certified motion."""
+    if close_pass is None:
+        return []
+    proven = f"proven: at least {_mm(max(close_pass.min_clearance, 0.0))} mm"
+    return [_close(close_pass.pair, close_pass.sampled, close_pass.time, f" ({proven})")]
+
+
+def sampled_warnings(close_pass: LeastClearance | None) -> list[str]:
+    """The warnings of a motion whose distances were sampled."""
+    return [] if close_pass is None else [_close(close_pass.pair, close_pass.distance, close_pass.time, "")]
+
+
+def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> str:
+    first, second = pair
+    # the proven distance may be below CLOSE, and the sampled one a little above it
+    how = f"{_mm(distance)} mm apart" if distance > 0 else f"overlapping by {_mm(-distance)} mm"
+    return f"Closer than {CLOSE * 1e3:g} mm: {first} and {second} are {how} at {time:.3f} s{proven}. {ADVICE}"
+
+
+def _mm(distance: float) -> str:
+    return f"{distance * 1e3:.2f}"

@@ -1,0 +1,116 @@
+"""What capsules hold: the proof over whole triangles against points of surfaces, and the UR5e against its meshes."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from models.capsule_cover import SMALLEST, not_held, outside
+from models.meshes import KINDS, PLACEMENTS, link_surfaces, sampled
+from models.registry import load_robot
+from models.robot import Array, LinkCapsule
+
+# m; double precision of sums of a few squares of lengths below 1 m
+ROUNDING = 1e-12
+ROBOT = load_robot("ur5e")
+
+
+def meshes() -> Path:
+    """The folder of the UR5e's meshes in the package that ships them, which need not be imported."""
+    package = find_spec("airo_models")
+    assert package is not None and package.origin is not None, "a development dependency: `make test` installs it"
+    return Path(package.origin).parent / "arms" / "ur5e"
+
+
+def capsule(begin: list[float], end: list[float], radius: float) -> LinkCapsule:
+    return LinkCapsule(1, np.array([begin, end]), radius)
+
+
+def triangles(*corners: list[list[float]]) -> Array:
+    return np.array(corners, dtype=float)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("link", ROBOT.link_names)
+def test_capsules_hold_every_surface(link: str, kind: str) -> None:
+    """Every triangle of the maker's meshes, wherever it is: no point is sampled."""
+    capsules = [each for each in ROBOT.capsules if ROBOT.link_names[each.link] == link]
+    surface = link_surfaces(meshes(), "ur5e", link)[kind]
+    assert len(surface) > 100
+    assert not len(not_held(surface, capsules))
+    # the same by points of the surfaces, and the test would see a radius that is 2 mm too small
+    points = sampled(surface, 20_000, np.random.default_rng(3))
+    assert outside(points, capsules).min(axis=0).max() <= ROUNDING
+
+
+@pytest.mark.parametrize("number", range(len(ROBOT.capsules)))
+def test_no_capsule_is_idle(number: int) -> None:
+    """Each holds some of a surface alone: 2 mm less of any radius, and a surface is outside."""
+    own = ROBOT.capsules[number]
+    others = [each for each in ROBOT.capsules if each.link == own.link and each is not own]
+    smaller = LinkCapsule(own.link, own.axis, own.radius - 2e-3)
+    surfaces = link_surfaces(meshes(), "ur5e", ROBOT.link_names[own.link])
+    assert any(len(not_held(surface, [smaller, *others])) for surface in surfaces.values())
+
+
+def test_every_link_has_meshes() -> None:
+    assert tuple(PLACEMENTS["ur5e"]) == ROBOT.link_names
+
+
+def test_a_triangle_between_two_capsules_is_not_held() -> None:
+    """All corners are inside; the middle of the long edges is not."""
+    ends = [capsule([0, 0, 0], [0, 0, 0], 0.1), capsule([1, 0, 0], [1, 0, 0], 0.1)]
+    bridge = triangles([[0, 0, 0], [1, 0, 0], [0, 0.01, 0]])
+    assert (outside(bridge.reshape(-1, 3), ends).min(axis=0) < 0).all()
+    assert len(not_held(bridge, ends))
+    assert not len(not_held(bridge, [*ends, capsule([0, 0, 0], [1, 0, 0], 0.02)]))
+
+
+def test_a_triangle_over_several_capsules_is_held() -> None:
+    """No capsule holds it alone."""
+    row = [capsule([x, 0, 0], [x, 0.2, 0], 0.1) for x in (0.0, 0.15, 0.3)]
+    across = triangles([[0, 0, 0], [0.3, 0, 0], [0.15, 0.2, 0.02]])
+    assert all(len(not_held(across, [each])) for each in row)
+    assert not len(not_held(across, row))
+    assert len(not_held(across, [row[0], row[2]]))
+
+
+def test_a_gap_below_the_resolution_is_found() -> None:
+    """Two balls that miss each other by less than SMALLEST: a piece over the gap is never held."""
+    balls = [capsule([s * (0.1 + SMALLEST / 4), 0, 0], [s * (0.1 + SMALLEST / 4), 0, 0], 0.1) for s in (-1, 1)]
+    assert len(not_held(triangles([[-0.05, 0, 0], [0.05, 0, 0], [0.05, 1e-9, 0]]), balls))
+
+
+def test_what_is_held_has_no_point_outside() -> None:
+    """Random capsules and triangles: the proof and dense samples agree; what is not held is outside or on the rim."""
+    rng = np.random.default_rng(8)
+    held = 0
+    for _ in range(200):
+        capsules = [capsule(*rng.uniform(-0.1, 0.1, (2, 3)).tolist(), 0.08) for _ in range(3)]
+        triangle = rng.uniform(-0.12, 0.12, (1, 3, 3))
+        missed = not_held(triangle, capsules)
+        if len(missed):
+            assert outside(missed.reshape(-1, 3), capsules).min(axis=0).max() > -SMALLEST
+        else:
+            held += 1
+            assert outside(sampled(triangle, 3000, rng), capsules).min(axis=0).max() <= ROUNDING
+    assert 20 < held < 180
+
+
+def test_distances_are_those_of_a_capsule() -> None:
+    tube = capsule([0, 0, 0], [0, 0, 1], 0.25)
+    points = np.array([[0.5, 0, 0.5], [0, 0, 1.5], [0, 0.1, 0.2], [0, 0.3, -0.4]])
+    assert outside(points, [tube])[0] == pytest.approx([0.25, 0.25, -0.15, 0.25])
+
+
+def test_samples_are_uniform_over_the_area() -> None:
+    """Three quarters of the area, three quarters of the points; and the centroid is their mean."""
+    surface = triangles([[0, 0, 0], [3, 0, 0], [0, 1, 0]], [[5, 0, 0], [6, 0, 0], [5, 1, 0]])
+    points = sampled(surface, 40_000, np.random.default_rng(1))
+    left = points[:, 0] < 4
+    # four standard deviations of a share of 40,000 points
+    assert left.mean() == pytest.approx(0.75, abs=0.009)
+    assert points[left].mean(axis=0) == pytest.approx([1, 1 / 3, 0], abs=0.02)

@@ -1,0 +1,118 @@
+"""Pairs of links that are not compared because they never meet: proven over every angle of the joints between.
+
+Forearm and wrist 2, wrist 1 and wrist 3: for the convex hulls of both of the maker's meshes, which hold the links. The
+distance of two hulls changes by no more than Σ lever_j |Δq_j|, where lever_j is the largest distance of a point of the
+second hull from the axis of joint j, at any angle. A cell of angles is proven by the distance in its middle, or cut.
+
+Base and upper arm: for the surface of the upper arm as the visual mesh has it, which is not convex, and a cylinder that
+holds the base. The collision mesh of the upper arm, its convex hull, fills the hollow in which the base stands.
+"""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from models.capsule_cover import cut
+from models.meshes import link_surfaces
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.collision.coal_distance import coal_shape
+from optimizer.collision.cores import Core
+from optimizer.kinematics.forward import joint_placements, link_frames
+from tests.models.test_capsule_cover import meshes
+
+ROBOT = load_robot("ur5e")
+PLACEMENTS = joint_placements(ROBOT.model)
+# distances [m] that the links keep, as figures.yaml states them
+BY_HULLS = {(3, 5): 0.005, (4, 6): 0.010}
+BY_SURFACE = {(0, 2): 0.005}
+# largest edge of a piece of a surface [m], and between two angles [rad]
+EDGE, STEP = 4e-3, np.deg2rad(0.5)
+# height [m] of the base below which it is widest
+FOOT = 0.074
+
+
+def hull(link: int) -> Array:
+    """Vertices (k, 3) [m] of the convex hull of both meshes of a link."""
+    surfaces = link_surfaces(meshes(), "ur5e", ROBOT.link_names[link]).values()
+    points = np.concatenate([surface.reshape(-1, 3) for surface in surfaces])
+    return np.asarray(points[ConvexHull(points).vertices])
+
+
+def distances(first: int, second: int, angles: Array) -> Array:
+    """Distances (k,) [m] of the hulls of two links at angles (k, 2) [rad] of the two joints between them."""
+    q = np.zeros((len(angles), ROBOT.nq))
+    q[:, first:second] = angles
+    frames = link_frames(PLACEMENTS, q)
+    shapes = [coal_shape(Core(hull(link)))[0] for link in (first, second)]
+    request, result = coal.DistanceRequest(True, True), []
+    for k in range(len(angles)):
+        poses = [
+            coal.Transform3s(np.ascontiguousarray(T[:3, :3]), np.ascontiguousarray(T[:3, 3]))
+            for T in frames[k, [first, second]]
+        ]
+        found = coal.DistanceResult()
+        result.append(coal.distance(shapes[0], poses[0], shapes[1], poses[1], request, found))
+    return np.array(result)
+
+
+def levers(second: int) -> tuple[float, float]:
+    """Bounds [m] on how far the second hull reaches from the axes of the last two joints that move it."""
+    points, T = hull(second), PLACEMENTS[second - 1]
+    own = float(np.linalg.norm(points[:, :2], axis=1).max())
+    # at any angle of the last joint, a point stays on a circle about its axis
+    centre = np.outer(points[:, 2], T[:3, 2]) + T[:3, 3]
+    radius = np.linalg.norm(points[:, :2], axis=1)
+    return float((np.linalg.norm(centre[:, :2], axis=1) + radius).max()), own
+
+
+@pytest.mark.parametrize("pair", sorted(BY_HULLS))
+def test_hulls_that_never_meet(pair: tuple[int, int]) -> None:
+    first, second = pair
+    reach = sum(levers(second))
+    half = np.pi / 24
+    grid = np.arange(-np.pi + half, np.pi, 2 * half)
+    cells = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    while len(cells):
+        found = distances(first, second, cells)
+        assert found.min() > BY_HULLS[pair]
+        cells = cells[found - reach * half < BY_HULLS[pair]]
+        half /= 2
+        cells = (cells[:, None] + half * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(-1, 2)
+
+
+def test_base_and_upper_arm_never_meet() -> None:
+    """The pan joint turns about the axis of the cylinder: only the lift joint changes the distance."""
+    base = link_surfaces(meshes(), "ur5e", "base")["visual"]
+    # the base has a foot and a neck
+    cylinders = [
+        (np.linalg.norm(part[..., :2], axis=-1).max(), base[..., 2].min(), part[..., 2].max())
+        for part in (base[base[..., 2].max(axis=1) <= FOOT], base[base[..., 2].max(axis=1) > FOOT])
+    ]
+    pieces = link_surfaces(meshes(), "ur5e", "upper_arm")["visual"]
+    small = []
+    while len(pieces):
+        edges = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)
+        small.append(pieces[edges.max(axis=1) <= EDGE])
+        is_long = edges.max(axis=1) > EDGE
+        pieces = cut(pieces[is_long], edges[is_long].argmax(axis=1))
+    points = np.unique(np.round(np.concatenate(small).reshape(-1, 3), 3), axis=0)
+    # no point of the surface is farther from a corner of its piece than this, nor a corner from where it is rounded to
+    spacing = EDGE / np.sqrt(3) + np.sqrt(3) / 2 * 1e-3
+    moved = float(np.linalg.norm(points[:, :2], axis=1).max()) * STEP / 2
+    angles = np.arange(-np.pi, np.pi, STEP)
+    q = np.zeros((len(angles), ROBOT.nq))
+    q[:, 1] = angles
+    for T in link_frames(PLACEMENTS, q)[:, 2]:
+        x = points @ T[:3, :3].T + T[:3, 3]
+        for radius, low, high in cylinders:
+            away = np.maximum(np.linalg.norm(x[:, :2], axis=1) - radius, 0)
+            beyond = np.maximum(np.maximum(x[:, 2] - high, low - x[:, 2]), 0)
+            assert np.hypot(away, beyond).min() - spacing - moved > BY_SURFACE[0, 2]
+
+
+def test_all_pairs_that_are_left_out_are_proven() -> None:
+    assert ROBOT.never_in_collision == set(BY_HULLS) | set(BY_SURFACE)
