@@ -74,7 +74,8 @@ def fit(robot: Robot, folder: Path, link: int) -> list[LinkCapsule]:
     checked = _outermost(np.vstack([sampled(each, CHECKED_SAMPLES, rng) for each in surfaces]), surfaces)
     task = replace(_weighed(robot, folder, link, rng), points=checked[rng.choice(len(checked), SURFACE_SAMPLES)])
     z = np.array([[*c.axis.ravel(), c.radius] for c in robot.capsules if c.link == link]).ravel()
-    bounds = Bounds(*(np.tile([*[far] * 6, radius], len(z) // 7) / UNIT for far, radius in _RANGES))
+    lower, upper = (np.tile([*[far] * 6, radius], len(z) // 7) / UNIT for far, radius in _RANGES)
+    bounds = Bounds(lower, upper)
     for width, penalty, most in STAGES:
         found = minimize(
             _cost, z / UNIT, (task, width, penalty), "L-BFGS-B", jac=True, bounds=bounds, options={"maxiter": most}
@@ -132,7 +133,7 @@ def _outermost(points: Array, surfaces: list[Array]) -> Array:
     is_wall = np.zeros(index.max(axis=0) + 5, dtype=bool)
     is_wall[tuple(index.T)] = True
     parts = label(~is_wall)[0]
-    return points[binary_dilation(parts == parts[0, 0, 0])[tuple(index.T)]]
+    return np.asarray(points[binary_dilation(parts == parts[0, 0, 0])[tuple(index.T)]])
 
 
 def _cost(scaled: Array, task: _Task, width: float, penalty: float) -> tuple[float, Array]:

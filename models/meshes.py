@@ -60,4 +60,4 @@ def _triangles(path: Path) -> Array:
             # numbered from 1; of `vertex/texture/normal` only the first counts
             corners = [int(corner.split("/")[0]) - 1 for corner in rest]
             faces += [[corners[0], *corners[k : k + 2]] for k in range(1, len(corners) - 1)]
-    return np.array(vertices)[np.array(faces)]
+    return np.asarray(np.array(vertices)[np.array(faces)])

@@ -131,9 +131,9 @@ class Robot:
     adds them. `friction_laws` are named; the first one is the default. `figures` is what `GET /robots/{name}` shows:
     every figure with its unit, source and trust letter.
 
-    Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of links that cannot touch at any joint
-    positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be limited; None for an
-    arm without one.
+    Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of links that cannot
+    touch at any joint positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be
+    limited; None for an arm without one.
     """
 
     name: str

@@ -69,7 +69,8 @@ class RobotDetail(RobotSummary):
     limits: Parameters = part("Limits and rated payload.")
     collision: Parameters = part(
         "Capsules that hold each link, the mesh sets that they hold (`meshes`), the link that carries the elbow, and "
-        "pairs of links that are never in collision. A capsule is [x1, y1, z1, x2, y2, z2, radius]: both ends of its axis in the link frame."
+        "pairs of links that are never in collision. A capsule is [x1, y1, z1, x2, y2, z2, radius]: both ends of its "
+        "axis in the link frame."
     )
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part("Power that the electronics draw, and what the supply takes back.")
