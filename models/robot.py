@@ -197,7 +197,10 @@ class Robot:
 
 
 def link_names(model: pin.Model) -> tuple[str, ...]:
-    """Names of the links of a chain from the base to the last one that moves, njoints of them."""
+    """Names of the links of a chain from the base to the last one that moves, njoints of them.
+
+    A link that the model has no frame of goes by the name of the joint that carries it.
+    """
     # a link that a fixed joint carries, as the flange is, comes after the one that the moving joint carries
     first = {frame.parentJoint: frame.name for frame in reversed(model.frames) if frame.type == pin.BODY}
-    return tuple(first[joint] for joint in range(model.njoints))
+    return tuple(first.get(joint, model.names[joint]) for joint in range(model.njoints))

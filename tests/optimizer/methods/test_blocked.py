@@ -31,8 +31,10 @@ def placed(x: float, y: float, z: float, yaw: float = 0.0) -> Array:
 
 # on the straight line in joint space; a method that avoids obstacles passes it
 POST = Obstacle("post", Sphere(0.06), placed(-0.45, 0.35, 0.5))
-# a wall that leads outwards from the base, between start and goal
-WALL = Obstacle("wall", Box(np.array([1.2, 0.02, 2.4])), placed(-0.8 * 0.8, 0.6 * 0.8, 0.0, np.arctan2(0.6, -0.8)))
+# a wall that leads outwards from the base, between start and goal, and beside the upper arm at the goal
+WALL = Obstacle(
+    "wall", Box(np.array([1.2, 0.02, 2.4])), placed(-0.8 * 0.8, 0.6 * 0.8, 0.0, np.arctan2(0.6, -0.8)), margin=0.0
+)
 
 
 def blocked(method: str, obstacle: Obstacle) -> Problem:
