@@ -88,7 +88,7 @@ def test_requests_that_once_failed(seed: int, index: int) -> None:
 
 @pytest.mark.parametrize(
     ("jerk", "duration", "displacement"),
-    [(200.0, 100.0, 0.9), (0.01, 600.0, 6.0)],
+    [(200.0, 100.0, 0.9), pytest.param(0.01, 600.0, 6.0, marks=pytest.mark.long)],
     ids=["a hundred seconds for one radian", "next to no jerk, all of ten minutes"],
 )
 def test_very_slow_motions(jerk: float, duration: float, displacement: float) -> None:

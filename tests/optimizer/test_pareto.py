@@ -56,7 +56,11 @@ def objective(asked: Problem, answer: Solution) -> float:
     return answer.energy.of(asked.objective)
 
 
-@pytest.fixture(scope="module", params=[joints, straight_line, jumping, mechanical], ids=lambda make: make.__name__)
+@pytest.fixture(
+    scope="module",
+    params=[joints, straight_line, jumping, pytest.param(mechanical, marks=pytest.mark.long)],
+    ids=lambda make: make.__name__,
+)
 def asked_and_found(request: pytest.FixtureRequest) -> tuple[Problem, Front]:
     asked = request.param()
     return asked, pareto(asked, POINTS, still)

@@ -12,6 +12,7 @@ import pytest
 from tests.app.live import ROOT, serving
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
 def test_the_loop_ends_below_its_threshold() -> None:
     with serving(workers=2) as server:

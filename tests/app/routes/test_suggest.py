@@ -183,6 +183,7 @@ def test_a_motion_without_two_ends_gets_none(client: TestClient, configurations:
     assert content["suggestions"] == content["not_computed"] == []
 
 
+@pytest.mark.long
 def test_a_long_trajectory_is_taken(client: TestClient) -> None:
     t = np.linspace(0.0, 3.0, 2000)
     q = np.array(HOME) + np.multiply.outer(0.5 - 0.5 * np.cos(np.pi * t / 3.0), np.subtract(NEAR, HOME))

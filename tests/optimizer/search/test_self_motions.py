@@ -70,7 +70,7 @@ def test_the_answer_is_the_best_of_the_curve() -> None:
     assert answer.status == "feasible"
     for motion in curves(STRETCHED):
         lower, upper = motion.arcs[0]
-        for member in motion.at(np.linspace(lower, upper, 7)):
+        for member in motion.at(np.linspace(lower, upper, 4)):
             try:
                 other = solved(START, member)
             except JoulepathError:
