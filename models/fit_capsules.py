@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 from scipy.ndimage import binary_dilation, distance_transform_edt, label
 from scipy.optimize import Bounds, minimize
 
@@ -221,10 +222,7 @@ def _up(radius: float) -> float:
 
 
 def _about_z(angle: float) -> Array:
-    T = np.eye(4)
-    c, s = np.cos(angle), np.sin(angle)
-    T[:2, :2] = [[c, -s], [s, c]]
-    return T
+    return np.asarray(pin.SE3(pin.utils.rotate("z", angle), np.zeros(3)).homogeneous)
 
 
 def main() -> None:

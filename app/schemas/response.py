@@ -9,6 +9,7 @@ from pydantic import Field
 
 from app.schemas.common import Answer, Response, described, part
 from app.schemas.examples.values import HOME, LABEL, STANDING_STILL
+from optimizer.collision.close_pass import CLOSE
 from optimizer.problem.problem import MethodName
 from optimizer.solution import Objective
 
@@ -23,8 +24,8 @@ LOWER_BOUND = (
 )
 GAP = "1 - lower_bound / energy of the objective; 0 if this energy is not positive."
 WARNINGS = (
-    "Remarks on the motion, in words; empty if there are none. If two bodies come closer than 2 mm, a remark names "
-    "them, their distance without margins, and the time."
+    "Remarks on the motion, in words; empty if there are none. If two bodies come closer than "
+    f"{CLOSE * 1e3:g} mm, one names them, their distance without margins, and the time."
 )
 OBJECTIVE = "Energy that was minimised: electrical energy drawn from the supply, or mechanical work."
 

@@ -1,4 +1,4 @@
-"""Where a motion passes an obstacle, or the arm itself, closer than its real path may deviate: no margin subtracted.
+"""The least distance of a motion without margins, if it is so small that the real arm could touch.
 
 A pair whose obstacle has a margin of CLOSE or more stays as far apart as that margin, as long as the margin is kept.
 Only the other pairs have to be compared a second time, and only if the clearance beyond the margins is below CLOSE.

@@ -25,12 +25,7 @@ class SelfMotion(Protocol):
 
     @property
     def label(self) -> Label:
-        """The branch; its `singular` parts mean nothing."""
-        ...
-
-    @property
-    def singular(self) -> tuple[str, ...]:
-        """The parts of the branch that are singular."""
+        """The branch; the part that is singular has no meaning."""
         ...
 
     @property
@@ -69,7 +64,7 @@ def is_point(motion: SelfMotion) -> bool:
 def spread(motion: SelfMotion, count: int) -> Array:
     """At least `count` parameters, evenly spread over the arcs, both ends of each arc among them.
 
-    An arc that is no longer than rounding makes it has one.
+    Of an arc shorter than POINT there is one parameter, its middle.
     """
     length = sum(upper - lower for lower, upper in motion.arcs)
     found = []
@@ -102,7 +97,6 @@ class StretchedWrist:
     turn: float
     side: float
 
-    singular = ("wrist",)
     free = (1, 2, 3, 5)
 
     @property

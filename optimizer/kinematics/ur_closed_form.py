@@ -30,6 +30,8 @@ STRETCHED = 5e-10
 # distance [m] from an edge of the reach within which the two branches that meet there count as one: a pose on the edge,
 # rounded to double precision, lies that near
 EDGE = 1e-13
+# angle [rad] by which a pose rounded to double precision leaves the sum of the inner angles open, times the wrist's sine
+HEADING = 1e-14
 # a part of the label is singular where its sine, or the shoulder's distance [m], is below this: nearer to it, a pose
 # that is rounded to double precision no longer determines the joints to 1e-9 rad
 SINGULAR = 1e-6
@@ -97,14 +99,16 @@ class URClosedForm:
 
     def label(self, q: Array) -> Label:
         """The branch of a configuration, shape (6,); on a singularity, one of those that meet there."""
-        ahead = self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
-        return self._label(ahead, sin(q[2]), sin(q[4]))
+        return self._label(self._ahead(q), sin(q[2]), sin(q[4]))
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """The parts of the label that are singular at a configuration (6,): within SINGULAR of changing."""
-        ahead = self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
-        sizes = {"shoulder": ahead, "elbow": sin(q[2]), "wrist": sin(q[4])}
+        sizes = {"shoulder": self._ahead(q), "elbow": sin(q[2]), "wrist": sin(q[4])}
         return tuple(part for part, size in sizes.items() if abs(size) < SINGULAR)
+
+    def _ahead(self, q: Array) -> float:
+        """Distance [m] of the last axis' origin ahead of the first axis at a configuration (6,)."""
+        return self.a2 * cos(q[1]) + self.a3 * cos(q[1] + q[2]) + self.d5 * sin(q[1] + q[2] + q[3])
 
     def _label(self, ahead: float, sin_elbow: float, sin_wrist: float) -> Label:
         """From the origin of the last axis ahead of the first axis [m], and sines of the third and fifth angle."""
@@ -161,10 +165,35 @@ class URClosedForm:
             c6, s6 = cos(q6), sin(q6)
             along = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             above = -(s6 * r31 + c6 * r32)
-            x = ahead - self.d5 * along
-            z = pz - self.d6 * r33 - self.d1 - self.d5 * above
-            found.append((q5, q6, sin_q5, x, z, atan2(along, -above)))
+            height = pz - self.d6 * r33 - self.d1
+            turn, x, z = self._turned_into_reach(ahead, height, along, above, HEADING / sine)
+            found.append((q5, q6 - turn if w > 0 else q6 + turn, sin_q5, x, z, atan2(along, -above) + turn))
         return found
+
+    def _turned_into_reach(
+        self, ahead: float, height: float, along: float, above: float, slack: float
+    ) -> tuple[float, float, float]:
+        """Turn [rad] of the fifth axis, at most `slack`, and where it leaves the fourth axis in the arm's plane [m].
+
+        Next to a stretched wrist the rounding of the pose turns the fifth axis (along, above). On an edge of the elbow,
+        this may carry the fourth axis out of reach. It is then turned back, by no more than the pose leaves open.
+        """
+        least, most = self._reach
+        turn, c, s = 0.0, 1.0, 0.0
+        while True:
+            # the fifth axis is (sin, -cos) of an angle
+            x = ahead - self.d5 * (c * along - s * above)
+            z = height - self.d5 * (c * above + s * along)
+            distance = hypot(x, z)
+            excess = distance - min(max(distance, least), most)
+            slope = self.d5 * (x * (c * above + s * along) - z * (c * along - s * above))
+            if abs(excess) <= EDGE or slope == 0.0:
+                return turn, x, z
+            step = -excess * distance / slope
+            if abs(turn + step) > slack:
+                return turn, x, z
+            turn += step
+            c, s = cos(turn), sin(turn)
 
     def _elbows(self, x: float, z: float) -> list[tuple[float, float, float]]:
         """Second and third angle, and sin(q3), that put the fourth axis at (x, z) in the arm's plane [m]."""

@@ -75,7 +75,7 @@ class Problem:
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
 
     def allows(self, label: object, singular: Sequence[str] = ()) -> bool:
-        """Whether `branch` allows the inverse kinematics branch of this label, whose `singular` parts are both."""
+        """Whether `branch` allows a configuration of this label that is singular in these parts: see `BranchFilter`."""
         return self.branch is None or self.branch.allows(label, singular)
 
 

@@ -89,7 +89,7 @@ class _LeastSampled:
     def add(self, t: Array, q: Array) -> float:
         """Check samples q (k, nq) [rad] at times t (k,) [s].
 
-        Returns their least distance [m]: exact if it is the least of all so far, else a lower bound above that.
+        Returns their least distance [m], or a lower bound of it if an earlier sample was nearer.
         """
         # for bodies farther apart than the least distance known, the distance of their enclosing balls is enough
         coarse = self._model.closest_pairs(q[:: max(len(q) // COARSE, 1)])

@@ -10,8 +10,9 @@ from models.robot import Array
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.method import Method, SolveResult, SolveStatus
-from optimizer.search.candidates import Candidate
+from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
+from optimizer.solution import CandidateStatus
 
 
 def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
@@ -43,6 +44,16 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
 def _objective(incumbent: Incumbent, result: SolveResult) -> float:
     prepared = incumbent.prepared
     return np.inf if result.spline is None else prepared.objective_of(prepared.energy(result.spline))
+
+
+def settled(incumbent: Incumbent, candidate: Candidate, result: SolveResult, message: str) -> Candidate | None:
+    """A new candidate with the motion of a result as its own; None if there is no motion."""
+    if result.spline is None:
+        return None
+    candidate.attempt = result
+    candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, message)
+    candidate.energy = _objective(incumbent, result)
+    return candidate
 
 
 def solve_from(

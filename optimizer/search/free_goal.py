@@ -22,17 +22,14 @@ from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import solve
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
-from optimizer.search.attempts import solver_of
-from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.attempts import settled, solver_of
+from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
-from optimizer.search.sampled_ends import nearest_configuration, with_ends
-from optimizer.solution import CandidateStatus
+from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import REST_POINTS
 from optimizer.trajectories.spline import sample
 
-# solved samples that are refined, each of a pair of branches of its own
-MOST_REFINED = 4
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
 # relative decrease of the energy below which no further round follows
@@ -51,12 +48,11 @@ def refine_goals(incumbent: Incumbent) -> list[Candidate]:
     sample are returned.
     """
     solved = [each for each in incumbent.candidates if each.energy is not None and each.goal.tolerance is not None]
-    chosen: dict[tuple[str, str, int], Candidate] = {}
-    for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
-        chosen.setdefault((candidate.start.label, candidate.goal.label, candidate.goal.target), candidate)
-    samples = list(chosen.values())[:MOST_REFINED]
-    refined = [(candidate, refine_goal(incumbent, candidate)) for candidate in samples]
-    return [better for candidate, better in refined if better is not candidate]
+    return refine_best(
+        solved,
+        lambda each: (each.start.label, each.goal.label, each.goal.target),
+        lambda each: refine_goal(incumbent, each),
+    )
 
 
 def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
@@ -91,12 +87,7 @@ def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Gu
     guess.points[-REST_POINTS:] = q_goal
     # the guess is a motion of the free spline's own kind; other methods only take its goal
     result = incumbent.add_effort(solver.improve(guess) if type(solver) is FreeSpline else solver.solve())
-    if result.spline is None:
-        return None
-    fresh.attempt = result
-    fresh.settle(CandidateStatus.SOLVED, Reason.METHOD, REFINED_GOAL)
-    fresh.energy = prepared.objective_of(prepared.energy(result.spline))
-    return fresh
+    return settled(incumbent, fresh, result, REFINED_GOAL)
 
 
 def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Guess | None:

@@ -7,7 +7,7 @@ ordered by lower bound, and those of least bound are solved.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,8 @@ from optimizer.solution import CandidateStatus
 
 # samples solved before any is refined: in all, and of one pair of branches
 BATCH, ALIKE = 12, 2
+# solved samples that are refined, each of a kind of its own
+MOST_REFINED = 4
 # configurations that differ by less are the same [rad]
 SAME = 1e-6
 
@@ -74,6 +76,20 @@ def between(
                 candidates.append(fresh)
                 return fresh
     return nearest
+
+
+def refine_best(
+    solved: Sequence[Candidate], kind: Callable[[Candidate], Hashable], refine: Callable[[Candidate], Candidate]
+) -> list[Candidate]:
+    """The candidates that `refine` makes of the best sample of each kind, at most MOST_REFINED of them.
+
+    `solved` are solved samples. A sample that `refine` returns unchanged is left out.
+    """
+    chosen: dict[Hashable, Candidate] = {}
+    for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
+        chosen.setdefault(kind(candidate), candidate)
+    refined = [(candidate, refine(candidate)) for candidate in list(chosen.values())[:MOST_REFINED]]
+    return [better for candidate, better in refined if better is not candidate]
 
 
 def with_ends(prepared: PreparedProblem, candidate: Candidate, q_start: Array, q_goal: Array) -> Candidate | None:

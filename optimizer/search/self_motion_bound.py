@@ -69,8 +69,9 @@ class Cells:
 
 @dataclass(frozen=True)
 class EndCurves:
-    """What reaches the targets at one end: isolated configurations, and self-motions."""
+    """What reaches the targets at one end: isolated configurations of so many `joints`, and self-motions."""
 
+    joints: int
     curves: list[Array | SelfMotion]
 
     @staticmethod
@@ -80,7 +81,7 @@ class EndCurves:
         for end in ends:
             curve = end.q if end.self_motion is None else end.self_motion
             curves[id(curve)] = curve
-        return EndCurves(list(curves.values()))
+        return EndCurves(len(ends[0].q), list(curves.values()))
 
     def first(self) -> Cells:
         """Cells that cover every curve; one without extent for an isolated configuration."""
@@ -96,7 +97,7 @@ class EndCurves:
 
     def boxes(self, cells: Cells) -> tuple[Array, Array]:
         """Middle and half sides (n, nq) [rad] of a box around every cell."""
-        shape = (len(cells.curve), _joints(self.curves[0]))
+        shape = (len(cells.curve), self.joints)
         centre, half = np.zeros(shape), np.zeros(shape)
         for k, each in enumerate(self.curves):
             own = np.flatnonzero(cells.curve == k)
@@ -105,10 +106,6 @@ class EndCurves:
             elif len(own):
                 centre[own], half[own] = each.boxes(cells.parameter[own], cells.half[own])
         return centre, half
-
-
-def _joints(curve: Array | SelfMotion) -> int:
-    return len(curve) if isinstance(curve, np.ndarray) else curve.at(np.array([curve.arcs[0][0]])).shape[1]
 
 
 class _CellSearch:

@@ -10,15 +10,12 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.search.attempts import solve
-from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.attempts import settled, solve
+from optimizer.search.candidates import Candidate
 from optimizer.search.ends import MEMBERS
 from optimizer.search.incumbent import Incumbent
-from optimizer.search.sampled_ends import nearest_configuration, with_ends
-from optimizer.solution import CandidateStatus
+from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 
-# solved samples that are refined, each of a pair of branches of its own
-MOST_REFINED = 4
 # first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
 REFINED = "converged; refined along the self-motion that holds the pose"
@@ -31,13 +28,11 @@ def refine(incumbent: Incumbent) -> list[Candidate]:
     sample are returned.
     """
     solved = [each for each in incumbent.candidates if each.energy is not None and _sides(each)]
-    chosen: dict[tuple[int, int, str, str], Candidate] = {}
-    for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
-        start, goal = candidate.start, candidate.goal
-        chosen.setdefault((id(start.self_motion), id(goal.self_motion), start.label, goal.label), candidate)
-    samples = list(chosen.values())[:MOST_REFINED]
-    refined = [(candidate, _descend(incumbent, candidate)) for candidate in samples]
-    return [better for candidate, better in refined if better is not candidate]
+    return refine_best(
+        solved,
+        lambda each: (id(each.start.self_motion), id(each.goal.self_motion), each.start.label, each.goal.label),
+        lambda each: _descend(incumbent, each),
+    )
 
 
 def _sides(candidate: Candidate) -> list[Literal["start", "goal"]]:
@@ -82,10 +77,4 @@ def _moved(incumbent: Incumbent, candidate: Candidate, side: Literal["start", "g
     fresh = with_ends(incumbent.prepared, candidate, moved["start"], moved["goal"])
     if fresh is None or fresh.lower_bound >= (candidate.energy or 0.0):
         return None
-    result = solve(incumbent, fresh)
-    if result.spline is None:
-        return None
-    fresh.attempt = result
-    fresh.settle(CandidateStatus.SOLVED, Reason.METHOD, REFINED)
-    fresh.energy = incumbent.prepared.objective_of(incumbent.prepared.energy(result.spline))
-    return fresh
+    return settled(incumbent, fresh, solve(incumbent, fresh), REFINED)

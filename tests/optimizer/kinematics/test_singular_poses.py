@@ -57,6 +57,20 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
         assert BranchFilter(elbow=part).allows(nearest.label, nearest.singular)
 
 
+def test_an_edge_of_the_elbow_next_to_a_stretched_wrist_is_in_reach() -> None:
+    """The rounding of such a pose turns the fifth axis, and would carry the fourth out of the elbow's reach."""
+    rng = np.random.default_rng(1)
+    for _ in range(500):
+        q = rng.uniform(-3.1, 3.1, 6)
+        q[2] = rng.choice([0, np.pi, -np.pi])
+        q[3] = rng.choice([q[3], 0, np.pi / 2, -np.pi / 2, np.pi])
+        q[4] = rng.choice([0, np.pi]) + rng.choice([-1, 1]) * 10 ** rng.uniform(-10, -3)
+        solutions = IK.solve(forward(q), windings=False)
+        assert solutions
+        for each in solutions:
+            assert max(errors(forward(q), each.q)) < ACCURACY
+
+
 def test_on_an_edge_the_branches_that_meet_count_once() -> None:
     rng = np.random.default_rng(3)
     for q in rng.uniform(-3, 3, (200, 6)):
