@@ -30,8 +30,10 @@ STRETCHED = 5e-10
 # distance [m] from an edge of the reach within which the two branches that meet there count as one: a pose on the edge,
 # rounded to double precision, lies that near
 EDGE = 1e-13
-# angle [rad] by which a pose rounded to double precision leaves the sum of the inner angles open, times the wrist's sine
+# angle [rad] that a pose rounded to double precision leaves open in q2 + q3 + q4, times the wrist's sine
 HEADING = 1e-14
+# the excess is small against the circle that the fourth axis moves on: the second step meets the last digit
+NEWTON_STEPS = 4
 # a part of the label is singular where its sine, or the shoulder's distance [m], is below this: nearer to it, a pose
 # that is rounded to double precision no longer determines the joints to 1e-9 rad
 SINGULAR = 1e-6
@@ -180,20 +182,18 @@ class URClosedForm:
         """
         least, most = self._reach
         turn, c, s = 0.0, 1.0, 0.0
-        while True:
+        for _ in range(NEWTON_STEPS):
             # the fifth axis is (sin, -cos) of an angle
             x = ahead - self.d5 * (c * along - s * above)
             z = height - self.d5 * (c * above + s * along)
             distance = hypot(x, z)
             excess = distance - min(max(distance, least), most)
             slope = self.d5 * (x * (c * above + s * along) - z * (c * along - s * above))
-            if abs(excess) <= EDGE or slope == 0.0:
-                return turn, x, z
-            step = -excess * distance / slope
-            if abs(turn + step) > slack:
-                return turn, x, z
-            turn += step
+            if abs(excess) <= EDGE or not abs(excess) * distance <= slack * abs(slope):
+                break
+            turn -= excess * distance / slope
             c, s = cos(turn), sin(turn)
+        return turn, x, z
 
     def _elbows(self, x: float, z: float) -> list[tuple[float, float, float]]:
         """Second and third angle, and sin(q3), that put the fourth axis at (x, z) in the arm's plane [m]."""
