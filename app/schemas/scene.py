@@ -6,8 +6,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
+from app.schemas.common import IDENTITY, NO_CONTROLS, PLAIN, Pose, Request, RobotWithTcp, Vector3, described
 from app.schemas.examples.values import BOX, TOOL, at
+from optimizer.problem.names import LONGEST_NAME
 
 # the library rejects more; repeated here so that the schema shows it
 MOST_OBSTACLES, MOST_VERTICES, MOST_CAPSULES = 64, 256, 16
@@ -70,8 +71,11 @@ class HalfSpace(_Shape):
 
 
 class _Obstacle(Request):
-    name: Annotated[str, Field(min_length=1, max_length=64)] = described(
-        "Name of the obstacle in answers; each name is used once.", None, "table"
+    name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN] = described(
+        "Name of the obstacle in answers. Each name is used once, and none is a link's, `tool` or `payload`; names "
+        "that differ only in case or spaces count as the same. Every character must show.",
+        None,
+        "table",
     )
     margin: float = described(
         "Required clearance between the arm and this obstacle.", "m", 0.02, default=0.0, ge=0, le=1
