@@ -8,6 +8,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.model import collision_model
+from optimizer.deadline import checkpoint
 from optimizer.problem.arm import Arm
 from optimizer.replay.piecewise_motion import PiecewiseMotion
 
@@ -55,6 +56,8 @@ class ClearanceMonitor:
         within = min((closest.distance for closest in coarse), default=np.inf)
         at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
         for low in range(0, len(q), at_once):
+            if low:
+                checkpoint()
             for k, closest in enumerate(self._model.closest_pairs(q[low : low + at_once], within), low):
                 if self.nearest is None or closest.distance < self.nearest.distance:
                     self.nearest = LeastClearance(closest.distance, closest.pair, float(t[k]), spacing)

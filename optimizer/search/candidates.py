@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.methods.method import SolveResult
 from optimizer.prepared_problem import PreparedProblem
@@ -24,6 +25,8 @@ from optimizer.trajectories.spline import Spline
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
 MOST_PAIRS = 32768
+# goal configurations between two looks at the deadline: some ten milliseconds
+GOALS_PER_CHECK = 16
 # joint displacements that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 
@@ -109,7 +112,10 @@ def pairs(
     """
     result: list[Candidate] = []
     for start in starts:
-        for goal in goals:
+        checkpoint()
+        for k, goal in enumerate(goals):
+            if k % GOALS_PER_CHECK == GOALS_PER_CHECK - 1:
+                checkpoint()
             windings = prepared.problem.windings and goal.tolerance is None
             options = [
                 _joint_options(s, g, start.fixed or goal.fixed, windings)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Array, Robot
+from optimizer.deadline import checkpoint
 from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import (
     full_turn_alternatives,
@@ -73,6 +74,7 @@ def label_of(robot: Robot, q: Array) -> str:
 
 
 def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, samples: int) -> list[EndConfiguration]:
+    checkpoint()
     problem = prepared.problem
     robot, limits = problem.arm.robot, problem.arm.active_limits
     if not isinstance(target, Pose | ConeOrientedPose):
