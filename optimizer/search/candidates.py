@@ -25,8 +25,8 @@ from optimizer.trajectories.spline import Spline
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
 MOST_PAIRS = 32768
-# goal configurations between two looks at the deadline: some ten milliseconds
-GOALS_PER_CHECK = 16
+# pairs between two looks at the deadline: some ten milliseconds
+PAIRS_PER_CHECK = 1024
 # joint displacements that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 
@@ -111,11 +111,12 @@ def pairs(
     Raises InvalidProblem if several targets make too many pairs.
     """
     result: list[Candidate] = []
+    due = PAIRS_PER_CHECK
     for start in starts:
-        checkpoint()
-        for k, goal in enumerate(goals):
-            if k % GOALS_PER_CHECK == GOALS_PER_CHECK - 1:
+        for goal in goals:
+            if len(result) > due:
                 checkpoint()
+                due = len(result) + PAIRS_PER_CHECK
             windings = prepared.problem.windings and goal.tolerance is None
             options = [
                 _joint_options(s, g, start.fixed or goal.fixed, windings)

@@ -23,6 +23,8 @@ from optimizer.solution import UnreachableTarget
 
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least
 SAMPLES, LEAST_SAMPLES = 96, 12
+# samples between two looks at the deadline: some ten milliseconds
+SAMPLES_PER_CHECK = 24
 # share of the tool's cone that a goal of free orientation may use: on its edge the motion could not leave the goal
 INSIDE = 0.999
 # label of joint positions of an arm without named branches
@@ -58,6 +60,7 @@ def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], 
     reached: list[EndConfiguration] = []
     unreachable: list[UnreachableTarget] = []
     for index, member in enumerate(target.targets):
+        checkpoint()
         try:
             reached += _ends_of(prepared, name, member, index, max(SAMPLES // max(tolerance, 1), LEAST_SAMPLES))
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
@@ -74,7 +77,6 @@ def label_of(robot: Robot, q: Array) -> str:
 
 
 def _ends_of(prepared: PreparedProblem, name: str, target: Single, index: int, samples: int) -> list[EndConfiguration]:
-    checkpoint()
     problem = prepared.problem
     robot, limits = problem.arm.robot, problem.arm.active_limits
     if not isinstance(target, Pose | ConeOrientedPose):
@@ -103,7 +105,9 @@ def _ends_of_samples(
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
-    for R in sample_orientations(pose, tried):
+    for k, R in enumerate(sample_orientations(pose, tried)):
+        if k % SAMPLES_PER_CHECK == SAMPLES_PER_CHECK - 1:
+            checkpoint()
         try:
             found += [
                 replace(end, tolerance=pose)
