@@ -220,3 +220,35 @@ def test_evaluate_takes_a_scene_as_a_query(client: TestClient) -> None:
     assert limits["tcp_speed"]["value"] / limits["tcp_speed"]["bound"] == limits["tcp_speed"]["worst_ratio"]
     assert limits["tool_cone"]["held"] and limits["tool_cone"]["joint"] is None
     assert not answer.json()["collides"]
+
+
+def test_a_close_pass_is_warned_of(client: TestClient) -> None:
+    """A floor 1 mm below the tool at rest, without a margin; with the usual one, the start is refused."""
+    request = move(scene=floor(-1.0, margin=0.0), tool=EXAMPLES["over_a_post"]["tool"])
+    assert answered(client, request)["warnings"] == []
+    arm = to_arm(OptimizeRequest.model_validate_json(json.dumps(request)))
+    model = CollisionModel(arm)
+    of_floor = [p for p in range(len(model.pairs)) if "floor" in model.names(p)]
+    lowest = float(model.signed_distances(np.array([HOME, request["goal"]["q"]]))[0][:, of_floor].min())
+    near = request | {"scene": floor(lowest - 1.0 - 1e-3, margin=0.0)}
+    (warning,) = answered(client, near)["warnings"]
+    assert "floor and " in warning and "closer than 2 mm" in warning.lower()
+    refused(client.post("/optimize", json=request | {"scene": floor(lowest - 1.0 - 1e-3)}), problems.StartInCollision)
+
+
+def test_a_given_motion_is_warned_of_too(client: TestClient) -> None:
+    given = {"configurations": [HOME, FOLDED], "time_per_segment": 2.0}
+    (warning,) = answered(client, given, "/evaluate")["warnings"]
+    assert "overlapping" in warning
+    assert answered(client, given | {"collisions": False}, "/evaluate")["warnings"] == []
+
+
+def test_a_tool_declares_what_it_touches(client: TestClient) -> None:
+    """A sleeve around wrist 2 is in collision with it, unless it touches it by design."""
+    sleeve = {"start": [0.0, 0.0, -0.03], "end": [0.0, 0.0, 0.0], "radius": 0.03}
+    content = refused(client.post("/optimize", json=move(tool={"capsules": [sleeve]})), problems.StartInCollision)
+    assert content["pair"] == ["wrist_2", "tool"]
+    by_design = {"capsules": [sleeve | {"touches": ["wrist_2", "wrist_3"]}]}
+    assert answered(client, move(tool=by_design))["status"] in ("optimal", "feasible")
+    unknown = client.post("/optimize", json=move(tool={"capsules": [sleeve | {"touches": ["wrist_9"]}]}))
+    assert unknown.status_code == 422 and "tool.capsules.0.touches" in unknown.text

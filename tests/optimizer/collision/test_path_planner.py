@@ -178,7 +178,7 @@ def walled_in() -> tuple[Arm, Array, Array]:
     """The task of the post with walls across all that the arm reaches, but for where it stands."""
     arm, q_start, q_goal = task("post")
     wall = Obstacle("wall", Box(np.array([3.0, 0.02, 3.0])), at(1.77, 0.0, 1.0))
-    behind = Obstacle("behind", Box(np.array([3.0, 0.02, 3.0])), at(-1.65, 0.0, 1.0))
+    behind = Obstacle("behind", Box(np.array([3.0, 0.02, 3.0])), at(-1.58, 0.0, 1.0))
     over = Obstacle("over", Box(np.array([0.6, 0.02, 2.0])), at(0.0, 0.0, 1.7))
     return replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over])), q_start, q_goal
 
