@@ -33,8 +33,8 @@ from optimizer.trajectories.spline import Spline
 
 # instants of the grid between two looks at the deadline: some ten milliseconds
 BLOCK = 5000
-# time [s] per instant, at least, of what follows their torques
-REST = 1.5e-6
+# time [s] per instant, at least, of the whole certificate, and of what follows the torques
+WHOLE, REST = 3e-6, 1.5e-6
 
 
 @one_thread()
@@ -81,6 +81,8 @@ class _Replay:
         self.data = self.model.createData()
         self._last, self._T_last_tcp = self.model.njoints - 1, T_last_tcp(arm)
         self.t, curve = grid(spline.duration), spline.curve
+        if len(self.t) > BLOCK:
+            checkpoint(len(self.t) * WHOLE)
         self.q, self.v, self.a, self.jerk = (
             np.ascontiguousarray(curve(self.t, order, extrapolate=False)) for order in range(4)
         )
