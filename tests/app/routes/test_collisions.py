@@ -252,3 +252,9 @@ def test_a_tool_declares_what_it_touches(client: TestClient) -> None:
     assert answered(client, move(tool=by_design))["status"] in ("optimal", "feasible")
     unknown = client.post("/optimize", json=move(tool={"capsules": [sleeve | {"touches": ["wrist_9"]}]}))
     assert unknown.status_code == 422 and "tool.capsules.0.touches" in unknown.text
+
+
+def test_the_robot_says_which_meshes_its_capsules_hold(client: TestClient) -> None:
+    collision = client.get("/robots/ur5e").json()["collision"]
+    assert collision["meshes"]["value"] == ["visual", "collision"]
+    assert sum(len(collision[link]["value"]) for link in ROBOT.link_names) == len(ROBOT.capsules)
