@@ -19,10 +19,11 @@ from scipy.spatial import ConvexHull
 from app.convert.request import to_problem
 from app.schemas.request import OptimizeRequest
 from models.robot import Array
-from optimizer.collision.bodies import TOOL, Body
+from optimizer.collision.bodies import Body
 from optimizer.collision.model import CollisionModel
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.optimize import optimize
+from optimizer.problem.arm import TOOL
 
 # Okabe and Ito's blue to orange, which colour-blind readers can tell apart
 OVER_TIME = LinearSegmentedColormap.from_list("over time", ["#0072B2", "#56B4E9", "#F0E442", "#E69F00", "#D55E00"])

@@ -1,10 +1,14 @@
 """Public entry point: `pareto(problem, n)` returns a `Front`, the Pareto front of energy and duration.
 
-The front begins with the fastest motion and ends with the motion of least energy. Every candidate counts, and every
-point is certified. Between two neighbours the front lies within the rectangle that they span: a motion that is slower
-than the left one is dominated unless it needs less energy, and no motion needs less energy than the right one.
-Durations are therefore chosen one by one. Each is the geometric mean of the two neighbours whose rectangle has the
-longest sides, relative to those of the whole front, in log T and in energy.
+The front begins with the fastest motion and ends with the motion of least energy: the answer of `optimize`, found as
+`optimize` finds it. A motion of another duration that needs a little less, by no more than solves from different
+initial guesses differ, is the same optimum and no point of its own. Every candidate counts, and every point is
+certified.
+
+Between two neighbours the front lies within the rectangle that they span: a motion that is slower than the left one is
+dominated unless it needs less energy, and no motion needs less energy than the right one. Durations are therefore
+chosen one by one. Each is the geometric mean of the two neighbours whose rectangle has the longest sides, relative to
+those of the whole front, in log T and in energy.
 
 If two neighbours belong to different candidates, the front may jump between them. The candidate of the right one has a
 fastest motion of its own. If this is slower than the left point, the jump is at its duration. That duration is tried
@@ -29,6 +33,7 @@ from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProb
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.problem import Problem
 from optimizer.search.fastest import fastest, fastest_from, fastest_of
+from optimizer.search.reserve import report_time
 from optimizer.search.run import Run
 from optimizer.search.sampled_ends import between
 from optimizer.solution import Solution
@@ -43,6 +48,9 @@ SAME_DURATION, SAME_JUMP = 2e-4, 2e-3
 BEFORE_JUMP = (1e-4, 1e-3)
 # least deadline of a search [s]
 LEAST_TIME = 1e-3
+# relative difference of two energies that are the same optimum: solves from different initial guesses and with knots at
+# other instants scatter by as much
+CONVERGED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -110,19 +118,21 @@ class _Search:
         self.problem, self.n = problem, n
         self.nodes: list[_Node] = []
         self.solves = 0
+        self.least: _Node
         self.fastest_run = self.run([])
         self.tried: set[bytes] = set()
 
     def front(self) -> Front:
         """The front. Raises the errors of `pareto`."""
-        spline, known = self.fastest()
+        spline, found = self.fastest()
         problem = self.problem
         if problem.duration_max is not None and spline.duration > problem.duration_max:
             raise DurationTooShort(spline.duration)
         first = max(spline.duration, problem.duration_min or 0.0)
         # first, so that the fastest motion is known even if the deadline passes before the other end is
         self.solve(first, [spline])
-        self.add(self.run(known, least=first), problem.duration_max or math.inf)
+        # as `optimize` solves it: with the same durations, and without what else the front knows
+        self.least = self.add(self.run([]), problem.duration_max or math.inf) if found is None else self.keep(found)
         while len(self.nodes) < self.n and self.left() > 0 and (k := self.next_interval()) is not None:
             left, right = self.nodes[k : k + 2]
             if len(self.nodes) == self.n - 1 and self.refine_last():
@@ -131,10 +141,10 @@ class _Search:
                 continue
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
-        return self.result(spline.duration, complete=self.left() > 0)
+        return self.result(min(spline.duration, self.nodes[0].duration), complete=self.left() > 0)
 
-    def fastest(self) -> tuple[Spline, list[Spline]]:
-        """The fastest motion, and motions of least energy known by then. Raises the errors of `optimize`.
+    def fastest(self) -> tuple[Spline, Solution | None]:
+        """The fastest motion, and the answer of least energy if it had to be found first. Raises what `optimize` does.
 
         The minimum-time solve may fail on a candidate on which the least-energy solve does not. Then the motion of
         least energy is its initial guess; if it fails again, that motion is the fastest one known.
@@ -142,7 +152,7 @@ class _Search:
         self.fastest_run.prepare()
         found = fastest(self.fastest_run.incumbent)
         if found is not None:
-            return found[1], []
+            return found[1], None
         run = self.run([])
         try:
             answer = run.solution()
@@ -151,11 +161,12 @@ class _Search:
             faster = fastest_from(incumbent, candidate, known)
         finally:
             self.solves += run.incumbent.solves
-        return (known if faster is None or faster.duration > known.duration else faster), [known]
+        return (known if faster is None or faster.duration > known.duration else faster), answer
 
     def left(self) -> float:
-        """Time left [s]."""
-        return self.began + self.problem.deadline - self.clock()
+        """Time left [s] but for that to encode the answers so far."""
+        report = sum(report_time(self.problem, node.answer) for node in self.nodes if node.answer is not None)
+        return self.began + self.problem.deadline - report - self.clock()
 
     def run(self, known: list[Spline], least: float | None = None, most: float | None = None) -> Run:
         """A search between two durations [s], with its share of the time left."""
@@ -181,11 +192,18 @@ class _Search:
     def add(self, run: Run, duration: float) -> _Node:
         """Run a search and keep its result; `duration` [s] is its place in the front if it finds no motion."""
         try:
-            answer = run.solution()
-            node = _Node(answer.duration, answer, answer.energy.of(self.problem.objective))
+            return self.keep(run.solution())
         except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
-            node = _Node(duration, None, reason=str(error))
-        self.solves += run.incumbent.solves
+            return self.insert(_Node(duration, None, reason=str(error)))
+        finally:
+            self.solves += run.incumbent.solves
+
+    def keep(self, answer: Solution) -> _Node:
+        """The node of an answer."""
+        return self.insert(_Node(answer.duration, answer, answer.energy.of(self.problem.objective)))
+
+    def insert(self, node: _Node) -> _Node:
+        """The node, put among the others."""
         self.nodes.append(node)
         self.nodes.sort(key=lambda node: (node.duration, node.energy))
         return node
@@ -199,7 +217,10 @@ class _Search:
             return False
         self.tried.add(key)
         run = self.run([])
-        run.prepare()
+        try:
+            run.prepare()
+        except DeadlineExceeded:
+            return False
         candidate = between(run.incumbent.prepared, run.incumbent.candidates, q_start, q_goal)
         spline = fastest_of(run.incumbent, candidate)
         self.solves += run.incumbent.solves
@@ -218,11 +239,19 @@ class _Search:
     def refine_last(self) -> bool:
         """Search the end of least energy again from the motion of least energy, if that is not the last node."""
         least_energy = min(self.nodes, key=lambda node: node.energy)
-        if least_energy is self.nodes[-1] or least_energy.spline is None:
+        if not self.beats_least(least_energy) or least_energy is self.nodes[-1] or least_energy.spline is None:
             return False
         most = self.problem.duration_max or math.inf
         self.add(self.run([least_energy.spline], least=self.nodes[0].duration), most)
         return True
+
+    def beats_least(self, node: _Node) -> bool:
+        """Whether a node needs clearly less energy than the answer of `optimize`: by more than solves differ."""
+        return self.least.answer is None or node.energy < self.least.energy - CONVERGED * abs(self.least.energy)
+
+    def same_as_least(self, node: _Node) -> bool:
+        """Whether a node needs less energy than the answer of `optimize`, but by no more than solves differ."""
+        return node is not self.least and node.energy <= self.least.energy and not self.beats_least(node)
 
     def next_interval(self) -> int | None:
         """The node behind which another duration tells most about the front; None if all are near enough."""
@@ -254,6 +283,9 @@ class _Search:
         for node in self.nodes:
             if node.answer is None:
                 dropped.append(Dropped(node.duration, None, node.reason))
+            elif self.same_as_least(node):
+                reason = "the same least energy as that of the last point, as far as the solver converges"
+                dropped.append(Dropped(node.duration, node.energy, reason))
             elif points and (node.duration, node.energy) == (points[-1].duration, least):
                 continue  # the same motion found twice
             elif node.energy >= least:

@@ -10,8 +10,8 @@ import time
 from dataclasses import dataclass, replace
 
 from optimizer.certificate import certify
-from optimizer.deadline import Clock, Deadline
-from optimizer.exceptions import JoulepathError
+from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.linear_algebra import one_thread
 from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
@@ -19,6 +19,9 @@ from optimizer.problem.problem import Problem, narrowed
 from optimizer.search.incumbent import SLACK
 from optimizer.search.run import Run
 from optimizer.solution import Certificate, Energy, Solution
+
+# least deadline of a search [s]
+LEAST_TIME = 1e-3
 
 
 @dataclass(frozen=True)
@@ -41,13 +44,19 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
 
     The changed problem is solved on its own. If the base motion is feasible on the changed arm and needs less energy
     than the new motion, the problem is solved again with a warm start from it. The result then needs no more energy
-    than the base motion, unless the deadline passes first. `problem.deadline` [s] holds for all of it.
+    than the base motion, unless the deadline passes first. `problem.deadline` [s] holds for all of it. Raises
+    DeadlineExceeded if it passes before the base motion is certified on the changed arm.
     """
     deadline = Deadline.after(problem.deadline, clock)
     spline, prepared = base.trajectory.spline, PreparedProblem.of(problem)
-    energy = prepared.energy(spline)
     asked = narrowed(problem, base.start.target, base.goal.target)
-    certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
+    try:
+        with watch(deadline):
+            energy = prepared.energy(spline)
+            certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
+    except DeadlinePassed:
+        raise DeadlineExceeded([]) from None
+    problem = replace(problem, deadline=max(deadline.left, LEAST_TIME))
     try:
         found = optimize(problem, clock)
     except JoulepathError as error:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.convert.fields import fields
-from app.convert.solution import baseline_fields, optimality_gap, to_optimize_response
+from app.convert.solution import baseline_fields, optimality_gap
 from app.schemas import request as asked
 from app.schemas.compare import ROW_FIELDS, CompareRequest
 from optimizer.problem.problem import MethodName
@@ -18,9 +18,10 @@ def to_compare_response(
     request_id: str,
     found: Mapping[MethodName, Solution],
     failed: Mapping[MethodName, dict[str, Any]],
+    answers: Mapping[MethodName, Any],
 ) -> dict[str, Any]:
     """The answer of `POST /compare`. `found` has the solution of every method that found a motion, at least one;
-    `failed` the error document of every other method."""
+    `failed` the error document of every other method, `answers` the complete answers that the rows are to contain."""
     energies = {method: solution.energy.of(request.objective) for method, solution in found.items()}
     best = min(energies, key=energies.__getitem__)
     # every method has the same candidates, and therefore the same bound
@@ -42,8 +43,7 @@ def to_compare_response(
                 "valid": solution.certificate.valid,
                 "worst_ratio": max(solution.certificate.worst_ratio.values()),
             }
-            if request.answers:
-                row["answer"] = to_optimize_response(to_optimize_request(request, method), request_id, solution)
+            row["answer"] = answers.get(method)
         rows.append({**row, "method": method, "problem": failed.get(method)})
     return {
         "id": request_id,

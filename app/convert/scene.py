@@ -30,11 +30,7 @@ Made = TypeVar("Made")
 
 def to_scene(scene: asked.Scene) -> Scene:
     """The scene of the library. Raises InvalidProblem."""
-    obstacles = []
-    for k, given in enumerate(scene.obstacles):
-        shape = _named(f"scene.obstacles.{k}", partial(_to_shape, given))
-        obstacles.append(Obstacle(given.name, shape, to_matrix(given.pose), given.margin))
-    return Scene(obstacles)
+    return Scene([_named(f"scene.obstacles.{k}", partial(_to_obstacle, o)) for k, o in enumerate(scene.obstacles)])
 
 
 def to_tool(tool: asked.Tool) -> list[Attachment]:
@@ -45,6 +41,10 @@ def to_tool(tool: asked.Tool) -> list[Attachment]:
 def to_attachment(shape: asked.CarriedShape, touches: list[str] | None) -> Attachment:
     """The shape of a payload, fixed to the flange. Raises InvalidProblem."""
     return _named("payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose), touches))
+
+
+def _to_obstacle(given: asked.Obstacle) -> Obstacle:
+    return Obstacle(given.name, _to_shape(given), to_matrix(given.pose), given.margin)
 
 
 def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:

@@ -10,24 +10,40 @@ import orjson
 
 
 @dataclass(frozen=True)
+class StoredAnswer:
+    """A complete answer (JSON) and the id under which it is to be stored.
+
+    The task chooses the id, so that the document holds the final path from the first. Nothing is ever searched and
+    replaced in a document, which repeats texts of the caller.
+    """
+
+    id: str
+    body: bytes
+
+    @property
+    def path(self) -> str:
+        """Path of the answer in the service."""
+        return f"/answers/{self.id}"
+
+
+@dataclass(frozen=True)
 class TaskResult:
     """A document and its media type. A task that fails raises an exception instead.
 
-    `stored` are complete answers (JSON) that belong into the database. Where the document refers to the k-th of them,
-    it holds `placeholder(k)`, which gives way to the answer's path: see `app.store.store_answers`.
+    `stored` are complete answers that belong into the database before the document is sent: it refers to them.
     """
 
     document: bytes
     media_type: str
-    stored: tuple[bytes, ...] = ()
+    stored: tuple[StoredAnswer, ...] = ()
 
     @classmethod
-    def of_json(cls, content: Mapping[str, Any], stored: tuple[bytes, ...] = ()) -> TaskResult:
+    def of_json(cls, content: Mapping[str, Any], stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
         """A JSON document: see `json_document`."""
         return cls(json_document(content), "application/json", stored)
 
     @classmethod
-    def of_csv(cls, table: str, stored: tuple[bytes, ...] = ()) -> TaskResult:
+    def of_csv(cls, table: str, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
         """A CSV document."""
         return cls(table.encode(), "text/csv", stored)
 
@@ -35,11 +51,3 @@ class TaskResult:
 def json_document(content: Mapping[str, Any]) -> bytes:
     """`content` as JSON. NumPy arrays must be C-contiguous; a number that is not finite becomes null."""
     return orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
-
-
-def placeholder(k: int) -> str:
-    """Text that stands for the path of the k-th stored answer.
-
-    It contains a control character that no text of a client may contain.
-    """
-    return f"\x7fstored/{k}\x7f"

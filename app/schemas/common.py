@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field
 from pydantic_core import PydanticCustomError
 
 from app.schemas.examples.values import REQUEST_ID
+from optimizer.problem.names import is_plain
 from optimizer.problem.pose import QUATERNION_TOLERANCE
 
 KEY_HEADER = "Idempotency-Key"
@@ -76,6 +77,19 @@ def _is_unit(quaternion: list[float]) -> list[float]:
         raise PydanticCustomError("not_unit", "The norm of the quaternion must be within 0.001 of 1")
     return quaternion
 
+
+def _plain(name: str) -> str:
+    if not is_plain(name):
+        raise PydanticCustomError(
+            "plain", "The name is blank or has control or invisible characters: use letters, digits, signs and spaces"
+        )
+    return name
+
+
+# the pattern shows a part of the rule in the schema: no control characters, which a database may reject, too
+NO_CONTROLS = r"^[^\x00-\x1F\x7F-\x9F]+$"
+PLAIN = AfterValidator(_plain)
+"""Refuses a name with characters that do not show."""
 
 Vector3 = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[

@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import IDENTITY, Pose, Request, RobotWithTcp, Vector3, described
+from app.schemas.common import IDENTITY, NO_CONTROLS, PLAIN, Pose, Request, RobotWithTcp, Vector3, described
 from app.schemas.examples.values import BOX, TOOL, at
 from optimizer.problem.arm import MOST_PARTS
+from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
@@ -70,8 +71,11 @@ class HalfSpace(_Shape):
 
 
 class _Obstacle(Request):
-    name: Annotated[str, Field(min_length=1, max_length=64)] = described(
-        "Name of the obstacle in answers; each name is used once.", None, "table"
+    name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN] = described(
+        "Name of the obstacle in answers. Each name is used once, and none is a link's, `tool` or `payload`; names "
+        "that differ only in case or spaces count as the same. Every character must show.",
+        None,
+        "table",
     )
     margin: float = described(
         "Required clearance between the arm and this obstacle; 0 allows contact.",

@@ -5,29 +5,16 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, ConfigDict, Field, Tag
-from pydantic_core import PydanticCustomError
+from pydantic import ConfigDict, Field, Tag
 
-from app.schemas.common import Request, Response, RobotName, by_field, described, part
+from app.schemas.common import NO_CONTROLS, PLAIN, Request, Response, RobotName, by_field, described, part
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
 from app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
 from app.schemas.request import OptimizeRequest
 from optimizer.solution import Objective
 
-
-def _not_blank(name: str) -> str:
-    if not name.strip():
-        raise PydanticCustomError("blank", "The name must not be blank")
-    return name
-
-
-# no control characters: they are invisible, and a database rejects some
-Name = Annotated[
-    str,
-    Field(min_length=1, max_length=NAME_LENGTH, pattern=r"^[^\x00-\x1F\x7F-\x9F]+$"),
-    AfterValidator(_not_blank),
-]
+Name = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
 IdempotencyKey = Annotated[str, Field(min_length=1, max_length=KEY_LENGTH, pattern=r"^[!-~]+$")]
 
 

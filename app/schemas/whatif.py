@@ -14,6 +14,7 @@ from app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
 from app.schemas.request import OptimizeRequest
 from app.schemas.response import OBJECTIVE, Certificate, ElectricalEnergy
 from app.schemas.studies import Name
+from optimizer.problem.names import first_repeated
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Objective
 
@@ -41,8 +42,8 @@ class Change(Request):
 
 
 def _different(changes: list[Change]) -> list[Change]:
-    if len({change.name for change in changes}) < len(changes):
-        raise PydanticCustomError("repeated", "Give each change a different name")
+    if first_repeated([change.name for change in changes]) is not None:
+        raise PydanticCustomError("repeated", "Give each change a different name; case and spaces make no difference")
     return changes
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import uuid
 from typing import Any
 
-from app.engine.result import json_document, placeholder
+from app.engine.result import StoredAnswer, json_document
 from app.exceptions import InvalidRequest
 
 MOST_BYTES = 1 << 27
@@ -15,17 +16,18 @@ class AnswerCollector:
     """Collects complete answers for `TaskResult.stored`."""
 
     def __init__(self) -> None:
-        self._answers: list[bytes] = []
+        self._answers: list[StoredAnswer] = []
 
     def add(self, content: dict[str, Any]) -> str:
-        """Adds an answer and returns the placeholder of its path. Raises InvalidRequest above MOST_BYTES."""
-        self._answers.append(json_document(content))
-        if sum(map(len, self._answers)) > MOST_BYTES:
+        """Adds an answer and returns its path. Raises InvalidRequest above MOST_BYTES."""
+        answer = StoredAnswer(str(uuid.uuid4()), json_document(content))
+        self._answers.append(answer)
+        if sum(len(each.body) for each in self._answers) > MOST_BYTES:
             message = "The answers are too large together: use a longer `sample_period`, or ask for fewer"
             raise InvalidRequest([{"loc": ["body"], "msg": message}])
-        return placeholder(len(self._answers) - 1)
+        return answer.path
 
     @property
-    def stored(self) -> tuple[bytes, ...]:
+    def stored(self) -> tuple[StoredAnswer, ...]:
         """The answers so far."""
         return tuple(self._answers)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import orjson
+
 from app.convert.comparison import to_compare_response, to_optimize_request
 from app.convert.request import to_problem
-from app.engine.result import TaskResult
+from app.convert.solution import to_optimize_response
+from app.engine.result import TaskResult, json_document
 from app.http.problem_details import problem_content
 from app.schemas.compare import CompareRequest
 from app.tasks.certified import certified
 from app.tasks.deadline_shares import DeadlineShares
 from optimizer.deadline import Deadline
-from optimizer.exceptions import JoulepathError
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.methods import METHODS
 from optimizer.optimize import optimize
 from optimizer.problem.problem import MethodName
@@ -33,16 +36,24 @@ class CompareTask:
         """The table, within about `deadline` seconds. If no method finds a motion, raises the error of the first."""
         found: dict[MethodName, Solution] = {}
         errors: dict[MethodName, JoulepathError] = {}
+        answers: dict[MethodName, orjson.Fragment] = {}
         methods = [method for method in METHODS if method in self.request.methods]
         shares = DeadlineShares(Deadline.after(deadline), len(methods))
         for method in methods:
+            asked, share = to_optimize_request(self.request, method), shares.next()
+            if shares.used_up:
+                errors[method] = DeadlineExceeded([])
+                continue
             try:
-                solution = optimize(to_problem(to_optimize_request(self.request, method), shares.next()))
+                solution = found[method] = certified(optimize(to_problem(asked, share)))
             except JoulepathError as error:
                 errors[method] = error
             else:
-                found[method] = certified(solution)
+                if self.request.answers:
+                    # encoded at once: the next method gets the time that is left then
+                    answer = json_document(to_optimize_response(asked, self.request_id, solution))
+                    answers[method] = orjson.Fragment(answer)
         if not found:
             raise errors[self.request.methods[0]]
         problems = {method: problem_content(error, self.request_id) for method, error in errors.items()}
-        return TaskResult.of_json(to_compare_response(self.request, self.request_id, found, problems))
+        return TaskResult.of_json(to_compare_response(self.request, self.request_id, found, problems, answers))

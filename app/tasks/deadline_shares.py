@@ -18,6 +18,11 @@ class DeadlineShares:
     def __init__(self, deadline: Deadline, runs: int) -> None:
         self._deadline, self._runs = deadline, runs
 
+    @property
+    def used_up(self) -> bool:
+        """Whether no time is left."""
+        return self._deadline.passed
+
     def next(self) -> float:
         """Time [s] for the next run."""
         share = self._deadline.left / self._runs

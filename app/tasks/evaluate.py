@@ -17,6 +17,7 @@ from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.problem_details import invalid_request
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
+from optimizer.deadline import Deadline
 from optimizer.replay.evaluate import Evaluation, evaluate
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
@@ -34,25 +35,26 @@ class EvaluateTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
-        robot, result = self._evaluate_csv(deadline) if self.kind == "csv" else self._evaluate_json(deadline)
+        end = Deadline.after(deadline)
+        robot, result = self._evaluate_csv(end) if self.kind == "csv" else self._evaluate_json(end)
         if self.wanted == "csv":
             return TaskResult.of_csv(to_csv_table(result))
         return TaskResult.of_json(to_evaluate_response(self.request_id, robot, result))
 
-    def _evaluate_csv(self, deadline: float) -> tuple[str, Evaluation]:
+    def _evaluate_csv(self, end: Deadline) -> tuple[str, Evaluation]:
         settings = csv_settings(self.query)
         arm = to_arm(settings)
         with Path(self.file).open("rb") as file:
             table = MotionCsv.of(file, arm.robot.nq, settings.units)
-            result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, deadline)
+            result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, end.left)
         return settings.robot, result
 
-    def _evaluate_json(self, deadline: float) -> tuple[str, Evaluation]:
+    def _evaluate_json(self, end: Deadline) -> tuple[str, Evaluation]:
         if self.query:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         body = Path(self.file).read_bytes()
         request = _validated(lambda: EvaluateRequest.model_validate_json(body), "body")
-        return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, deadline)
+        return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:

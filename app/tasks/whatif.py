@@ -109,7 +109,12 @@ class _Optimized(_Work):
         change, share = self.request.changes[k], self.shares.next()
         if isinstance(problem, OutsideLimits):
             return self.row(change, problem)
-        found = whatif(base, replace(problem, deadline=min(asked.deadline, share)))
+        if self.shares.used_up:
+            return self.row(change, DeadlineExceeded([]))
+        try:
+            found = whatif(base, replace(problem, deadline=min(asked.deadline, share)))
+        except DeadlineExceeded as error:
+            return self.row(change, error)
         same = {
             "holds": found.certificate.valid,
             "certificate": certificate_fields(found.certificate),
@@ -162,6 +167,8 @@ class _Evaluated(_Work):
 
     def _row(self, asked: EvaluateRequest, k: int, content: dict[str, Any], arm: Arm) -> dict[str, Any]:
         change = self.request.changes[k]
+        if self.shares.used_up:
+            return self.row(change, DeadlineExceeded([]))
         try:
             found = _located(lambda: self._evaluate(arm, asked), f"changes.{k}.arm", change)
         except DeadlineExceeded as error:

@@ -9,11 +9,10 @@ import numpy as np
 
 from models.robot import Array, Robot
 from optimizer.collision.cores import Core, core_of
-from optimizer.problem.arm import Arm
+from optimizer.problem.arm import PAYLOAD, TOOL, Arm
 from optimizer.problem.scene import Attachment
 
 Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
-TOOL, PAYLOAD = "tool", "payload"
 
 
 @dataclass(frozen=True, eq=False)

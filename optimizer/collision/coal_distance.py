@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull
 
 from models.robot import Array
 from optimizer.collision.cores import Core
+from optimizer.deadline import checkpoint
 
 # tolerances of the distance [m], tried in turn. Coal's default of 1e-6 is too coarse for the line search of the
 # optimiser; deep inside a round body, EPA may not converge to the finest, and the next is tried
@@ -20,6 +21,8 @@ MOST_ITERATIONS = 500
 SKIN = 1e-2
 # Coal reports a failure by a distance beyond this [m]
 MOST_DISTANCE = 1e6
+# pairs between two looks at the deadline: some ten milliseconds
+PER_CHECK = 2048
 
 
 class ConvexPairs:
@@ -41,6 +44,8 @@ class ConvexPairs:
         count = len(T_first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
         for k, (i, j) in enumerate(zip(first, second, strict=True)):
+            if k % PER_CHECK == PER_CHECK - 1:
+                checkpoint()
             (a, skin_a, local_a), (b, skin_b, local_b) = self._shape(int(i)), self._shape(int(j))
             pose_a, pose_b = _transform(T_first[k]) * local_a, _transform(T_second[k]) * local_b
             for request in self._requests:

@@ -17,11 +17,14 @@ import casadi as ca
 import numpy as np
 
 from models.robot import Array, Robot
+from optimizer.deadline import checkpoint
 from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, seal_path
 from optimizer.energy.kernel_expressions import FUNCTION_NAMES, SYMBOLICS, build
 
 # nodes per call of a function whose number of nodes varies from caller to caller
 CHUNK = 64
+# such chunks between two looks at the deadline: some ten milliseconds
+CHUNKS_PER_CHECK = 128
 
 
 class _Evaluation:
@@ -103,7 +106,12 @@ class Kernel:
         evaluation = self._evaluation("torque", CHUNK)
         y = np.zeros((-(-count // CHUNK) * CHUNK, 3 * self.nq))
         y[:count] = np.hstack([q, v, a])
-        return np.concatenate([evaluation(y[i : i + CHUNK], p)[0].copy() for i in range(0, len(y), CHUNK)])[:count]
+        tau = np.empty((len(y), self.nq))
+        for k, i in enumerate(range(0, len(y), CHUNK)):
+            if k % CHUNKS_PER_CHECK == CHUNKS_PER_CHECK - 1:
+                checkpoint()
+            tau[i : i + CHUNK] = evaluation(y[i : i + CHUNK], p)[0]
+        return tau[:count]
 
 
 class _Loader:

@@ -9,7 +9,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
-from optimizer.deadline import Deadline
+from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.methods.limit_repair import (
     MARGIN,
     LimitCheck,
@@ -80,6 +80,13 @@ class SqpMethod(Method):
         `deadline` replaces the candidate's if it is given.
         """
         deadline = self.deadline if deadline is None else deadline
+        with watch(deadline):
+            try:
+                return self._improved(guess, deadline)
+            except DeadlinePassed:
+                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+
+    def _improved(self, guess: Guess, deadline: Deadline) -> SolveResult:
         stage = self._first_stage(guess)
         iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array
+from optimizer.deadline import checkpoint, watched_time_left
 from optimizer.nlp.active_path_constraints import ActivePathConstraints, Index, PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
 
@@ -25,6 +26,8 @@ NEAR_PATH = 0.5
 STEP = 1.5
 # times that the QP is solved again with the constraints that its step would break
 QP_ROUNDS = 10
+# least time [s] that a QP gets: most take a millisecond
+LEAST_TIME = 0.05
 
 Places = tuple[Index, Index, Index]  # derivative, grid point, coordinate
 Marks = npt.NDArray[np.bool_]
@@ -125,8 +128,19 @@ class _Rows:
         sense[self.fixed] = _EQUAL
         least = np.concatenate([self.lower, self.goal.least, np.full(len(self.b), -_INFINITE)])
         most = np.concatenate([self.upper, self.goal.most, self.b])
+        left = watched_time_left()
         x, _, flag, info = daqp.solve(
-            at.hessian, at.gradient, self.A, most, least, sense, primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6
+            at.hessian,
+            at.gradient,
+            self.A,
+            most,
+            least,
+            sense,
+            primal_tol=1e-9,
+            eps_prox=0.0,
+            rho_soft=1e-6,
+            # 0: no limit
+            time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,
         )
         return x, info["lam"], bool(flag >= _DAQP_OPTIMAL)
 
@@ -161,7 +175,10 @@ class WorkingSetQP:
         working = np.concatenate([np.zeros(rows.hard + before, dtype=bool), self._active[rows.places]])
         relaxed = False
         for attempt in range(QP_ROUNDS):
+            checkpoint()
             x, multipliers, found = rows.solved(at, working, relaxed)
+            if not found:
+                checkpoint()
             if not found and relaxed:
                 return None
             if not found:

@@ -11,6 +11,7 @@ from models.robot import Array, Drives, FrictionLaw, Limits, Robot
 from optimizer.exceptions import InvalidProblem, OutsideLimits
 from optimizer.problem.arrays import frozen, per_joint, rigid_transform
 from optimizer.problem.bus import Bus
+from optimizer.problem.names import first_among
 from optimizer.problem.scene import Attachment, Scene
 from optimizer.problem.tool_cone import ToolCone
 
@@ -19,6 +20,8 @@ LEAST_SPEED = 1e-3
 LIMIT_NAMES = {"velocity": "v_max", "acceleration": "a_max", "jerk": "j_max", "torque": "tau_max"}
 # most capsules of a tool
 MOST_PARTS = 16
+# names of the bodies at the flange
+TOOL, PAYLOAD = "tool", "payload"
 
 # range of the factors on mass and inertia of a link: beyond it, the arm is no variant of the robot
 LINK_MASS_SCALES = (0.1, 10.0)
@@ -109,6 +112,7 @@ class Arm:
         if len(self.tool) > MOST_PARTS:
             raise InvalidProblem("tool.capsules", f"A tool has at most {MOST_PARTS} capsules.")
         self._check_touches()
+        self._check_names()
         self._check_limits()
         for name in ("tcp_speed", "elbow_speed"):
             speed = getattr(self, name)
@@ -176,6 +180,15 @@ class Arm:
         for name, part in parts:
             if part.touches is not None and not set(part.touches) <= set(known):
                 raise InvalidProblem(name, f"{name} may name only links of the robot: {', '.join(known)}.")
+
+    def _check_names(self) -> None:
+        own = (*self.robot.link_names, TOOL, PAYLOAD)
+        taken = first_among(self.scene.names, own)
+        if taken is not None:
+            raise InvalidProblem(
+                f"scene.obstacles.{taken}.name",
+                f"The arm's own bodies have the names {', '.join(own)}: give the obstacle another name.",
+            )
 
     def _check_limits(self) -> None:
         limits, robot = self.active_limits, self.robot.limits

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -12,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arrays import LARGEST, SMALLEST, frozen, placement
+from optimizer.problem.names import check_name, first_repeated
 
 # most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
 MOST_OBSTACLES, MOST_VERTICES = 64, 256
@@ -98,7 +98,10 @@ Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at least `margin` [m]."""
+    """A shape at `T_base_shape` (4, 4) in the base frame; its clearance from the arm must be at least `margin` [m].
+
+    Answers call it `name`: see `optimizer.problem.names`. Raises InvalidProblem, with the field named.
+    """
 
     name: str
     shape: Shape
@@ -106,11 +109,10 @@ class Obstacle:
     margin: float = DEFAULT_MARGIN
 
     def __post_init__(self) -> None:
-        if not self.name:
-            raise InvalidProblem("scene.obstacles", "Every obstacle needs a name.")
+        check_name("name", self.name)
         if not (0 <= self.margin <= 1):
-            raise InvalidProblem("scene.obstacles", "margin must be between 0 and 1 m.")
-        object.__setattr__(self, "T_base_shape", placement(self.T_base_shape, "scene.obstacles"))
+            raise InvalidProblem("margin", "margin must be between 0 and 1 m.")
+        object.__setattr__(self, "T_base_shape", placement(self.T_base_shape, "pose"))
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class Attachment:
 
 @dataclass(frozen=True)
 class Scene:
-    """Obstacles, each with a name of its own."""
+    """Obstacles, each with a name of its own. Raises InvalidProblem if two names read alike."""
 
     obstacles: Sequence[Obstacle] = ()
 
@@ -143,8 +145,17 @@ class Scene:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if len(self.obstacles) > MOST_OBSTACLES:
             raise InvalidProblem("scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles.")
-        if any(count > 1 for count in Counter(obstacle.name for obstacle in self.obstacles).values()):
-            raise InvalidProblem("scene.obstacles", "Two obstacles have the same name: name each differently.")
+        repeated = first_repeated(self.names)
+        if repeated is not None:
+            raise InvalidProblem(
+                f"scene.obstacles.{repeated}.name",
+                "Two obstacles have the same name, but for case and spaces: give each another name.",
+            )
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the obstacles."""
+        return [obstacle.name for obstacle in self.obstacles]
 
 
 def capsule_between(first: Array, second: Array, radius: float, touches: Sequence[str] | None = None) -> Attachment:

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from optimizer.deadline import Clock, Deadline
+from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from optimizer.energy.bus_flow import charges
 from optimizer.energy.losses import breakdown, power_flow
 from optimizer.energy.plant import Plant
@@ -35,6 +35,8 @@ from optimizer.trajectories.quadrature import lobatto_panels
 LONGEST_PANEL, MOST_PANELS = 0.2, 256
 MOST_SEGMENTS = 10_000
 """Most segments of a motion that are listed one by one."""
+# segments between two looks at the deadline: some ten milliseconds
+SEGMENTS_PER_CHECK = 64
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,13 @@ def evaluate(
     """
     end = Deadline.after(deadline, clock)
     evaluator = _Evaluator(arm, motion, sample_period)
-    for block in piecewise_motion(arm, motion):
-        if end.passed:
-            raise DeadlineExceeded([])
-        evaluator.update(block)
+    try:
+        with watch(end):
+            for block in piecewise_motion(arm, motion):
+                checkpoint()
+                evaluator.update(block)
+    except DeadlinePassed:
+        raise DeadlineExceeded([]) from None
     return evaluator.finish()
 
 
@@ -165,7 +170,9 @@ class _Evaluator:
         first = np.searchsorted(nodes.piece, np.arange(len(block.segment) + 1))
         segment = block.segment if self._segment_count <= MOST_SEGMENTS else np.zeros_like(block.segment)
         edges = np.append(np.flatnonzero(np.diff(segment, prepend=-1)), len(segment))
-        for low, high in pairwise(edges.tolist()):
+        for k, (low, high) in enumerate(pairwise(edges.tolist()), 1):
+            if k % SEGMENTS_PER_CHECK == 0:
+                checkpoint()
             inside = first[steps[(steps > low) & (steps < high)]]
             energy = self._energy(nodes, int(first[low]), int(first[high]), inside, float(charge[first[low]]))
             kinetic = self._kinetic(nodes, int(first[low])), self._kinetic(nodes, int(first[high]) - 1)

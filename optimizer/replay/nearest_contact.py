@@ -10,6 +10,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.close_pass import CLOSE, model_without_margins
 from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
+from optimizer.deadline import checkpoint
 from optimizer.problem.arm import Arm
 from optimizer.replay.piecewise_motion import PiecewiseMotion
 
@@ -97,6 +98,8 @@ class _LeastSampled:
         at_once = max(CHECKS // max(len(self._model.pairs), 1), 1)
         least = np.inf
         for low in range(0, len(q), at_once):
+            if low:
+                checkpoint()
             for k, closest in enumerate(self._model.closest_pairs(q[low : low + at_once], within), low):
                 least = min(least, closest.distance)
                 if self._closest is None or closest.distance < self._closest.distance:

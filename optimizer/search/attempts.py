@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
-from optimizer.methods.method import Method, SolveResult, SolveStatus
+from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.solution import CandidateStatus
@@ -18,6 +21,15 @@ from optimizer.solution import CandidateStatus
 def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
     """The solver of the problem's method for a candidate, in one interval of durations."""
     return solver_for(incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval)
+
+
+def in_time(incumbent: Incumbent, attempt: Callable[[], SolveResult]) -> SolveResult:
+    """The result of an attempt, whose effort is counted; without a motion if it does not end before the deadline."""
+    try:
+        with watch(incumbent.deadline):
+            return incumbent.add_effort(attempt())
+    except DeadlinePassed:
+        return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
 
 
 def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
@@ -32,7 +44,7 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
         solver = solver_of(incumbent, candidate, interval)
         if best is not None and best.energy is not None:
             solver.best_known = best.energy
-        results.append(incumbent.add_effort(solver.solve()))
+        results.append(in_time(incumbent, solver.solve))
     solved = [result for result in results if result.spline is not None]
     if len(solved) > 1:
         solved.sort(key=lambda result: _objective(incumbent, result))
@@ -73,6 +85,7 @@ def solve_from(
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal, surplus_value):
         if duration is not None:
             interval = replace(interval, t_min=duration, t_max=duration)
-        result = incumbent.add_effort(solver_of(incumbent, candidate, interval).solve_from(q, t, fine))
+        solver = solver_of(incumbent, candidate, interval)
+        result = in_time(incumbent, partial(solver.solve_from, q, t, fine))
         if result.spline is not None:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))

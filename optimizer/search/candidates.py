@@ -11,6 +11,7 @@ from itertools import product
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.methods.method import SolveResult
 from optimizer.prepared_problem import PreparedProblem
@@ -24,6 +25,8 @@ from optimizer.trajectories.spline import Spline
 FULL_TURN = 2 * np.pi
 # 64 poses from a given start make 16384, two poses 2048; each is named in the answer with some 400 bytes
 MOST_PAIRS = 32768
+# pairs between two looks at the deadline: some ten milliseconds
+PAIRS_PER_CHECK = 1024
 # joint displacements that differ by less are the same [rad]
 SAME_TRAVEL = 1e-9
 
@@ -113,8 +116,12 @@ def pairs(
     Raises InvalidProblem if several targets make too many pairs.
     """
     result: list[Candidate] = []
+    due = PAIRS_PER_CHECK
     for start in starts:
         for goal in goals:
+            if len(result) > due:
+                checkpoint()
+                due = len(result) + PAIRS_PER_CHECK
             windings = prepared.problem.windings and not (start.sampled or goal.sampled)
             options = [
                 _joint_options(s, g, start.fixed or goal.fixed, windings)

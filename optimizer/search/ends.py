@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Array, Robot
+from optimizer.deadline import checkpoint
 from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import (
     full_turn_alternatives,
@@ -25,6 +26,8 @@ from optimizer.solution import UnreachableTarget
 SAMPLES, LEAST_SAMPLES = 96, 12
 # members of the self-motion of a pose, and of each sample of a pose of free orientation
 MEMBERS, FEW_MEMBERS = 24, 4
+# samples between two looks at the deadline: some ten milliseconds
+SAMPLES_PER_CHECK = 24
 # share of the tool's cone that a goal of free orientation may use: on its edge the motion could not leave the goal
 INSIDE = 0.999
 # label of joint positions of an arm without named branches
@@ -67,6 +70,7 @@ def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], 
     reached: list[EndConfiguration] = []
     unreachable: list[UnreachableTarget] = []
     for index, member in enumerate(target.targets):
+        checkpoint()
         try:
             reached += _ends_of(prepared, name, member, index, max(SAMPLES // max(tolerance, 1), LEAST_SAMPLES))
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
@@ -123,7 +127,9 @@ def _ends_of_samples(
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
-    for R in sample_orientations(pose, tried):
+    for k, R in enumerate(sample_orientations(pose, tried)):
+        if k % SAMPLES_PER_CHECK == SAMPLES_PER_CHECK - 1:
+            checkpoint()
         try:
             found += [
                 replace(end, tolerance=pose, self_motion=None)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from optimizer.exceptions import DurationTooShort
 from optimizer.methods.duration_intervals import fastest as all_durations
-from optimizer.search.attempts import solve_from, solver_of
+from optimizer.search.attempts import in_time, solve_from, solver_of
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import activate_deferred
@@ -51,9 +53,9 @@ def fastest(incumbent: Incumbent) -> tuple[Candidate, Spline] | None:
 def fastest_from(incumbent: Incumbent, candidate: Candidate, spline: Spline) -> Spline | None:
     """The fastest motion of one candidate, optimised from one of its motions; None if none was found."""
     solver = solver_of(incumbent, candidate, all_durations(incumbent.prepared))
-    return incumbent.add_effort(solver.solve_from(*sampled(spline), fine=False)).spline
+    return in_time(incumbent, partial(solver.solve_from, *sampled(spline), fine=False)).spline
 
 
 def fastest_of(incumbent: Incumbent, candidate: Candidate) -> Spline | None:
     """The fastest motion of one candidate, whatever durations the problem allows; None if none was found."""
-    return incumbent.add_effort(solver_of(incumbent, candidate, all_durations(incumbent.prepared)).solve()).spline
+    return in_time(incumbent, solver_of(incumbent, candidate, all_durations(incumbent.prepared)).solve).spline

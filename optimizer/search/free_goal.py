@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import DeadlinePassed, watch
 from optimizer.kinematics.orientation_tolerance import tilt
 from optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
@@ -64,9 +65,11 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
     for _ in range(ROUNDS):
         if incumbent.deadline.passed or radius < LEAST_RADIUS:
             break
-        guess = _proposal(incumbent, best, radius)
-        q_goal = None if guess is None else nearest_configuration(incumbent.prepared, best.goal, guess.points[-1])
-        fresh = None if guess is None or q_goal is None else _solved(incumbent, best, q_goal, guess)
+        try:
+            with watch(incumbent.deadline):
+                fresh = _moved(incumbent, best, radius)
+        except DeadlinePassed:
+            break
         if fresh is None or (fresh.energy or 0.0) >= (best.energy or 0.0):
             radius /= 4
             continue
@@ -75,6 +78,13 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
         if gain < GAIN * abs(best.energy or 0.0):
             break
     return best
+
+
+def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> Candidate | None:
+    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved; None if it has no motion."""
+    guess = _proposal(incumbent, candidate, radius)
+    q_goal = None if guess is None else nearest_configuration(incumbent.prepared, candidate.goal, guess.points[-1])
+    return None if guess is None or q_goal is None else _solved(incumbent, candidate, q_goal, guess)
 
 
 def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Guess) -> Candidate | None:

@@ -13,6 +13,7 @@ from optimizer.methods.method import Method, SolveResult
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
 from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.reserve import reserve
 from optimizer.solution import CandidateStatus, Certificate, Energy
 from optimizer.trajectories.spline import Spline
 
@@ -25,15 +26,22 @@ class Incumbent:
     """State of one search, shared by all of its stages.
 
     `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all attempts. `cut_short` says
-    that an attempt ended at the deadline although another attempt on the same candidate found a motion.
+    that an attempt ended at the deadline although another attempt on the same candidate found a motion. `end` is the
+    instant at which the answer is due, `longest` [s] the longest duration that the answer is known to have, perhaps.
     """
 
     prepared: PreparedProblem
-    deadline: Deadline
+    end: Deadline
     candidates: list[Candidate] = field(default_factory=list)
     iterations: int = 0
     solves: int = 0
     cut_short: bool = False
+    longest: float = 0.0
+
+    @property
+    def deadline(self) -> Deadline:
+        """The deadline of the search: `end`, less the time to certify and report a motion like those known so far."""
+        return self.end.earlier_by(reserve(self.problem, self.longest, len(self.candidates)))
 
     @property
     def problem(self) -> Problem:
@@ -57,6 +65,8 @@ class Incumbent:
 
     def add_effort(self, result: SolveResult) -> SolveResult:
         """Add an attempt's effort to the totals; returns the result unchanged."""
+        if result.spline is not None:
+            self.longest = max(self.longest, result.spline.duration)
         self.iterations += result.iterations
         self.solves += result.solves
         return result

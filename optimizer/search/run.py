@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer.deadline import Clock, Deadline
+from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
@@ -36,8 +36,8 @@ from optimizer.solution import (
 )
 from optimizer.trajectories.spline import Spline, lasting, sampled
 
-# share of the deadline kept for the certificate and the report of the answer, at most [s]
-RESERVE_SHARE, RESERVE = 0.2, 0.1
+# time after the deadline [s] at which a certificate is given up: better a little late than no answer
+OVERTIME = 0.1
 
 
 class Run:
@@ -46,17 +46,26 @@ class Run:
     def __init__(self, problem: Problem, known: Sequence[Spline] = (), clock: Clock = time.perf_counter) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.known = problem, known
-        deadline = Deadline.after(problem.deadline - min(RESERVE_SHARE * problem.deadline, RESERVE), clock)
-        self.incumbent = Incumbent(PreparedProblem.of(problem), deadline)
+        self.incumbent = Incumbent(PreparedProblem.of(problem), Deadline.after(problem.deadline, clock))
         self.unreachable: list[UnreachableTarget] = []
 
     def prepare(self) -> None:
         """Find the candidates, and give each its lower bound. Raises the errors of `optimize` that need no search."""
+        try:
+            with watch(self.incumbent.end):
+                self._prepare()
+        except DeadlinePassed:
+            raise self.too_late() from None
+
+    def _prepare(self) -> None:
         problem, prepared = self.problem, self.incumbent.prepared
         (starts, no_starts), (goals, no_goals) = (ends(prepared, name) for name in ("start", "goal"))
         self.unreachable = no_starts + no_goals
         self.incumbent.candidates = pairs(prepared, starts, goals)
         bound(prepared, self.incumbent.candidates)
+        checkpoint()
+        least = min(candidate.shortest for candidate in self.incumbent.candidates)
+        self.incumbent.longest = max(least, problem.duration_min or 0.0)
         if problem.arm.payload.mass > problem.arm.robot.rated_payload:
             rating = problem.arm.robot.rated_payload
             raise InvalidProblem(
@@ -86,10 +95,13 @@ class Run:
                 return answer
             incumbent.reject(best)
             self.explore()
-        reports = [candidate.report() for candidate in incumbent.candidates]
         if any(candidate.status is CandidateStatus.UNVISITED for candidate in incumbent.candidates):
-            raise DeadlineExceeded(reports)
+            raise self.too_late()
         raise self.no_trajectory()
+
+    def too_late(self) -> DeadlineExceeded:
+        """The error for no certified motion before the deadline."""
+        return DeadlineExceeded([candidate.report() for candidate in self.incumbent.candidates])
 
     def no_trajectory(self) -> NoTrajectory:
         """The error for no motion at all; it names the collision that stopped the best candidate, if there is one."""
@@ -153,8 +165,13 @@ class Run:
             return
         least, most = self.problem.duration_min or 0.0, self.problem.duration_max or np.inf
         known = lasting(spline, float(np.clip(spline.duration, least, most)))
-        energy = prepared.energy(known)
-        if incumbent.certified(candidate, known, energy).valid:
+        try:
+            with watch(incumbent.deadline):
+                energy = prepared.energy(known)
+                valid = incumbent.certified(candidate, known, energy).valid
+        except DeadlinePassed:
+            return
+        if valid:
             incumbent.accept_if_better(
                 candidate, SolveResult(SolveStatus.SOLVED, "a known motion, retimed", spline=known), energy
             )
@@ -168,13 +185,18 @@ class Run:
             solve_from(incumbent, candidate, sampled(result.spline), fine=False)
 
     def answer(self, best: Candidate, table: list[Baseline]) -> Solution | None:
-        """The solution around the best candidate; None if its certificate fails."""
+        """The solution around the best candidate; None if its certificate fails. Raises DeadlineExceeded."""
         incumbent, spline = self.incumbent, best.spline
         prepared, candidates = incumbent.prepared, incumbent.candidates
-        energy = prepared.energy(spline)
-        certificate = incumbent.certified(best, spline, energy)
-        if not certificate.valid:
-            return None
+        try:
+            with watch(incumbent.end.earlier_by(-OVERTIME)):
+                energy = prepared.energy(spline)
+                certificate = incumbent.certified(best, spline, energy)
+                if not certificate.valid:
+                    return None
+                trajectory = prepared.trajectory(spline, self.problem.sample_period)
+        except DeadlinePassed:
+            raise self.too_late() from None
         objective = energy.of(self.problem.objective)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
         for candidate in open_:
@@ -192,7 +214,7 @@ class Run:
             status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
-            trajectory=prepared.trajectory(spline, self.problem.sample_period),
+            trajectory=trajectory,
             energy=energy,
             lower_bound=min([family, *(each.lower_bound for each in candidates if not each.sampled)]),
             baselines=table,

@@ -31,7 +31,7 @@ from optimizer.problem.branches import BranchFilter
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.search.baselines import saving
-from optimizer.search.run import RESERVE
+from optimizer.search.reserve import RESERVE
 from optimizer.solution import Certificate, Solution
 from optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.clocks import LAST_READINGS, CountingClock

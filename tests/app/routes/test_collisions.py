@@ -155,7 +155,11 @@ def test_a_free_goal_keeps_within_the_cone(client: TestClient) -> None:
         ({"limits": {"tcp_speed": 0.0}}, ["body", "limits", "tcp_speed"]),
         ({"limits": {"elbow_speed": -1.0}}, ["body", "limits", "elbow_speed"]),
         ({"collisions": 1}, ["body", "collisions"]),
-        ({"scene": {"obstacles": floor(0)["obstacles"] * 2}}, ["body", "scene", "obstacles"]),
+        ({"scene": {"obstacles": floor(0)["obstacles"] * 2}}, ["body", "scene", "obstacles", 1, "name"]),
+        *[
+            ({"scene": floor(0, name=name)}, ["body", "scene", "obstacles", 0, "name"])
+            for name in ("wrist_1", "tool", "payload", "Tool ", "\x7fkept/0\x7f", "a\u202eb", "", " ", "x" * 65)
+        ],
     ],
 )
 def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:

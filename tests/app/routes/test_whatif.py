@@ -257,7 +257,12 @@ def change(**arm: Any) -> dict[str, Any]:
         ({"changes": []}, ["changes"]),
         ({"changes": [{"name": f"{k}", "arm": {"payload": None}} for k in range(17)]}, ["changes"]),
         ({"changes": [{"name": "twice", "arm": {"payload": None}}] * 2}, ["changes"]),
+        ({"changes": [{"name": n, "arm": {"payload": None}} for n in ("twice", "Twice ")]}, ["changes"]),
         ({"changes": [{"name": "\x7fstored/0\x7f", "arm": {"payload": None}}]}, ["changes", 0, "name"]),
+        (
+            change(scene={"obstacles": [{"name": "tool", "shape": "half_space"}]}),
+            ["changes", 1, "arm", "scene", "obstacles", 0, "name"],
+        ),
         ({"evaluate": GIVEN}, []),
         ({"optimize": None}, []),
         ({"optimize": LIFT | {"limits": {"velocity": [1.0]}}}, ["optimize", "limits", "velocity"]),
@@ -273,6 +278,22 @@ def test_refuses_what_cannot_be_asked(client: TestClient, fields: dict[str, Any]
     assert "none of these" not in answer.text
 
 
+@pytest.mark.parametrize("text", ["stored/0", "/answers/0", "{0}", "%s", "\\u007fkept/0\\u007f", '","answer":"'])
+def test_texts_of_the_caller_come_back_as_they_are(client: TestClient, text: str) -> None:
+    """A change's name, and an obstacle's in the problem of a change; paths of answers lead where they say."""
+    pose = {"position": tcp_pose(np.array(HOME)).T[:3, 3].tolist(), "rotvec": [0, 0, 0]}
+    ball = {"name": text, "shape": "sphere", "radius": 0.15, "pose": pose}
+    answer = client.post(
+        "/whatif",
+        json=body(changes=[{"name": text, "arm": {"scene": {"obstacles": [ball]}}}]),
+        headers={"X-Request-ID": "kept-0"},
+    ).json()
+    (row,) = answer["changes"]
+    assert (answer["id"], row["name"]) == ("kept-0", text)
+    assert text in row["problem"]["pair"] and text in row["problem"]["detail"]
+    assert kept(client, answer["base"]["answer"], "optimize")["id"] == "kept-0"
+
+
 def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
     answer = client.post("/whatif", json=body(optimize=LIFT | {"duration": 0.01}))
     assert answer.json()["type"] == "/problems/duration-too-short"
@@ -281,7 +302,8 @@ def test_refuses_a_base_that_cannot_be(client: TestClient) -> None:
 def test_answers_that_are_too_large_together_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(answer_collector, "MOST_BYTES", 25)
     collector = AnswerCollector()
-    placeholders = [collector.add({"v": 1.5}) for _ in range(2)]
-    assert len(set(placeholders)) == len(collector.stored) == 2
+    paths = [collector.add({"v": 1.5}) for _ in range(2)]
+    assert len(set(paths)) == len(collector.stored) == 2
+    assert paths == [answer.path for answer in collector.stored]
     with pytest.raises(InvalidRequest):
         collector.add({"v": 1.5})

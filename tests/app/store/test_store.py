@@ -18,13 +18,16 @@ from alembic.migration import MigrationContext
 from sqlalchemy import func, select, text, update
 from starlette.testclient import TestClient
 
+from app.engine.result import StoredAnswer, TaskResult
 from app.exceptions import StoreUnavailable, UnknownAnswer
+from app.schemas import answers as schemas
 from app.schemas import errors as problems
-from app.schemas.answers import StoredAnswer
+from app.settings import Settings
 from app.store import answers
 from app.store.database import create_database_engine, migrate
 from app.store.store import Store
-from app.store.tables import Answer, Table, now
+from app.store.store_answers import store_answers
+from app.store.tables import Answer, Table, new_id, now
 from tests.app.databases import Postgres, postgres, why_no_postgres
 from tests.app.live import ROOT, serving
 from tests.app.requests import move
@@ -113,6 +116,22 @@ def test_answers_are_kept_whole(url: str) -> None:
     with_store(url, test)
 
 
+def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
+    """A document repeats texts of the caller: none of them may stand for anything else."""
+    kept = [StoredAnswer(new_id(), b'{"k": 0}'), StoredAnswer(new_id(), b'{"k": 1}')]
+    texts = [f"\x7f{word}/{k}\x7f" for word in ("kept", "stored") for k in range(2)]
+    result = TaskResult.of_json({"names": texts, "answers": [answer.path for answer in kept]}, tuple(kept))
+
+    async def test(store: Store) -> None:
+        done = await store_answers(store, Settings(), "optimize", result)
+        assert (done.document, done.media_type, done.stored) == (result.document, result.media_type, ())
+        for answer in kept:
+            _, body = await store.read(partial(answers.get, answer_id=answer.path.removeprefix("/answers/")))
+            assert body == answer.body
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
 def test_the_oldest_answers_make_room(url: str) -> None:
     async def test(store: Store) -> None:
         ids = [await store.write(partial(answers.put, kind="optimize", body=b"{}")) for _ in range(5)]
@@ -161,7 +180,7 @@ def test_answers_over_http(client: TestClient) -> None:
     answer_id = client.portal.call(store.write, partial(answers.put, kind="ik", body=b'{"solutions": [1.5]}'))
     answer = client.get(f"/answers/{answer_id}")
     assert answer.status_code == 200, answer.text
-    StoredAnswer.model_validate_json(answer.content)
+    schemas.StoredAnswer.model_validate_json(answer.content)
     assert answer.json()["answer"] == {"solutions": [1.5]}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import chain, pairwise, repeat
 from typing import Any
 
 import numpy as np
@@ -255,10 +255,10 @@ def test_refuses_a_log_without_a_motion(rows: int) -> None:
 
 
 def test_keeps_its_deadline() -> None:
-    def at(*instants: float) -> Any:
-        return iter(instants).__next__
+    def at(first: float, later: float) -> Any:
+        return chain([first], repeat(later)).__next__
 
-    # the clock is read at the start and before each block: this motion has one
+    # the clock is read at the start, and again and again before each block and within it
     assert evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 11.9)).segment_count == 2
     with pytest.raises(DeadlineExceeded):
         evaluate(ARM, motion("quintic"), deadline=2.0, clock=at(10.0, 12.1))

@@ -31,7 +31,7 @@ from optimizer.problem.targets import AnyOf
 from optimizer.search.free_goal import goal_constraints
 from optimizer.search.free_goal_bound import family_bound
 from optimizer.search.lower_bound import lower_bounds
-from optimizer.search.run import RESERVE
+from optimizer.search.reserve import RESERVE
 from optimizer.solution import Solution
 from optimizer.trajectories import bspline
 from tests.optimizer.chains import serial_chain

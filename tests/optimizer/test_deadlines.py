@@ -1,0 +1,214 @@
+"""Deadlines hold wherever the time goes: by a clock that moves with the work that is done, not with the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from threading import Thread
+from typing import Any
+
+import daqp
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from optimizer import optimize, pareto
+from optimizer.collision import coal_distance
+from optimizer.collision.model import CollisionModel
+from optimizer.deadline import NEVER, Deadline, DeadlinePassed, checkpoint, watch, watched_time_left
+from optimizer.energy import kernel
+from optimizer.exceptions import DeadlineExceeded
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import Mesh, Obstacle, Scene
+from optimizer.search.reserve import reserve
+from optimizer.whatif import whatif
+from tests.optimizer.cells import at
+from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
+
+# what the work of a call takes on one core [s]: per node of the kernel, instant of Pinocchio's recursion, forward
+# kinematics, distance by Coal, row of a quadratic program
+NODE, INSTANT, PLACEMENT, DISTANCE, ROW = 1.2e-6, 1.5e-6, 3e-6, 6e-6, 2e-5
+# the most that a deadline may be overrun [s]
+OVERRUN = 0.3
+
+
+class WorkClock:
+    """Stands still but for the work that is done."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def charged(self, call: Callable[..., Any], price: Callable[..., float]) -> Callable[..., Any]:
+        """The call, whose work moves the clock."""
+
+        def run(*args: Any, **fields: Any) -> Any:
+            self.now += price(*args, **fields)
+            return call(*args, **fields)
+
+        return run
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> WorkClock:
+    """A clock that every expensive call of the library moves."""
+    mine = WorkClock()
+    prices: list[tuple[Any, str, Callable[..., float]]] = [
+        (kernel._Evaluation, "__call__", lambda self, *arguments: NODE * len(arguments[0])),
+        (pin, "rneaInParallel", lambda threads, pool, q, *rest: INSTANT * q.shape[1]),
+        (pin, "forwardKinematics", lambda *arguments: PLACEMENT),
+        (coal_distance.coal, "distance", lambda *arguments: DISTANCE),
+        (daqp, "solve", lambda H, f, A, *rest, **fields: ROW * len(A)),
+    ]
+    for owner, name, price in prices:
+        monkeypatch.setattr(owner, name, mine.charged(getattr(owner, name), price))
+    return mine
+
+
+def crowded() -> Scene:
+    """64 meshes around the arm, which Coal measures one by one."""
+    rng, things = np.random.default_rng(3), list[Obstacle]()
+    while len(things) < 64:
+        direction = rng.normal(size=3)
+        where = direction / np.linalg.norm(direction) * rng.uniform(0.6, 1.1)
+        thing = Obstacle(f"thing {len(things)}", Mesh(rng.normal(size=(24, 3)) * 0.03), at(where))
+        if CollisionModel(Arm(robot=ROBOT, scene=Scene([thing]))).least_distance(np.array([START, GOAL]), 0.02) > 0.01:
+            things.append(thing)
+    return Scene(things)
+
+
+HARD: dict[str, Problem] = {
+    "slow TCP": problem(tcp_speed=5e-3),
+    "slow joints": problem(limits=ROBOT.limits.tightened(v_max=np.full(6, 0.02))),
+    "ten minutes": problem(duration_min=600.0, duration_max=600.0, sample_period=0.01),
+    "crowded": problem(goal=tcp_pose(GOAL), scene=crowded(), collisions=True),
+    "mechanical": problem(tcp_pose(START), tcp_pose(GOAL), objective="mechanical", duration_max=1.5, windings=False),
+}
+
+
+@pytest.mark.parametrize("deadline", [0.02, 0.3, 1.0, 2.0])
+@pytest.mark.parametrize("kind", HARD)
+def test_nothing_overruns(clock: WorkClock, kind: str, deadline: float) -> None:
+    asked = due(HARD[kind], deadline)
+    try:
+        answer = optimize(asked, clock)
+    except DeadlineExceeded:
+        pass
+    else:
+        assert answer.certificate.valid
+    assert clock.now > 0
+    assert clock.now < deadline + OVERRUN
+
+
+def due(asked: Problem, deadline: float) -> Problem:
+    """The problem with another deadline [s]."""
+    return replace(asked, deadline=deadline)
+
+
+@pytest.mark.parametrize("kind", ["slow TCP", "ten minutes", "crowded"])
+def test_a_front_does_not_overrun(clock: WorkClock, kind: str) -> None:
+    asked = HARD["slow TCP" if kind == "ten minutes" else kind]
+    try:
+        front = pareto(due(asked, 1.0), 8, clock)
+    except DeadlineExceeded:
+        pass
+    else:
+        assert all(point.certificate.valid for point in front.points)
+    assert 0 < clock.now < 1.0 + OVERRUN
+
+
+def test_a_change_does_not_overrun(clock: WorkClock) -> None:
+    """Two minutes of motion, certified on the changed arm and optimised for it, in a second of work."""
+    base = optimize(due(HARD["slow joints"], 60.0), clock)
+    began = clock.now
+    with suppress(DeadlineExceeded):
+        whatif(base, due(HARD["slow joints"], 0.2), clock)
+    assert clock.now - began < 0.2 + OVERRUN
+
+
+def test_what_was_verified_by_then_is_answered(clock: WorkClock) -> None:
+    """Many candidates, of which the time is enough for some."""
+    whole = optimize(due(HARD["mechanical"], 1e6), clock)
+    needed = clock.now
+    answer = optimize(due(HARD["mechanical"], needed / 4), clock)
+    assert answer.status == "feasible" and answer.certificate.valid
+    assert any(each.status == "unvisited" for each in answer.candidates)
+    assert answer.energy.mechanical.total >= whole.energy.mechanical.total * (1 - 1e-9)
+    assert clock.now - needed < needed / 4 + OVERRUN
+
+
+def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:
+    """A TCP at 1 mm/s: three minutes of motion, certified at 180,000 instants, within two seconds of work."""
+    asked = problem(
+        start=np.array([0, -1.57, 1.57, -1.57, -1.57, 0]),
+        goal=np.array([0.3, -1.4, 1.4, -1.5, -1.57, 0.2]),
+        tcp_speed=1e-3,
+        sample_period=0.01,
+        deadline=2.0,
+    )
+    answer = optimize(asked, clock)
+    assert answer.certificate.valid and answer.duration > 100
+    assert clock.now < 2.0 + OVERRUN
+
+
+def test_a_quadratic_program_gets_no_more_than_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[float] = []
+    solve = daqp.solve
+
+    def limited(*args: Any, **fields: Any) -> Any:
+        given.append(fields["time_limit"])
+        return solve(*args, **fields)
+
+    monkeypatch.setattr(daqp, "solve", limited)
+    optimize(problem(deadline=50.0), WorkClock())
+    assert given and all(0 < limit <= 50.0 for limit in given)
+
+
+def test_a_longer_answer_leaves_more_time_for_its_end() -> None:
+    asked = problem(deadline=10.0)
+    kept = [reserve(asked, duration, 1) for duration in (0.1, 1.0, 10.0, 100.0, 1e6)]
+    assert kept == sorted(kept) and kept[0] >= 0.1 and kept[-1] < 10.0
+    assert reserve(asked, 1.0, 10_000) > reserve(asked, 1.0, 1)
+
+
+# --- watching ---
+
+
+def test_the_innermost_deadline_counts() -> None:
+    checkpoint()
+    assert watched_time_left() == float("inf")
+    with watch(Deadline(2.0, lambda: 1.0)):
+        checkpoint()
+        checkpoint(needed=1.0)
+        assert watched_time_left() == 1.0
+        with pytest.raises(DeadlinePassed):
+            checkpoint(needed=1.5)
+        with watch(Deadline(0.5, lambda: 1.0)), pytest.raises(DeadlinePassed):
+            checkpoint()
+        with watch(NEVER):
+            checkpoint(needed=1e9)
+        checkpoint()
+    checkpoint(needed=1e9)
+
+
+def test_each_thread_watches_its_own() -> None:
+    ended: list[bool] = []
+
+    def other() -> None:
+        checkpoint()
+        ended.append(True)
+
+    with watch(Deadline(0.0, lambda: 1.0)):
+        thread = Thread(target=other)
+        thread.start()
+        thread.join()
+    assert ended == [True]
+
+
+def test_an_earlier_deadline() -> None:
+    deadline = Deadline(5.0, lambda: 1.0)
+    assert deadline.earlier_by(1.5).left == 2.5 and deadline.earlier_by(-1.0).left == 5.0
