@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
@@ -169,9 +170,9 @@ class _Solver:
         bent = self.p.path_rows.hessian(at.path_values, at.T, self.multipliers.path)
         H = (self.line.hessian + bent) * self.cost_scale
         H[-1, -1] += self.multipliers.curvature
-        H = _convex(H[:n, :n] * np.outer(self.scale, self.scale))
+        H, whitening = _convex(H[:n, :n] * np.outer(self.scale, self.scale))
         ratio = at.kinematics / self.qp.rates(at.T)[:, None, :]
-        return QPInputs(H, g, at.free, at.T, self.line, at.path_values, ratio)
+        return QPInputs(H, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
 
     def _line_search(self, dx: Array, slope: float) -> _Point | None:
         """The first point along dx (n,), halving the step, that lowers the merit function enough; None if none does.
@@ -195,16 +196,15 @@ class _Solver:
         return None
 
 
-def _convex(H: Array) -> Array:
-    """H if it is positive definite, else H with its eigenvalues clamped from below."""
+def _convex(H: Array) -> tuple[Array, Array]:
+    """H (n, n) if it is positive definite, else H with its eigenvalues clamped from below; and W with Wᵀ H W = 1."""
     H = 0.5 * (H + H.T)
-    try:
-        np.linalg.cholesky(H)
-        return H
-    except np.linalg.LinAlgError:
-        values, vectors = np.linalg.eigh(H)
-        floor = EIGENVALUE_FLOOR * max(1.0, np.abs(values).max())
-        return np.asarray((vectors * np.maximum(np.abs(values), floor)) @ vectors.T)
+    L, failed = dpotrf(H, lower=1)
+    if not failed:
+        return H, np.ascontiguousarray(dtrtri(L, lower=1)[0].T)
+    values, vectors = np.linalg.eigh(H)
+    clamped = np.maximum(np.abs(values), EIGENVALUE_FLOOR * max(1.0, np.abs(values).max()))
+    return (vectors * clamped) @ vectors.T, vectors / np.sqrt(clamped)
 
 
 def solve(

@@ -2,12 +2,16 @@
 
 Speed, acceleration and jerk are limited at every point of a fine grid. Only their peaks, and the anchors of the basis,
 enter the QP when they come near a limit. The QP is solved by DAQP (dual active set; Arnström, Bemporad, Axehill 2022).
-If its step breaks a limit at another point, that point is added and the QP is solved again.
+If its step breaks a limit at another point, or a bound of a variable, this is added and the QP is solved again.
+
+DAQP gets the QP in variables y with x = W y that make the Hessian the identity. It would factorise the Hessian for each
+QP again, and transform all rows with it, at a tenth of the speed of BLAS.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import daqp
 import numpy as np
@@ -32,6 +36,9 @@ LEAST_TIME = 0.05
 Places = tuple[Index, Index, Index]  # derivative, grid point, coordinate
 Marks = npt.NDArray[np.bool_]
 
+# excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
+BOUND_TOLERANCE = 1e-9
+
 _DAQP_OPTIMAL = 1
 _ACTIVE, _EQUAL, _SOFT = 1, 5, 8
 _INFINITE = 1e30
@@ -41,11 +48,12 @@ _INFINITE = 1e30
 class QPInputs:
     """What the QP is made of at one iterate.
 
-    `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `ratio` (3, M, r) holds speed,
-    acceleration and jerk over their limits on the grid.
+    `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n, n) makes it
+    the identity, Wᵀ H W = 1. `ratio` (3, M, r) holds speed, acceleration and jerk over their limits on the grid.
     """
 
     hessian: Array
+    whitening: Array
     gradient: Array
     free: Array
     T: float
@@ -93,60 +101,73 @@ class _GoalRows:
     most: Array
 
 
-@dataclass
 class _Rows:
-    """Constraints A x ≤ b in the order goal, path, torque, kinematic. Variables and goal are never relaxed.
+    """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
-    `chosen` (3, M, r) marks the grid points with a kinematic row, `places` lists them in the order of the rows.
+    `hard` rows are never relaxed. `chosen` (3, M, r) marks the grid points with a kinematic row, `places` lists them,
+    and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the lower and upper bounds with a row.
     """
 
-    goal: _GoalRows
-    lower: Array
-    upper: Array
-    A: Array
-    b: Array
-    chosen: Marks
-    places: Places
+    def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
+        self.whitening, n = whitening, len(whitening)
+        self.A, self.least, self.most = np.zeros((0, n)), np.zeros(0), np.zeros(0)
+        self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+        self.chosen, self.bounded = np.zeros(grid, dtype=bool), np.zeros((2, n), dtype=bool)
+        none = np.zeros(0, dtype=int)
+        self.places: Places = (none, none, none)
+        self.kinematic: Index = none
+        self.sides: tuple[Index, Index] = (none, none)
+        self.bounds: Index = none
 
-    @property
-    def hard(self) -> int:
-        """Number of bounds and rows that may not be relaxed."""
-        return len(self.lower) + len(self.goal.gradients)
+    def add(self, gradients: Array, most: Array, least: Array | None = None, hard: bool = False) -> Index:
+        """Add rows with gradients (rows, n) by the scaled variables, and return their numbers."""
+        first, count = len(self.most), len(most)
+        self.A = np.concatenate([self.A, gradients @ self.whitening])
+        self.least = np.concatenate([self.least, np.full(count, -_INFINITE) if least is None else least])
+        self.most = np.concatenate([self.most, most])
+        self.hard = np.concatenate([self.hard, np.full(count, hard)])
+        self.active = np.concatenate([self.active, np.zeros(count, dtype=bool)])
+        return first + np.arange(count)
 
-    @property
-    def fixed(self) -> Index:
-        """The rows of the goal that are equations."""
-        return np.asarray(len(self.lower) + np.flatnonzero(self.goal.least == self.goal.most))
+    def add_kinematic(self, gradients: Array, most: Array, places: Places) -> None:
+        """Add the rows of places that have none yet."""
+        self.kinematic = np.concatenate([self.kinematic, self.add(gradients, most)])
+        self.places = _joined(self.places, places)
+        self.chosen[places] = True
 
-    def solved(self, at: QPInputs, working: Marks, relax: bool) -> tuple[Array, Array, bool]:
-        """DAQP's x, the multipliers of bounds and rows, and whether it found them; `working` marks a first guess."""
-        sense = np.zeros(self.hard + len(self.b), dtype=np.int32)
+    def add_bounds(self, bounds: Array, wanted: Marks) -> None:
+        """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""
+        sides = np.nonzero(wanted & ~self.bounded)
+        side, variable = sides
+        gradients = np.zeros((len(side), len(self.whitening)))
+        sign = np.where(side, 1.0, -1.0)
+        gradients[np.arange(len(side)), variable] = sign
+        self.bounds = np.concatenate([self.bounds, self.add(gradients, sign * bounds[sides], hard=True)])
+        self.sides = _joined(self.sides, sides)
+        self.bounded[sides] = True
+
+    def solve(self, gradient: Array, relax: bool) -> tuple[Array, Array, bool]:
+        """DAQP's y, the multipliers of the rows, and whether it found them. `active` is its guess, then its result."""
+        sense = np.zeros(len(self.most), dtype=np.int32)
         if relax:
-            sense[self.hard :] = _SOFT
+            sense[~self.hard] = _SOFT
         else:
-            sense[: len(working)][working] = _ACTIVE
-        sense[self.fixed] = _EQUAL
-        least = np.concatenate([self.lower, self.goal.least, np.full(len(self.b), -_INFINITE)])
-        most = np.concatenate([self.upper, self.goal.most, self.b])
+            sense[self.active] = _ACTIVE
+        sense[self.least == self.most] = _EQUAL
         left = watched_time_left()
-        x, _, flag, info = daqp.solve(
-            at.hessian,
-            at.gradient,
-            self.A,
-            most,
-            least,
-            sense,
-            primal_tol=1e-9,
-            eps_prox=0.0,
-            rho_soft=1e-6,
-            # 0: no limit
-            time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,
-        )
-        return x, info["lam"], bool(flag >= _DAQP_OPTIMAL)
+        y, _, flag, info = daqp.solve(
+            np.eye(len(gradient)), gradient, self.A, self.most, self.least, sense,
+            primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6,
+            time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,  # 0: no limit
+        )  # fmt: skip
+        found = bool(flag >= _DAQP_OPTIMAL)
+        if found:
+            self.active = info["lam"] > 0
+        return y, info["lam"], found
 
 
 class WorkingSetQP:
-    """The QPs of one run of the SQP; it keeps the kinematic constraints that were active, for the next one.
+    """The QPs of one run of the SQP; it keeps the constraints that were active, for the next one.
 
     Variables x: free control points row by row, then T / time_scale if the duration is free.
     """
@@ -161,6 +182,7 @@ class WorkingSetQP:
         self._anchors = basis.anchors[:, :, None]
         self._orders = np.arange(1, 4)
         self._active = np.zeros((*basis.at_grid.shape[:2], program.r), dtype=bool)
+        self._bounded = np.zeros((2, self.n), dtype=bool)
 
     def rates(self, T: float) -> Array:
         """Limits on the first to third derivative of s by τ, (3, r), for the duration T [s]."""
@@ -168,15 +190,14 @@ class WorkingSetQP:
 
     def solve(self, at: QPInputs) -> QPStep | None:
         """The step; None if even the relaxed QP has no solution."""
-        torque = self._torque_rows(at)
+        goal, torque = self._goal_rows(at.free), self._torque_rows(at)
         path = self.p.path_rows.active(at.path_values, at.T, NEAR_PATH)
-        rows = self._rows(at, torque, path)
-        before = len(path.slack) + len(torque.slack)
-        working = np.concatenate([np.zeros(rows.hard + before, dtype=bool), self._active[rows.places]])
-        relaxed = False
+        rows, bounds = self._rows(at, goal, torque, path), np.array(self._bounds(at.free, at.T))
+        rows.add_bounds(bounds, self._bounded)
+        gradient, relaxed = at.gradient @ at.whitening, False
         for attempt in range(QP_ROUNDS):
             checkpoint()
-            x, multipliers, found = rows.solved(at, working, relaxed)
+            y, multipliers, found = rows.solve(gradient, relaxed)
             if not found:
                 checkpoint()
             if not found and relaxed:
@@ -184,30 +205,47 @@ class WorkingSetQP:
             if not found:
                 relaxed = True
                 continue
-            working = multipliers > 0
-            if attempt == QP_ROUNDS - 1 or not self._add_broken(rows, at, x):
+            x = at.whitening @ y
+            if attempt == QP_ROUNDS - 1 or not self._add_broken(rows, at, bounds, x):
                 break
-        mu = np.maximum(multipliers[rows.hard :], 0.0)
-        mu_path, mu_torque, kinematic = np.split(mu, [len(path.slack), before])
-        self._active[...] = False
-        held = kinematic > 0
-        self._active[tuple(place[held] for place in rows.places)] = True
+        mu = np.maximum(multipliers, 0.0)
+        kinds = np.cumsum([len(goal.least), len(path.slack), len(torque.slack)])
+        _, mu_path, mu_torque, _ = np.split(mu, kinds)
+        self._keep(rows, mu)
         passed = path.points, path.columns
-        return QPStep(x, relaxed, rows.places, kinematic, torque.nodes, torque.signs, mu_torque, passed, mu_path)
+        return QPStep(
+            _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
+            torque.nodes, torque.signs, mu_torque, passed, mu_path,
+        )  # fmt: skip
 
-    def _rows(self, at: QPInputs, torque: _TorqueRows, path: ActivePathConstraints) -> _Rows:
-        """The rows that the QP is first solved with."""
+    def _keep(self, rows: _Rows, mu: Array) -> None:
+        """Keep what was active for the next QP."""
+        for marks, places, numbers in (
+            (self._active, rows.places, rows.kinematic),
+            (self._bounded, rows.sides, rows.bounds),
+        ):
+            marks[...] = False
+            marks[places] = mu[numbers] > 0
+
+    def _rows(self, at: QPInputs, goal: _GoalRows, torque: _TorqueRows, path: ActivePathConstraints) -> _Rows:
+        """The rows that the QP is first solved with, but for bounds: goal, path, torque, kinematic."""
         size = np.abs(at.ratio)
         chosen = (size > NEAR) & (self._anchors | _peaks(size)) | self._active
         places: Places = np.nonzero(chosen)  # type: ignore[assignment]
-        goal = self._goal_rows(at.free)
-        kinematic = self._kinematic_rows(places, np.sign(at.ratio[places]), at.T)
-        A = np.concatenate([goal.gradients, self._scaled(path.gradients), torque.gradients, kinematic])
-        b = np.concatenate([path.slack, torque.slack, 1 - size[places]])
-        return _Rows(goal, *self._bounds(at.free, at.T), A, b, chosen, places)
+        rows = _Rows(at.whitening, size.shape)
+        rows.add(goal.gradients, goal.most, goal.least, hard=True)
+        rows.add(self._scaled(path.gradients), path.slack)
+        rows.add(torque.gradients, torque.slack)
+        rows.add_kinematic(self._kinematic_rows(places, np.sign(at.ratio[places]), at.T), 1 - size[places], places)
+        rows.active[rows.kinematic] = self._active[places]
+        return rows
 
-    def _add_broken(self, rows: _Rows, at: QPInputs, x: Array) -> bool:
-        """Add rows at the peaks that exceed a limit after the step x; whether there are any."""
+    def _add_broken(self, rows: _Rows, at: QPInputs, bounds: Array, x: Array) -> bool:
+        """Add the bounds that the step x breaks, and the peaks that exceed a limit after it; whether there are any."""
+        before = len(rows.most)
+        excess = np.array([bounds[0] - x, x - bounds[1]])
+        if (excess > BOUND_TOLERANCE).any():
+            rows.add_bounds(bounds, excess > BOUND_TOLERANCE)
         moved = (self._grid_free @ x[: self.count].reshape(at.free.shape)) / self.rates(at.T)[:, None, :]
         predicted = at.ratio + moved
         if self.free_time:
@@ -215,19 +253,13 @@ class WorkingSetQP:
             predicted /= np.maximum(growth, 1e-3)[:, None, None]
         size = np.abs(predicted)
         broken = size > 1 + FEASIBILITY / 4
-        if not broken.any():
-            return False
-        broken &= (self._anchors | _peaks(size)) & ~rows.chosen
-        fresh: Places = np.nonzero(broken)  # type: ignore[assignment]
-        if not len(fresh[0]):
-            return False
-        rows.chosen |= broken
-        # the row's sign is that of the value after the step, not before it
-        signs = np.sign(predicted[fresh])
-        rows.A = np.concatenate([rows.A, self._kinematic_rows(fresh, signs, at.T)])
-        rows.b = np.concatenate([rows.b, 1 - signs * at.ratio[fresh]])
-        rows.places = tuple(np.concatenate(both) for both in zip(rows.places, fresh, strict=True))  # type: ignore[assignment]
-        return True
+        if broken.any():
+            broken &= (self._anchors | _peaks(size)) & ~rows.chosen
+            fresh: Places = np.nonzero(broken)  # type: ignore[assignment]
+            # the row's sign is that of the value after the step, not before it
+            signs = np.sign(predicted[fresh])
+            rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh)
+        return len(rows.most) > before
 
     def _kinematic_rows(self, places: Places, signs: Array, T: float) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""
@@ -279,6 +311,18 @@ class WorkingSetQP:
         A[:, self.count - self.p.r : self.count] = constraints.rows
         moved = constraints.rows @ (free[-1] - self.p.coordinates.goal)
         return _GoalRows(A, constraints.lower - moved, constraints.upper - moved)
+
+
+def _joined(first: tuple[Index, ...], second: tuple[Index, ...]) -> Any:
+    """Indices of the first places, then of the second."""
+    return tuple(np.concatenate(both) for both in zip(first, second, strict=True))
+
+
+def _shortened(x: Array, bounds: Array) -> Array:
+    """The step, as far as the bounds (2, n) let it go: rounds may end before every bound has its row."""
+    most = np.where(x > 0, bounds[1], bounds[0])
+    beyond = np.abs(x) > np.abs(most) + BOUND_TOLERANCE
+    return np.asarray(x * np.min(np.abs(most[beyond] / x[beyond]), initial=1.0))
 
 
 def _peaks(size: Array) -> Marks:
