@@ -33,8 +33,8 @@ REST = 1e-3
 # share of the cost per greatest displacement, or per doubling of the time, that no multiplier accounts for; the
 # solver stops
 # where a further step promises 5e-5 of the cost: with a curvature h of the cost, (2 h · 5e-5)^½ may be left, and h is
-# of order 10 along the softest directions
-STATIONARY = 0.05
+# some tens along the softest directions
+STATIONARY = 0.07
 SAME = 1e-4  # relative; cost at one optimum reached along different ways
 GRID = 1e-3  # relative; a rate's peak between the points of the grid
 COARSE = bspline.uniform(11)
