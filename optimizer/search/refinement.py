@@ -10,6 +10,7 @@ from optimizer.search.attempts import solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
+from optimizer.search.sharpening import sharpen
 from optimizer.solution import Baseline, BaselineName
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.spline import Spline, least_time_scale, retimed, sampled
@@ -23,6 +24,7 @@ SURPLUS_VALUES = (0.75, 0.5, 0.25)
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
     method, problem, deadline = incumbent.method, incumbent.problem, incumbent.deadline
+    sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
         solve_from(incumbent, candidate, sampled(candidate.spline), fine=False)
     if not method.guess_baselines:
