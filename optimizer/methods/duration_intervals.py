@@ -46,11 +46,7 @@ def duration_intervals(
         surplus_value = max(problem.arm.bus.efficiency, problem.arm.regeneration)
     if problem.cycle is None or problem.objective == "mechanical":
         weights = {problem.objective: 1.0}
-        return [
-            DurationInterval(
-                prepared.parameters(**weights, regeneration=surplus_value, width=width), t_min, t_max
-            )
-        ]
+        return [DurationInterval(prepared.parameters(**weights, regeneration=surplus_value, width=width), t_min, t_max)]
     return [
         DurationInterval(
             prepared.parameters(electrical=1.0, time=-float(piece.power), regeneration=surplus_value, width=width),
