@@ -169,11 +169,9 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
     )
     bounds, shortest = lower_bounds(prepared, displacement, potential_gain, hold)
     if prepared.problem.objective == "mechanical":
-        q_start, q_goal = (
-            np.array([getattr(candidate, name) for candidate in candidates]) for name in ("q_start", "q_goal")
-        )
-        ends = np.array([[potential[id(candidate.start)], potential[id(candidate.goal)]] for candidate in candidates])
-        bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_goal, ends))
+        q_start = np.array([candidate.q_start for candidate in candidates])
+        levels = np.array([[potential[id(candidate.start)], potential[id(candidate.goal)]] for candidate in candidates])
+        bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_start + displacement, levels))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
         for name in ("start", "goal"):

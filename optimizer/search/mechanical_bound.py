@@ -14,21 +14,23 @@ the total variation of E between two rests, E(0) = U_0 and E(T) = U_1.
 
 Nothing else is known: h = max(U_0, U_1) and l = min(U_0, U_1) give |U_1 - U_0|.
 
-**Barrier.** Joints whose axes are parallel to gravity turn the arm about the vertical and leave U as it is. Let k be the
-first other joint. With the links beyond k lumped at the origin of joint k + 1, potential energy is a function of q_k
-alone, u(q_k) = constant + a cos q_k + b sin q_k. The true one differs by at most R = Σ_i m_i |g| r_i over the links i
-beyond k, where r_i, the length of the chain from that origin to the centre of mass of link i, is never less than their
-distance. On its way q_k takes every value between its ends, so E ≥ U ≥ u - R holds at the greatest of them: h = max u - R.
-At the least of them U ≤ u + R, so that l = min u + R + K_max, where K_max is the most kinetic energy under the limits.
+**Barrier.** Joints whose axes are parallel to gravity turn the arm about the vertical and leave U as it is. Let k be
+the first other joint. With the links beyond k lumped at the origin of joint k + 1, potential energy is a function of
+q_k alone, u(q_k) = constant + a cos q_k + b sin q_k. The true one differs by at most R = Σ_i m_i |g| r_i over the links
+i beyond k, where r_i, the length of the chain from that origin to the centre of mass of link i, is never less than
+their distance. On its way q_k takes every value between its ends, so E ≥ U ≥ u - R holds at the greatest of them:
+h = max u - R. At the least of them U ≤ u + R, so that l = min u + R + K_max, where K_max is the most kinetic energy
+under the limits on speed and acceleration: each link's centre of mass is no faster than Σ_j |v_j| times its greatest
+distance from the axis of joint j, and turns no faster than Σ_j |v_j|.
 
 **Travel.** From (2) with l = min(U_0, U_1), E(t) ≤ e = (W + U_0 + U_1) / 2 at all times. The mass matrix is that of the
 rotors, D = diag(rotor inertia), plus that of the links, which is positive semidefinite. With |v|_D² = vᵀ D v,
 
     |q_1 - q_0|_D ≤ ∫ |v|_D dt ≤ ∫ min( sqrt(2 max(e - U(q(t)), 0)), A min(t, T - t) ) dt,         (3)
 
-A = |a_max|_D, as v starts and ends at zero. U is bounded from below by the time that the arm has for falling: joint j is
-at most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start, and |∂U/∂q_j| ≤ G_j, the weight of the links
-that it carries times their greatest distances from its axis (zero for the joints before k). So
+A = |a_max|_D, as v starts and ends at zero. U is bounded from below by the time that the arm has for falling: joint j
+is at most s_j(t) = min(v_max t, a_max t² / 2, j_max t³ / 6) from its start, and |∂U/∂q_j| ≤ G_j, the weight of the
+links that it carries times their greatest distances from its axis (zero for the joints before k). So
 
     U(q(t)) ≥ max(U_0 - Σ_j G_j s_j(t), U_1 - Σ_j G_j s_j(T - t), least u - R).
 
@@ -56,8 +58,8 @@ from optimizer.problem.problem import LONGEST_DURATION
 CELLS, BISECTIONS = 32, 30
 # an axis counts as parallel to gravity up to this sine of the angle, the rounding of a placement
 PARALLEL = 1e-8
-# rounding of the potential energies, of the weight times the length of the arm; the bound gives it away
-ROUNDING = 1e-9
+# error of a potential energy as a share of weight times length of the arm: rounding, and the angle of PARALLEL axes
+ROUNDING = 1e-7
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,7 @@ class EnergyRange:
 
     @cached_property
     def rounding(self) -> float:
-        """What the potential energies are rounded by, at most [J]."""
+        """Greatest error of a potential energy [J]; the bound gives it away."""
         return ROUNDING * float(np.linalg.norm(self.gravity)) * float(self.lengths.sum(axis=0) @ self.masses)
 
     def most_kinetic(self, duration: Array) -> Array:
@@ -226,4 +228,4 @@ def _least_energy(arm: EnergyRange, displacement: Array, potentials: Array, leas
         middle = (low + high) / 2
         enough = reached(middle) >= needed
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-    return low
+    return np.asarray(low)

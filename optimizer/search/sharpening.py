@@ -1,12 +1,12 @@
 """Motions of least energy where every joint's power has a corner of its own: restarts, finer motions, sharper corners.
 
 The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j, 0). The NLP smooths
-these corners over `WIDTH`. It has one corner per joint, so that its optimum lies some percent above the least energy,
-and bends |tau_j v_j| most where a joint rests. Sharp corners from the start would leave the SQP in poor local optima.
-So the optimum is followed from one width to the next, in a space fine enough for the short pushes of such motions.
+these corners over `WIDTH`. Every joint has one, so that the optimum of the smoothed cost lies some percent above the
+least energy. Sharp corners from the start would leave the SQP in poor local optima. So the optimum is followed from one
+width to the next, in a space fine enough for the short pushes of such motions.
 
-The mechanical work of a motion has many local optima. As work is free while no joint moves, the best of them swing, push
-and rest, which few control points hardly show. Coarse restarts from random motions are cheap; the best are followed.
+The mechanical work of a motion has many local optima. As rest costs nothing, the best of them swing, push and rest,
+which few control points hardly show. Coarse solves from random motions are cheap; the best of them are followed.
 """
 
 from __future__ import annotations

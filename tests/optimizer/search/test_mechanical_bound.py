@@ -24,6 +24,8 @@ from tests.optimizer.moves import PAYLOAD, TILTED, fixed, limits, problem
 QUADRATURE = 1e-4
 # J; differences of potential energies of some 100 J in double precision
 EXACT = 1e-9
+# J; what the bound gives away for rounding and for axes that are not quite parallel to gravity
+GIVEN_AWAY = 1e-4
 # J/rad; central differences over 1e-5 rad
 DIFFERENCE = 1e-6
 
@@ -148,7 +150,7 @@ def test_over_the_top() -> None:
     # upper arm of 8.058 kg, its centre at half of 0.425 m, and 5.881 kg beyond, which may stay down
     lifted = 9.81 * (8.058 * 0.2125 + 5.881 * 0.425)
     top = EnergyRange(task).lumped[1] + lifted - EnergyRange(task).lumped[2]
-    assert bound(task, hanging[None], turned[None])[0] == pytest.approx(2 * (top - ends[0]), abs=1e-5)
+    assert bound(task, hanging[None], turned[None])[0] == pytest.approx(2 * (top - ends[0]), abs=GIVEN_AWAY)
 
 
 def test_weightless_travel() -> None:
@@ -168,4 +170,4 @@ def test_a_longer_duration_never_raises_the_bound() -> None:
     bounds = np.array([bound(prepared(T), start, goal) for T in (0.3, 0.6, 1.0, 3.0, 10.0)])
     assert (np.diff(bounds, axis=0) <= EXACT).all()
     climb = [abs(prepared(1.0).potential(b) - prepared(1.0).potential(a)) for a, b in zip(start, goal, strict=True)]
-    assert (bounds >= np.array(climb) - 1e-5).all()
+    assert (bounds >= np.array(climb) - GIVEN_AWAY).all()
