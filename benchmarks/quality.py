@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,9 @@ from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import JoulepathError
 from optimizer.optimize import optimize
 
+# so long that no search ends early, and its result does not depend on the machine [s]
+AMPLE = 600.0
+
 
 def main() -> None:
     """Solves every task that has a reference, and compares the energies."""
@@ -21,6 +25,7 @@ def main() -> None:
     arguments.add_argument("--count", type=int, help="tasks (all that have a reference)")
     arguments.add_argument("--objective", choices=tuple(FILES), default="electrical", help="(%(default)s)")
     arguments.add_argument("--reference", type=Path, help="the stored references (those of the objective)")
+    arguments.add_argument("--deadline", type=float, default=AMPLE, help="of each search [s] (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     robot = load_robot("ur5e")
@@ -34,7 +39,9 @@ def main() -> None:
             continue
         task = move(reference["seed"], row["index"])
         try:
-            energy = optimize(problem_of(task, given.objective)).energy.of(given.objective)
+            energy = optimize(replace(problem_of(task, given.objective), deadline=given.deadline)).energy.of(
+                given.objective
+            )
         except JoulepathError as error:
             print(f"index {task.index}: {error!r}")
             energy = float("inf")

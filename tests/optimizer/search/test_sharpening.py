@@ -59,7 +59,7 @@ def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
     assert after.energy == prepared.objective_of(prepared.energy(after.spline))
 
 
-@pytest.mark.parametrize("given", [{}, {"method": "time_scaling", "objective": "mechanical", "duration_max": 1.5}])
+@pytest.mark.parametrize("given", [{}, {"method": "uniform_scaling", "objective": "mechanical", "duration_max": 1.5}])
 def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str, Any]) -> None:
     incumbent = explored(**given)
     best = incumbent.best()
