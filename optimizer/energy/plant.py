@@ -21,6 +21,8 @@ from optimizer.trajectories.spline import Spline, fine_samples, sample
 # smoothing in the optimiser's cost: the reversal of friction [rad/s] and the corners of |power| [W]
 KNEE = 0.02
 WIDTH = 0.5
+# widths [W] of the solves that follow, one from the other, where every joint has a corner of its own
+SHARPER_WIDTHS = (0.1, 0.02)
 # quadrature points per panel for reported energies
 REPORT_NODES = 8
 # a last sample nearer to the one before than this fraction of a period is rounding
@@ -55,11 +57,13 @@ class Plant:
         mechanical: float = 0.0,
         time: float = 0.0,
         regeneration: float | None = None,
+        width: float = WIDTH,
     ) -> Array:
         """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1] and duration [W].
 
         `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply takes back. The cost of
-        an instant cannot depend on a charge: with an energy storage, this value stands for it.
+        an instant cannot depend on a charge: with an energy storage, this value stands for it. `width` [W] smooths the
+        corners of the cost.
         """
         payload, friction, drives = self.arm.payload, self.arm.friction_law, self.arm.drives
         return Parameters(
@@ -85,7 +89,7 @@ class Plant:
             mechanical=mechanical,
             time=time,
             knee=KNEE,
-            width=WIDTH,
+            width=width,
         ).pack()
 
     @cached_property

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from models.robot import Array
 from optimizer.energy.dwell import linear_dwells
+from optimizer.energy.plant import WIDTH
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 
@@ -31,11 +32,12 @@ class DurationInterval:
 
 
 def duration_intervals(
-    prepared: PreparedProblem, q_goal: Array, surplus_value: float | None = None
+    prepared: PreparedProblem, q_goal: Array, surplus_value: float | None = None, width: float = WIDTH
 ) -> list[DurationInterval]:
     """The intervals of a problem for motions that end at q_goal (nq,) [rad], in order of duration.
 
-    `surplus_value` [1] is the value of a joule of net surplus with energy storage; None: the highest possible.
+    `surplus_value` [1] is the value of a joule of net surplus with energy storage; None: the highest possible. `width`
+    [W] smooths the corners of the cost.
     """
     problem = prepared.problem
     t_min = LEAST_DURATION if problem.duration_min is None else problem.duration_min
@@ -43,12 +45,11 @@ def duration_intervals(
     if surplus_value is None and problem.arm.bus.mode == "storage":
         surplus_value = max(problem.arm.bus.efficiency, problem.arm.regeneration)
     if problem.cycle is None or problem.objective == "mechanical":
-        return [
-            DurationInterval(prepared.parameters(**{problem.objective: 1.0}, regeneration=surplus_value), t_min, t_max)
-        ]
+        weights = {problem.objective: 1.0}
+        return [DurationInterval(prepared.parameters(**weights, regeneration=surplus_value, width=width), t_min, t_max)]
     return [
         DurationInterval(
-            prepared.parameters(electrical=1.0, time=-float(piece.power), regeneration=surplus_value),
+            prepared.parameters(electrical=1.0, time=-float(piece.power), regeneration=surplus_value, width=width),
             max(t_min, piece.t_min),
             min(t_max, piece.t_max),
             float(piece.constant),

@@ -46,6 +46,7 @@ class FreeSpline(SqpMethod):
         "controller_default",
     )
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic", "ruckig", "ruckig_slowed")
+    evenly_spaced: ClassVar[bool] = True
 
     def solve(self) -> SolveResult:
         """From the smoothed time-optimal motion on evenly spaced knots.
@@ -95,8 +96,16 @@ class FreeSpline(SqpMethod):
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,), with knots REFINED, or EXACT if `fine`."""
+        return self._solve_in(self.graded(float(t[-1]), EXACT if fine else REFINED), q, t)
+
+    def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
+        """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots."""
+        self.progress = progress
+        return self._solve_in(bspline.uniform(count), q, t)
+
+    def _solve_in(self, space: Basis, q: Array, t: Array) -> SolveResult:
+        """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])
-        space = self.graded(duration, EXACT if fine else REFINED)
         points = space.fit(self.coordinates.from_joints(q), t / duration)
         # without clearance constraints, a motion from a planned path would return to the obstacle
         result = self.improve(

@@ -63,6 +63,8 @@ class Method(ABC):
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ()
     # greatest number of candidates that are solved
     most_solved: ClassVar[int | None] = None
+    # whether it has `solve_evenly`
+    evenly_spaced: ClassVar[bool] = False
     # whether it ends in a local optimum
     converges: ClassVar[bool] = True
     # energy of the best motion known [J], in the objective: motions that collide and need more are not solved further
@@ -89,6 +91,13 @@ class Method(ABC):
     def may_refine(found: Spline) -> bool:
         """Whether `solve_from` may improve the motion that `solve` found."""
         return False
+
+    def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
+        """Solve from samples q (k, nq) [rad] at times t (k,) [s] with `count` control points, evenly spaced in time.
+
+        The solve ends when a step promises less than the relative decrease `progress`.
+        """
+        return SolveResult(SolveStatus.FAILED, "the method has no evenly spaced control points")
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """Solve from samples q (k, nq) [rad] of a motion at times t (k,) [s] (warm start).

@@ -23,7 +23,7 @@ from optimizer.methods.limit_repair import (
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.nlp.coordinates import Coordinates
 from optimizer.nlp.nonlinear_program import NonlinearProgram
-from optimizer.nlp.sqp import Result, SqpStatus, solve
+from optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Clearance
 from optimizer.trajectories.bspline import Basis
@@ -69,6 +69,9 @@ class _Stage:
 class SqpMethod(Method):
     """A method whose motions form a linear space; the SQP optimises them."""
 
+    # relative decrease of the cost that a further step of the SQP must promise
+    progress: float = PROGRESS
+
     @cached_property
     def coordinates(self) -> Coordinates:
         """The coordinates of the spline, with limits tightened by MARGIN."""
@@ -90,7 +93,7 @@ class SqpMethod(Method):
         stage = self._first_stage(guess)
         iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):
-            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, deadline)
+            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, deadline, self.progress)
             iterations += result.iterations
             if result.status is SqpStatus.OUT_OF_TIME:
                 return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, iterations, solves)

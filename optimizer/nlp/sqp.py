@@ -109,9 +109,15 @@ class _Solver:
     """One run of the SQP."""
 
     def __init__(
-        self, program: NonlinearProgram, free: Array, T: float, multiplier: Array | None, deadline: Deadline
+        self,
+        program: NonlinearProgram,
+        free: Array,
+        T: float,
+        multiplier: Array | None,
+        deadline: Deadline,
+        progress: float,
     ) -> None:
-        self.p, self.deadline = program, deadline
+        self.p, self.deadline, self.progress = program, deadline, progress
         self.qp = WorkingSetQP(program, time_scale=T)
         self.scale = np.ones(self.qp.n)
         if self.qp.free_time:
@@ -141,12 +147,12 @@ class _Solver:
             stationarity = float(np.abs(Hdx).max())
             promised = -slope - 0.5 * float(step.x @ Hdx)
             feasible = float(self.at.violation.max()) < FEASIBILITY
-            if feasible and promised < PROGRESS:
+            if feasible and promised < self.progress:
                 status = SqpStatus.SOLVED
                 break
             found = self._line_search(step.x, slope)
             if found is None:
-                status = SqpStatus.SOLVED if feasible and promised < 100 * PROGRESS else SqpStatus.STALLED
+                status = SqpStatus.SOLVED if feasible and promised < 100 * self.progress else SqpStatus.STALLED
                 break
             self.at = found
             self.line = self.p.derivatives(found.free, found.T, self.multipliers.torque)
@@ -213,10 +219,12 @@ def solve(
     duration: float,
     multiplier: Array | None = None,
     deadline: Deadline = NEVER,
+    progress: float = PROGRESS,
 ) -> Result:
     """Minimise the cost of an NLP from an initial guess: free control points (m, r), duration [s], multipliers (N, nq).
 
     Without `multiplier` the torque multipliers start at zero. Once `deadline` passes, the last iterate is returned.
+    The solve ends when a step promises less than the relative decrease `progress`.
     """
     duration = min(max(duration, program.t_min), program.t_max)
-    return _Solver(program, free, duration, multiplier, deadline).solve()
+    return _Solver(program, free, duration, multiplier, deadline, progress).solve()

@@ -19,6 +19,7 @@ from optimizer.problem.targets import AnyOf
 from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
 from optimizer.search.ends import EndConfiguration
 from optimizer.search.lower_bound import lower_bounds
+from optimizer.search.mechanical_bound import mechanical_bounds
 from optimizer.solution import CandidateReport, CandidateStatus
 from optimizer.trajectories.spline import Spline
 
@@ -180,6 +181,10 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
         else None
     )
     bounds, shortest = lower_bounds(prepared, displacement, potential_gain, hold)
+    if prepared.problem.objective == "mechanical":
+        q_start = np.array([candidate.q_start for candidate in candidates])
+        levels = np.array([[potential[id(candidate.start)], potential[id(candidate.goal)]] for candidate in candidates])
+        bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_start + displacement, levels))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
         for name in ("start", "goal"):

@@ -12,6 +12,7 @@ from optimizer.search.attempts import solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
+from optimizer.search.sharpening import sharpen
 from optimizer.solution import Baseline, BaselineName
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.seven_segment import shortest_duration
@@ -26,6 +27,7 @@ SURPLUS_VALUES = (0.75, 0.5, 0.25)
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
     method, problem, deadline = incumbent.method, incumbent.problem, incumbent.deadline
+    sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
         coarse, tight = candidate.spline, is_tight(incumbent, candidate)
         solve_from(incumbent, candidate, sampled(coarse), fine=tight)

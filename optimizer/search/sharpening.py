@@ -1,0 +1,122 @@
+"""Motions of least energy where every joint's power has a corner of its own: restarts, finer motions, sharper corners.
+
+The mechanical objective is the integral of Σ_j |tau_j v_j|, and an isolated bus draws Σ_j max(P_j, 0). The NLP smooths
+these corners over `WIDTH`. Every joint has one, so that the optimum of the smoothed cost lies some percent above the
+least energy. Sharp corners from the start would leave the SQP in poor local optima. So the optimum is followed from one
+width to the next, in a space fine enough for the short pushes of such motions.
+
+The mechanical work of a motion has many local optima. As rest costs nothing, the best of them swing, push and rest,
+which few control points hardly show. Coarse solves from random motions are cheap; the best of them are followed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
+from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
+from optimizer.search.attempts import in_time, solver_of
+from optimizer.search.candidates import Candidate
+from optimizer.search.incumbent import Incumbent
+from optimizer.trajectories.spline import Spline, lasting, sampled
+from optimizer.trajectories.time_scalings import quintic_spline
+
+# random motions from which the coarse problem is solved, and how many of its solutions are solved in the middle space
+RESTARTS, FOLLOWED = 8, 3
+# control points of the restarts, between them and the last motion, and of that
+FEW, MIDDLE, DENSE = 13, 24, 40
+# relative decrease of the cost that a further step must promise, and in the last solve
+PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
+# other candidates are followed if they need at most this ratio of the least energy, and so many of them
+NEAR, RIVALS = 1.03, 2
+# half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
+WAVES, AMPLITUDES = 3, (0.1, 1.5)
+SEED = 0
+
+
+def sharpen(incumbent: Incumbent, best: Candidate) -> None:
+    """Follow the best candidate, and those that need little more, to motions of sharp corners, while time is left.
+
+    Does nothing if the objective has no corner per joint, or if the method has no evenly spaced control points.
+    """
+    problem = incumbent.problem
+    isolated = problem.objective == "electrical" and problem.arm.bus.mode == "isolated"
+    if not incumbent.method.evenly_spaced or not (isolated or problem.objective == "mechanical"):
+        return
+    assert best.energy is not None
+    near = [each for each in incumbent.candidates if each is not best and (each.energy or np.inf) <= NEAR * best.energy]
+    _Follower(incumbent, best).follow(restarts=0 if isolated else RESTARTS)
+    for rival in sorted(near, key=lambda each: each.energy or 0.0)[:RIVALS]:
+        _Follower(incumbent, rival).follow(restarts=0)
+
+
+@dataclass(frozen=True)
+class _Follower:
+    """Solves one candidate again. Motions that need less energy become the candidate's own."""
+
+    incumbent: Incumbent
+    candidate: Candidate
+
+    def follow(self, restarts: int) -> None:
+        """Solve with sharper and sharper corners, from the candidate's motion or from the best of random ones."""
+        motions = [self.candidate.spline]
+        if restarts:
+            motions = sorted([*motions, *self._restarted(restarts)], key=self._energy)
+            middle = [self._solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in motions[:FOLLOWED]]
+            motions = [motion for motion in middle if motion is not None] or motions
+        best: Spline | None = min(motions, key=self._energy)
+        for width in SHARPER_WIDTHS:
+            progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
+            best = None if best is None else self._solved(best, width, DENSE, progress)
+
+    def _restarted(self, count: int) -> list[Spline]:
+        """Coarse motions from random displacements of the rest-to-rest quintic."""
+        q_start, q_goal = self.candidate.q_start, self.candidate.q_goal
+        limits = self.incumbent.problem.arm.active_limits
+        line = quintic_spline(q_start, q_goal, self._interval(self.candidate.spline.duration).t_max)
+        q, t = sampled(line)
+        waves = np.sin(np.pi * np.outer(t / line.duration, np.arange(1, WAVES + 1)))
+        rng = np.random.default_rng(SEED)
+        found = []
+        for _ in range(count):
+            size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
+            moved = waves @ (rng.normal(size=(WAVES, q.shape[1])) * (size / np.arange(1, WAVES + 1)[:, None]))
+            guess = np.clip(q + moved, limits.q_min, limits.q_max)
+            motion = self._from_samples(guess, t, WIDTH, FEW, PROGRESS)
+            if motion is not None:
+                found.append(motion)
+        return found
+
+    def _solved(self, spline: Spline, width: float, count: int, progress: float) -> Spline | None:
+        interval = self._interval(spline.duration, width)
+        duration = float(np.clip(spline.duration, interval.t_min, interval.t_max))
+        return self._from_samples(*sampled(lasting(spline, duration)), width, count, progress)
+
+    def _from_samples(self, q: Array, t: Array, width: float, count: int, progress: float) -> Spline | None:
+        """The motion solved from samples q (k, nq) [rad] at t (k,) [s]; None if there is none or no time is left."""
+        incumbent, candidate = self.incumbent, self.candidate
+        if incumbent.deadline.passed:
+            return None
+        solver = solver_of(incumbent, candidate, self._interval(float(t[-1]), width))
+        solver.best_known = np.inf if candidate.energy is None else candidate.energy
+        result = in_time(incumbent, partial(solver.solve_evenly, q, t, count, progress))
+        if result.spline is not None:
+            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
+        return result.spline
+
+    def _interval(self, duration: float, width: float = WIDTH) -> DurationInterval:
+        """The interval of durations that holds `duration` [s]; the longest duration alone for mechanical work.
+
+        Waiting needs no mechanical work: no duration needs less than the longest.
+        """
+        intervals = duration_intervals(self.incumbent.prepared, self.candidate.q_goal, width=width)
+        interval = min(intervals, key=lambda each: max(each.t_min - duration, duration - each.t_max))
+        return replace(interval, t_min=interval.t_max) if self.incumbent.problem.objective == "mechanical" else interval
+
+    def _energy(self, spline: Spline) -> float:
+        prepared = self.incumbent.prepared
+        return prepared.objective_of(prepared.energy(spline))

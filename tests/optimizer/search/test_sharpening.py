@@ -1,0 +1,89 @@
+"""Motions with sharp corners: less energy than those of the smoothed cost, and only where every joint has a corner."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from benchmarks.reference import FILES, load, problem_of
+from benchmarks.tasks import move
+from optimizer.deadline import Deadline
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.bus import Bus
+from optimizer.search.attempts import solve
+from optimizer.search.branch_and_bound import explore
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.run import Run
+from optimizer.search.sharpening import sharpen
+from tests.optimizer.moves import AMPLE, problem
+
+# relative; what is promised against the best of many starts on as many control points
+PROMISED = 5e-3
+# index of a stored reference
+INDEX = 1
+
+
+def explored(**given: Any) -> Incumbent:
+    """A search whose candidates are solved, but not refined."""
+    run = Run(problem(**given))
+    run.prepare()
+    incumbent = run.incumbent
+    explore(incumbent.prepared, incumbent.candidates, lambda each: solve(incumbent, each), incumbent.deadline)
+    return incumbent
+
+
+def test_as_good_as_the_best_of_many_starts() -> None:
+    """Mechanical work at a fixed duration, against the reference of `benchmarks.reference`."""
+    stored = load(FILES["mechanical"])
+    row = next(row for row in stored["tasks"] if row["index"] == INDEX)
+    task = replace(problem_of(move(stored["seed"], INDEX), "mechanical"), deadline=AMPLE)
+    assert task.duration_max == pytest.approx(row["duration"])
+    assert optimize(task).energy.mechanical.total <= row["energy"] * (1 + PROMISED)
+
+
+@pytest.mark.parametrize("given", [{"objective": "mechanical", "duration_max": 1.5}, {"bus": Bus(mode="isolated")}])
+def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
+    incumbent = explored(**given)
+    before = incumbent.best()
+    assert before is not None and before.energy is not None
+    energy = before.energy
+    sharpen(incumbent, before)
+    after = incumbent.best()
+    assert after is not None and after.energy is not None
+    assert after.energy < energy
+    # the candidate's energy is that of its motion, by the exact formulas
+    prepared: PreparedProblem = incumbent.prepared
+    assert after.energy == prepared.objective_of(prepared.energy(after.spline))
+
+
+@pytest.mark.parametrize("given", [{}, {"method": "uniform_scaling", "objective": "mechanical", "duration_max": 1.5}])
+def test_nothing_is_solved_again_without_corners_or_even_spacing(given: dict[str, Any]) -> None:
+    incumbent = explored(**given)
+    best = incumbent.best()
+    assert best is not None
+    spline, solves = best.spline, incumbent.solves
+    sharpen(incumbent, best)
+    assert best.spline is spline and incumbent.solves == solves
+
+
+def test_longest_duration_of_mechanical_work() -> None:
+    """Rest costs nothing: a motion that may take longer takes all of the time."""
+    incumbent = explored(objective="mechanical", duration_max=2.0)
+    best = incumbent.best()
+    assert best is not None
+    sharpen(incumbent, best)
+    assert best.duration == pytest.approx(2.0, rel=1e-12)
+
+
+def test_no_time_is_left() -> None:
+    """The motion stays as it is."""
+    incumbent = explored(objective="mechanical", duration_max=1.5)
+    best = incumbent.best()
+    assert best is not None
+    spline = best.spline
+    incumbent.deadline = Deadline.after(-1.0)
+    sharpen(incumbent, best)
+    assert best.spline is spline
