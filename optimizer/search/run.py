@@ -23,6 +23,7 @@ from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.refinement import compare_with_baselines, refine
+from optimizer.search.tight_bound import tighten
 from optimizer.solution import (
     Baseline,
     Branch,
@@ -124,7 +125,7 @@ class Run:
         left = incumbent.deadline.left
         if left <= 0:
             return None
-        plain = replace(self.problem, arm=replace(self.problem.arm, bus=Bus()), deadline=left / 2)
+        plain = replace(self.problem, arm=replace(self.problem.arm, bus=Bus()), bound="normal", deadline=left / 2)
         try:
             found = Run(plain, clock=self.clock).solution()
         except DeadlineExceeded:
@@ -174,6 +175,8 @@ class Run:
         if not certificate.valid:
             return None
         objective = energy.of(self.problem.objective)
+        if self.problem.bound == "tight":
+            tighten(prepared, candidates, objective, incumbent.deadline)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
         for candidate in open_:
             if candidate.lower_bound >= objective:
