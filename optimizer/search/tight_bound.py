@@ -26,7 +26,7 @@ from optimizer.bounds.dual_bound import DualBound, Weights
 from optimizer.bounds.friction_conjugate import FrictionConjugate
 from optimizer.bounds.path_terms import path_terms
 from optimizer.bounds.reference import Reference, half_sides
-from optimizer.deadline import Deadline
+from optimizer.deadline import NEVER, Deadline
 from optimizer.energy.dwell import LinearDwell, linear_dwells
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
@@ -40,8 +40,8 @@ STEPS, CELL, GROUP, WINDOW = 24, 1.06, 2, 4.0
 PROBES = 400
 # multipliers' factors, and κ + μ in units of the friction's stiffness, of which μ is a share
 SCALES, STIFFNESSES, MIXING = (0.25, 0.5, 0.8), (0.8, 1.2), 0.2
-# a group of cells takes less than this [s]: none is begun with less left
-VARIANT_TIME = 1.0
+# the terms along a path take less than this [s], and so does a bound from them: none is begun with less left
+TERMS_TIME, BOUND_TIME = 1.0, 0.2
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
 WEIGHTLESS = 1e-9
 GRID_JOINTS = 2
@@ -56,7 +56,7 @@ def tighten(prepared: PreparedProblem, candidates: list[Candidate], energy: floa
         return
     below = [each for each in candidates if each.holdable and each.lower_bound < energy and each.goal.tolerance is None]
     for candidate in sorted(below, key=lambda each: each.lower_bound):
-        if deadline.left < VARIANT_TIME:
+        if deadline.left < TERMS_TIME:
             return
         candidate.lower_bound = max(candidate.lower_bound, pairs.bound(candidate, energy, deadline))
 
@@ -78,7 +78,9 @@ class _Pairs:
         if friction is None or arm.robot.nq < GRID_JOINTS:
             return None
         loss = (arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2
-        return cls(prepared, ChainDerivatives.of(arm), friction, loss, friction.stiffness(arm.friction_law))
+        stiffness = friction.stiffness(arm.friction_law)
+        # friction of the same torque at every speed has no convexity to spare
+        return cls(prepared, ChainDerivatives.of(arm), friction, loss, stiffness) if stiffness.min() > 0 else None
 
     def bound(self, candidate: Candidate, energy: float, deadline: Deadline) -> float:
         """A bound [J] on the pair's motions, at most `energy`; -inf where the dual bound does not apply."""
@@ -169,15 +171,17 @@ class _Piece:
         while (open_ := np.flatnonzero(left & (cells <= cells[~left].min(initial=np.inf)))).size:
             group = open_[:GROUP]
             group = group[longest[group] <= longest[group[0]] * CELL**GROUP]
-            if deadline.left < VARIANT_TIME:
+            if deadline.left < TERMS_TIME:
                 break
-            found = self._bounds(shortest[group], longest[group], choices)
+            found = self._bounds(shortest[group], longest[group], choices, deadline)
             cells[group] = np.maximum(cells[group], found[0])
             choices, left[group] = found[1], False
         return float(cells.min())
 
-    def _bounds(self, shortest: Array, longest: Array, choices: Sequence[_Choice]) -> tuple[Array, Sequence[_Choice]]:
-        """Dual bounds (B,) [J] of cells, and of the choices the one with the greatest least of them."""
+    def _bounds(
+        self, shortest: Array, longest: Array, choices: Sequence[_Choice], deadline: Deadline = NEVER
+    ) -> tuple[Array, Sequence[_Choice]]:
+        """Dual bounds (B,) [J] of cells, -inf if time is too short, and the choice with the greatest least of them."""
         pairs, arm = self.pairs, self.pairs.prepared.arm
         own = self._duration
         middle = float(np.sqrt(shortest[0] * longest[-1]) if own is None else np.clip(own, shortest[0], longest[-1]))
@@ -189,13 +193,15 @@ class _Piece:
         base = arm.base_power + float(arm.drives.inverter_constant.sum())
         best, chosen = np.full(len(shortest), -np.inf), choices[0]
         for kept in sorted({choice.kept for choice in choices}):
+            if deadline.left < TERMS_TIME:
+                break
             reference = Reference(x, multipliers * np.array(kept))
             terms = path_terms(pairs.chain, reference, pairs.loss, half, self._grid)
             first, last = reference.multipliers[:-1], reference.multipliers[1:]
             rates = (first * first + first * last + last * last) @ pairs.loss / 3
             dual = DualBound(terms, rates, pairs.friction, arm.active_limits, base, self._gain, float(longest[-1]))
             for choice in choices:
-                if choice.kept == kept:
+                if choice.kept == kept and deadline.left >= BOUND_TIME:
                     value = dual(shortest, longest, choice.weights, self._power)
                     if value.min() > best.min():
                         best, chosen = value, choice

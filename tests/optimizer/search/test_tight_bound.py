@@ -42,15 +42,17 @@ def test_it_is_between_the_plain_bound_and_the_energy(name: str) -> None:
 
 
 def test_motions_of_other_durations_spend_no_less() -> None:
-    """The least energy at fixed durations around the best one is not below the tight bound for all of them."""
+    """The least energy at fixed durations from the best one on is not below the tight bound for all of them."""
     free = optimize(problem(bound="tight"))
-    for factor in (0.9, 1.0, 1.15, 1.4):
+    for factor in (1.0, 1.1, 1.3, 1.7):
         found = optimize(problem(**fixed(factor * free.duration)))
         assert free.lower_bound <= found.energy.electrical.total
 
 
 ODD = replace(ROBOT, friction_laws={"odd": replace(ROBOT.friction, curved=-0.1 * ROBOT.friction.curved)})
+DRY = replace(ROBOT.friction, curved=0 * ROBOT.friction.curved, viscous=0 * ROBOT.friction.viscous)
 PLAIN: dict[str, dict[str, Any]] = {
+    "friction of one torque": {"robot": replace(ROBOT, friction_laws={"dry": DRY})},
     "mechanical": {"objective": "mechanical", "duration_max": 3.0},
     "friction that is not concave": {"robot": ODD},
     "no displacement": {"goal": START, "duration_min": 1.0},
@@ -63,7 +65,7 @@ def test_the_plain_bound_stays_where_the_dual_one_does_not_help(name: str) -> No
     asked = problem(**PLAIN[name])
     plain, tight = both(asked)
     assert plain.lower_bound <= tight.lower_bound <= tight.energy.of(asked.objective)
-    if name in ("mechanical", "friction that is not concave"):
+    if name.startswith(("mechanical", "friction")):
         assert tight.lower_bound == plain.lower_bound
 
 
