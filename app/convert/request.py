@@ -35,6 +35,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         cycle=to_cycle(request.cycle),
         branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
         windings=request.windings,
+        bound=request.bound,
         sample_period=request.sample_period,
         deadline=deadline,
     )

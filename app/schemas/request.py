@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
-from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
 from optimizer.replay.sampler import MOST_SAMPLES
 from optimizer.solution import Objective
 
@@ -221,4 +221,12 @@ class OptimizeRequest(MotionRequest):
         None,
         "bspline",
         default="bspline",
+    )
+    bound: BoundEffort = described(
+        "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the answer get a second, "
+        "greater one, which takes the copper loss of holding against gravity into account. It takes about a second per "
+        "candidate, lowest bound first, and ends before the `deadline`. For the objective `electrical`.",
+        None,
+        "normal",
+        default="normal",
     )

@@ -16,6 +16,8 @@ from optimizer.problem.targets import Target, members, validated
 from optimizer.solution import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
+# effort for the lower bound of the answer
+BoundEffort = Literal["normal", "tight"]
 
 # bounds on every planned duration [s]; the first also holds if start and goal are the same
 LEAST_DURATION = 0.01
@@ -32,8 +34,9 @@ class Problem:
     lasts no longer than the cycle.
 
     `branch` restricts the inverse kinematics branches of start and goal. With `windings` the goal may also be a full
-    turn of a joint away. `sample_period` [s] is that of the returned samples. After `deadline` [s] of wall time the
-    best verified result so far is returned.
+    turn of a joint away. With the `bound` "tight" more time goes into the lower bounds of what could still beat the
+    answer. `sample_period` [s] is that of the returned samples. After `deadline` [s] of wall time the best verified
+    result so far is returned.
 
     Raises InvalidProblem or OutsideLimits, with the field named, if the parts do not fit together.
     """
@@ -48,6 +51,7 @@ class Problem:
     cycle: Cycle | None = None
     branch: BranchFilter | None = None
     windings: bool = True
+    bound: BoundEffort = "normal"
     sample_period: float = 0.008
     deadline: float = 10.0
 

@@ -25,6 +25,7 @@ from optimizer.search.incumbent import Incumbent
 from optimizer.search.refinement import compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.self_motion_bound import self_motion_bound
+from optimizer.search.tight_bound import tighten
 from optimizer.solution import (
     Baseline,
     Branch,
@@ -138,7 +139,7 @@ class Run:
         left = incumbent.deadline.left
         if left <= 0:
             return None
-        plain = replace(self.problem, arm=replace(self.problem.arm, bus=Bus()), deadline=left / 2)
+        plain = replace(self.problem, arm=replace(self.problem.arm, bus=Bus()), bound="normal", deadline=left / 2)
         try:
             found = Run(plain, clock=self.clock).solution()
         except DeadlineExceeded:
@@ -198,6 +199,8 @@ class Run:
         except DeadlinePassed:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
+        if self.problem.bound == "tight":
+            tighten(prepared, candidates, objective, incumbent.deadline)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
         for candidate in open_:
             if candidate.lower_bound >= objective:

@@ -1,0 +1,148 @@
+"""Gravity torques and joint-space inertia of n configurations at once, and bounds on their derivatives that hold for
+every configuration.
+
+With the axis z_j and the origin o_j of joint j, the mass m_i and the centre c_i of link i, and S_j = Σ_{i≥j} m_i (c_i
+- o_j), the derivative of the potential energy U by joints k_1 ≤ … ≤ k_n is -g · (z_k1 × (… (z_kn × S_kn))): a joint
+turns everything beyond it, so that derivatives act from the last joint inwards. Its absolute value is at most |g ×
+z_k1| · |S_kn|, where |S_kn| ≤ Σ_{i≥kn} m_i · (lengths from o_kn to c_i), and |g × z_k1| is |g| but for the first
+joint, whose axis stands still.
+
+M_jk = Σ_i (m_i J_ij · J_ik + z_j · I_i z_k) with J_ij = z_j × (c_i - o_j). By the same rule a derivative of J_ij is
+no longer than ρ_i of the last of its joints, with ρ_i(k) ≥ |c_i - o_k|. In z_j · I_i z_k the rotation of a joint
+occurs at most twice, and its derivatives of any order have norm 1: n derivatives are at most 2^n times the greatest
+principal moment. M_jk does not change with the joints up to the first of j, k: they turn all that it depends on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.problem.arm import Arm
+
+
+@dataclass(frozen=True)
+class ChainDerivatives:
+    """A serial chain with payload, in its gravity.
+
+    `placements` (nq, 4, 4) of the joints in the frames before them, `mass` (nq,) [kg], `lever` (nq, 3) [m] and
+    `inertia` (nq, 3, 3) [kg·m²] of the links, about their centres of mass; `rotor` (nq,) [kg·m²].
+    """
+
+    placements: Array
+    mass: Array
+    lever: Array
+    inertia: Array
+    rotor: Array
+    gravity: Array
+
+    @classmethod
+    def of(cls, arm: Arm) -> ChainDerivatives:
+        """The chain of an arm."""
+        model = rigid_body_model(arm)
+        bodies = [model.inertias[i] for i in range(1, model.njoints)]
+        return cls(
+            joint_placements(model),
+            np.array([body.mass for body in bodies]),
+            np.array([body.lever for body in bodies]),
+            np.array([body.inertia for body in bodies]),
+            arm.drives.rotor_inertia,
+            np.asarray(arm.gravity),
+        )
+
+    @property
+    def nq(self) -> int:
+        """Number of joints."""
+        return len(self.mass)
+
+    @cached_property
+    def _reach(self) -> Array:
+        """Greatest distance (nq, nq) [m] of the centre of mass of link i from the origin of joint j ≤ i."""
+        lengths = np.append(np.linalg.norm(self.placements[1:, :3, 3], axis=1), 0.0)
+        reach = np.zeros((self.nq, self.nq))
+        for i, j in product(range(self.nq), repeat=2):
+            if j <= i:
+                reach[i, j] = np.linalg.norm(self.lever[i]) + lengths[j:i].sum()
+        return reach
+
+    def potential_bound(self, order: int) -> Array:
+        """Bounds (nq,) * order [J] on the derivatives of the potential energy by that many joints."""
+        moments = np.array([self.mass[j:] @ self._reach[j:, j] for j in range(self.nq)])
+        leading = np.full(self.nq, np.linalg.norm(self.gravity))
+        leading[0] = np.linalg.norm(np.cross(self.gravity, self.placements[0, :3, 2]))
+        joints = np.indices((self.nq,) * order)
+        return np.asarray(leading[joints.min(axis=0)] * moments[joints.max(axis=0)])
+
+    def inertia_bound(self, order: int) -> Array:
+        """Bounds (nq,) * order + (nq, nq) [kg·m²] on the derivatives of M_jk by `order` ≥ 1 joints."""
+        joints = np.indices((self.nq,) * (order + 2))
+        by, j, k = joints[:order], joints[order], joints[order + 1]
+        changes = by.min(axis=0) > np.minimum(j, k)
+        last = np.maximum(by.max(axis=0), np.maximum(j, k))
+        principal = np.linalg.eigvalsh(self.inertia)[:, -1]
+        bound = np.zeros(j.shape)
+        for i in range(self.nq):
+            products = np.zeros(j.shape)
+            for acts_on_second in product((False, True), repeat=order):
+                first, second = j, k
+                for joint, on_second in zip(by, acts_on_second, strict=True):
+                    if on_second:
+                        second = np.maximum(second, joint)
+                    else:
+                        first = np.maximum(first, joint)
+                products += self._reach[i][first] * self._reach[i][second]
+            own = self.mass[i] * products + 2.0**order * principal[i]
+            bound += np.where(changes & (last <= i), own, 0.0)
+        return bound
+
+    def gravity_torque(self, q: Array) -> tuple[Array, Array]:
+        """∂U/∂q_j (n, nq) [N·m] and ∂²U/∂q_j∂q_k (n, nq, nq) [N·m] at q (n, nq) [rad]."""
+        z, o, _, c = self._frames(q)
+        outer = np.cumsum(self.mass[::-1])[::-1]
+        moments = _from_outside(self.mass[:, None] * c) - outer[:, None] * o
+        levers = _cross(z, moments)
+        across = _cross(np.broadcast_to(self.gravity, z.shape), z)
+        return -levers @ self.gravity, _symmetric(-across @ levers.transpose(0, 2, 1))
+
+    def joint_inertia(self, q: Array) -> Array:
+        """M (n, nq, nq) [kg·m²] at q (n, nq) [rad], rotors included: momenta of unit speeds about the base."""
+        z, o, R, c = self._frames(q)
+        about_centre = R @ self.inertia @ R.transpose(0, 1, 3, 2)
+        square = (c * c).sum(axis=-1)[..., None, None] * np.eye(3) - c[..., :, None] * c[..., None, :]
+        about_origin = _from_outside(about_centre + self.mass[:, None, None] * square)
+        outer, moment = np.cumsum(self.mass[::-1])[::-1], _from_outside(self.mass[:, None] * c)
+        speed = _cross(o, z)
+        linear = outer[:, None] * speed + _cross(z, moment)
+        angular = (about_origin @ z[..., None])[..., 0] + _cross(moment, speed)
+        both = z @ angular.transpose(0, 2, 1) + speed @ linear.transpose(0, 2, 1)
+        return _symmetric(both) + np.diag(self.rotor)
+
+    def _frames(self, q: Array) -> tuple[Array, Array, Array, Array]:
+        """Axes and origins (n, nq, 3) of the joints, rotations (n, nq, 3, 3) and centres of mass (n, nq, 3)."""
+        frames = link_frames(self.placements, q)[:, 1:]
+        rotations = frames[..., :3, :3]
+        centres = frames[..., :3, 3] + (rotations @ self.lever[:, :, None])[..., 0]
+        return np.ascontiguousarray(rotations[..., 2]), np.ascontiguousarray(frames[..., :3, 3]), rotations, centres
+
+
+def _from_outside(each: Array) -> Array:
+    """Sums over a link and all beyond it, along axis 1."""
+    return np.cumsum(each[:, ::-1], axis=1)[:, ::-1]
+
+
+def _symmetric(upper: Array) -> Array:
+    """The symmetric matrices (n, k, k) with these upper triangles."""
+    return np.asarray(np.triu(upper) + np.triu(upper, 1).transpose(0, 2, 1))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products along the last axis; numpy's own takes several times as long for many short vectors."""
+    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    return np.stack([x, y, a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]], axis=-1)
