@@ -123,7 +123,7 @@ def _ends_of_samples(
     prepared: PreparedProblem, name: str, pose: ConeOrientedPose, index: int, samples: int
 ) -> list[EndConfiguration]:
     """The branches of orientations sampled evenly from those that the pose and the tool's cone allow."""
-    pose = _within_cone(prepared, pose)
+    pose = within_cone(prepared, pose, INSIDE)
     found: list[EndConfiguration] = []
     errors: list[UnreachablePose | SingularPose] = []
     tried = samples if pose.freedom > 1 else max(samples // 4, LEAST_SAMPLES)
@@ -151,10 +151,10 @@ def _ends_of_samples(
     )
 
 
-def _within_cone(prepared: PreparedProblem, pose: ConeOrientedPose) -> ConeOrientedPose:
-    """The pose with no more freedom than the tool's cone leaves it, if both have the same axes.
+def within_cone(prepared: PreparedProblem, pose: ConeOrientedPose, share: float = 1.0) -> ConeOrientedPose:
+    """The pose with no more freedom than a share of the tool's cone leaves it, if both have the same axes.
 
-    Else few samples of a free orientation would lie in a narrow cone.
+    Else few samples of a free orientation would lie in a narrow cone, and a bound would count what the cone excludes.
     """
     cone = prepared.problem.arm.tool_cone
     if cone is None:
@@ -162,4 +162,4 @@ def _within_cone(prepared: PreparedProblem, pose: ConeOrientedPose) -> ConeOrien
     free = pose.half_angle == np.pi
     if not free and not (np.allclose(pose.axis, cone.axis) and np.allclose(pose.direction, cone.direction)):
         return pose
-    return ConeOrientedPose(pose.position, cone.axis, cone.direction, min(pose.half_angle, INSIDE * cone.half_angle))
+    return ConeOrientedPose(pose.position, cone.axis, cone.direction, min(pose.half_angle, share * cone.half_angle))

@@ -1,11 +1,12 @@
 """A lower bound on the motions to a goal whose orientation is free in part: to all of its configurations at once.
 
-The wrist decides the orientation; the bound leaves it free and looks at the inner joints alone (`kinematics.
-wrist_geometry`). Branch and bound over boxes of inner joint positions. A box that cannot bring the wrist near enough to
-the goal, or not far enough from it, holds no configuration. For any other box, the joint displacement is at least that
-to the box, and the potential energy at least that in its middle less what the links can still sink. `lower_bounds` of
-the least displacement and the least gain of potential energy bounds every motion into the box, since it falls with
-neither. The least value over all boxes bounds the family.
+Branch and bound over boxes of joint positions. A box holds no configuration of the goal if its inner joints cannot
+bring the wrist near enough to the goal, or not far enough from it (`kinematics.wrist_geometry`, which tells while the
+wrist may still be anywhere). `kinematics.pose_boxes` narrows the others, the more the smaller they are, so that they
+shrink onto the goal's configurations. For every box, the joint displacement is at least that to the box, and the
+potential energy at least that in its middle less what it can fall. `lower_bounds` of the least displacement and the
+least gain of potential energy bounds every motion into the box, since it falls with neither. The least value over all
+boxes bounds the family; it grows towards the least bound of any pair.
 """
 
 from __future__ import annotations
@@ -16,32 +17,61 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.wrist_geometry import Shell, WristBody, WristGeometry, least_potential, potential_rates
+from optimizer.kinematics.pose_boxes import PoseBoxes
+from optimizer.kinematics.wrist_boxes import WristBoxes
+from optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGeometry, potential_rates
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.targets import AnyOf
 from optimizer.search.candidates import Candidate
+from optimizer.search.ends import within_cone
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves
 
-# boxes along each joint at first, boxes split in a round, rounds
-FIRST_BOXES, SPLIT, ROUNDS = 4, 160, 20
-# a box is not split once its widest side is below this [rad]
+# boxes along each inner joint at first, boxes split in a round, rounds a box is not split once its widest side is below
+# this [rad] length [m] that a radian of any joint counts as, beside the path that it moves the TCP by, where a side is
+# chosen to split times that a box is narrowed when it is made
+FIRST_BOXES, SPLIT, ROUNDS = 4, 160, 80
 SMALLEST = 0.01
+RADIAN = 0.3
+NARROWINGS = 2
+
+# half side [rad] from which on a box is as wide as can be where a side is chosen to split: inner joints come first
+WIDE = 0.3
+
+# sum of half sides [rad] below which narrowing in all joints pays
+SMALL = 2.0
+
+Marks = NDArray[np.bool_]
 
 
-def family_bound_of(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> float:
-    """Bound [J] on the motions to those goals whose orientation is free in part; inf if there are none."""
-    poses = {each.goal.target: each.goal.tolerance for each in candidates if each.goal.tolerance is not None}
+def family_bound_of(
+    prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline, enough: float = np.inf
+) -> float:
+    """Bound [J] on the motions to those goals whose orientation is free in part; inf if there are none.
+
+    The search ends once the bound reaches `enough` [J]. The bound covers the whole of a tool's cone; samples leave out
+    its rim, at which no motion could end.
+    """
+    goal = prepared.problem.goal
+    targets = goal.targets if isinstance(goal, AnyOf) else (goal,)
+    reached = {each.goal.target for each in candidates if each.goal.tolerance is not None}
+    poses = [
+        within_cone(prepared, pose)
+        for k, pose in enumerate(targets)
+        if k in reached and isinstance(pose, ConeOrientedPose)
+    ]
     if not poses:
         return np.inf
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
     rounds = ROUNDS // len(poses)
-    return min(family_bound(prepared, pose, starts, rounds, deadline, half) for pose in poses.values())
+    return min(family_bound(prepared, pose, starts, rounds, deadline, half, enough) for pose in poses)
 
 
 def family_bound(
@@ -51,17 +81,14 @@ def family_bound(
     rounds: int = ROUNDS,
     deadline: Deadline = NEVER,
     half: Array | None = None,
+    enough: float = np.inf,
 ) -> float:
     """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration of `pose`.
 
     With `half` (s, nq) [rad] the starts are boxes, `starts` their middles and `half` their half sides. Fewer rounds, or
-    a deadline, give a weaker bound. For a chain without inner joints the bound is that of motions to anywhere.
+    a deadline, give a weaker bound; the search ends once it reaches `enough` [J].
     """
-    geometry = WristGeometry.of(prepared.arm)
-    if geometry is None:
-        gain = least_potential(prepared.arm) - _greatest_potentials(prepared, starts, half)
-        return float(LeastBound(prepared).of(np.zeros_like(starts), gain).min())
-    return _BoxSearch(_Family(prepared, pose, geometry), starts, half).run(rounds, deadline)
+    return _BoxSearch(_Family(prepared, pose), starts, half).run(rounds, deadline, enough)
 
 
 def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array | None) -> Array:
@@ -74,8 +101,8 @@ def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array |
 
 @dataclass(frozen=True)
 class _Boxes:
-    """Boxes of inner joint positions: `start` (b,) the index of each one's start, middle and half sides (b, inner)
-    [rad], and the bound (b,) [J], inf for a box without configurations."""
+    """Boxes of joint positions: `start` (b,) the index of each one's start, middle and half sides (b, nq) [rad], and
+    the bound (b,) [J], inf for a box without configurations."""
 
     start: Indices
     centre: Array
@@ -103,28 +130,37 @@ class _BoxSearch:
         self.start_half = np.zeros_like(starts) if half is None else half
         self.potentials = _greatest_potentials(family.prepared, starts, half)
 
-    def run(self, rounds: int, deadline: Deadline) -> float:
-        """The least bound [J] of any box after at most so many rounds of splitting."""
+    def run(self, rounds: int, deadline: Deadline, enough: float = np.inf) -> float:
+        """The least bound [J] of any box after at most so many rounds of splitting, or once it reaches `enough` [J]."""
         boxes = self.first()
         for _ in range(rounds):
             boxes = boxes[np.flatnonzero(np.isfinite(boxes.value))]
             order = np.argsort(boxes.value, kind="stable")
-            if not len(order) or boxes.half[order[0]].max() < SMALLEST or deadline.passed:
+            if not len(order) or boxes.value[order[0]] >= enough or deadline.passed:
+                break
+            if self.family.settled(boxes.half[order[0]]):
                 break
             boxes = boxes[order[SPLIT:]].joined(self.halved(boxes[order[:SPLIT]]))
         return float(boxes.value.min(initial=np.inf))
 
     def first(self) -> _Boxes:
-        """Boxes that cover every position of the inner joints, for every start."""
-        side, count = np.pi / FIRST_BOXES, len(self.starts)
+        """Boxes that cover every position of the joints, for every start: the inner joints' range in parts."""
+        nq, count = self.starts.shape[1], len(self.starts)
+        inner = max(nq - OUTER, 0)
+        side = np.pi / FIRST_BOXES
         one_side = -np.pi + side * (2 * np.arange(FIRST_BOXES) + 1)
-        centres = np.array(list(product(one_side, repeat=self.family.geometry.inner)))
-        start = np.repeat(np.arange(count), len(centres))
-        return self.bounded(start, np.tile(centres, (count, 1)), np.full((len(start), centres.shape[1]), side))
+        # both ways of bending the wrist
+        parts = np.array(list(product(*[one_side] * inner, *[(-np.pi / 2, np.pi / 2)] * (nq > OUTER))))
+        centre, half = np.zeros((len(parts), nq)), np.full((len(parts), nq), np.pi)
+        if nq > OUTER:
+            centre[:, :inner], half[:, :inner] = parts[:, :inner], side
+            centre[:, inner + 1], half[:, inner + 1] = parts[:, inner], np.pi / 2
+        start = np.repeat(np.arange(count), len(parts))
+        return self.bounded(start, np.tile(centre, (count, 1)), np.tile(half, (count, 1)))
 
     def halved(self, boxes: _Boxes) -> _Boxes:
-        """Both halves of every box, split along the side that moves the wrist most."""
-        widest = (boxes.half * self.family.geometry.levers).argmax(axis=1)
+        """Both halves of every box, split along the side that moves the TCP most."""
+        widest = (np.minimum(boxes.half, WIDE) * self.family.weights).argmax(axis=1)
         rows = np.arange(len(widest))
         step = np.zeros_like(boxes.half)
         step[rows, widest] = boxes.half[rows, widest] / 2
@@ -136,9 +172,12 @@ class _BoxSearch:
         return _Boxes(halves.start, halves.centre, halves.half, value)
 
     def bounded(self, start: Indices, centre: Array, half: Array) -> _Boxes:
-        """The boxes with their bounds."""
-        starts, start_half, potentials = self.starts[start], self.start_half[start], self.potentials[start]
-        return _Boxes(start, centre, half, self.family.bounds(starts, start_half, potentials, centre, half))
+        """The boxes, narrowed, with their bounds."""
+        centre, half, held = self.family.narrowed(centre, half)
+        value = np.full(len(centre), np.inf)
+        starts, start_half, potentials = (each[start[held]] for each in (self.starts, self.start_half, self.potentials))
+        value[held] = self.family.bounds(starts, start_half, potentials, centre[held], half[held])
+        return _Boxes(start, centre, half, value)
 
 
 @dataclass(frozen=True)
@@ -147,44 +186,79 @@ class _Family:
 
     prepared: PreparedProblem
     pose: ConeOrientedPose
-    geometry: WristGeometry
+
+    @cached_property
+    def _boxes(self) -> PoseBoxes:
+        return PoseBoxes(self.prepared.arm, self.pose)
+
+    @cached_property
+    def _wrist(self) -> WristBoxes | None:
+        return None if self._geometry is None else WristBoxes(self.prepared.arm, self.pose)
+
+    @cached_property
+    def _geometry(self) -> WristGeometry | None:
+        return WristGeometry.of(self.prepared.arm)
 
     @cached_property
     def _shells(self) -> list[Shell]:
-        return self.geometry.shells(self.pose)
+        return [] if self._geometry is None else self._geometry.shells(self.pose)
 
     @cached_property
     def _bodies(self) -> list[WristBody]:
-        return self.geometry.bodies(self.pose)
+        return [] if self._geometry is None else self._geometry.bodies(self.pose)
 
     @cached_property
     def _bound(self) -> LeastBound:
         return LeastBound(self.prepared)
 
+    @cached_property
+    def weights(self) -> Array:
+        """Path of the TCP [m/rad] per joint (nq,), nearly; 0 for a joint that the pose leaves free."""
+        return np.where(self._boxes.free, 0.0, self._boxes.levers + RADIAN)
+
+    def settled(self, half: Array) -> bool:
+        """Whether a box of half sides (nq,) [rad] is not worth splitting."""
+        return bool(half[~self._boxes.free].max(initial=0.0) < SMALLEST)
+
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Marks]:
+        """Boxes (b, nq) that hold what of the given ones reaches the pose, and which of them (b,) may hold anything."""
+        held = np.ones(len(centre), dtype=bool)
+        if self._geometry is not None:
+            inner = self._geometry.inner
+            wrist, _ = self._geometry.placed(centre[:, :inner])
+            blur = half[:, :inner] @ self._geometry.levers
+            for shell in self._shells:
+                distance = np.linalg.norm(wrist - shell.centre, axis=1)
+                held &= (distance - blur <= shell.most) & (distance + blur >= shell.least)
+        centre, half = centre.copy(), half.copy()
+        for _ in range(NARROWINGS):
+            if held.any() and self._wrist is not None:
+                centre[held], half[held], held[held] = self._wrist.narrowed(centre[held], half[held])
+            small = np.flatnonzero(held & (half.sum(axis=1) - self._boxes.free[-1] * half[:, -1] < SMALL))
+            if len(small):
+                centre[small], half[small], held[small] = self._boxes.narrowed(centre[small], half[small])
+        return centre, half, held
+
     def bounds(self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array) -> Array:
         """Bounds (b,) [J] on motions from boxes around starts (b, nq), of potential energy at most (b,) [J], into boxes
-        (b, inner).
-
-        inf for a box that holds no configuration.
-        """
-        wrist, lowest = self.geometry.placed(centres)
-        blur = halves @ self.geometry.levers
-        value = np.full(len(centres), np.inf)
-        inside = np.ones(len(centres), dtype=bool)
-        for shell in self._shells:
-            distance = np.linalg.norm(wrist - shell.centre, axis=1)
-            inside &= (distance - blur <= shell.most) & (distance + blur >= shell.least)
-        if not inside.any():
-            return value
-        inner, strength = self.geometry.inner, float(np.linalg.norm(self.geometry.gravity))
-        away = starts[inside, :inner] - centres[inside]
+        (b, nq)."""
+        away = starts - centres
         away = np.abs(away - 2 * np.pi * np.round(away / (2 * np.pi)))
-        displacement = np.zeros((int(inside.sum()), starts.shape[1]))
-        displacement[:, :inner] = np.maximum(away - halves[inside] - start_halves[inside, :inner], 0.0)
-        lowest = lowest[inside] - halves[inside] @ self.geometry.potential_rates
-        hanging = -wrist[inside] @ self.geometry.gravity - blur[inside] * strength
+        displacement = np.maximum(away - halves - start_halves, 0.0)
+        lowest = np.maximum(self._boxes.least_potential(centres, halves), self._hanging(centres, halves))
+        return self._bound.of(displacement, lowest - potentials)
+
+    def _hanging(self, centres: Array, halves: Array) -> Array:
+        """Bound (b,) [J] on the potential energy in boxes, whatever the wrist does: it hangs from the inner joints, and
+        from the goal."""
+        geometry = self._geometry
+        if geometry is None:
+            return np.full(len(centres), -np.inf)
+        inner, strength = geometry.inner, float(np.linalg.norm(geometry.gravity))
+        wrist, lowest = geometry.placed(centres[:, :inner])
+        lowest = lowest - halves[:, :inner] @ geometry.potential_rates
+        hanging = -wrist @ geometry.gravity - halves[:, :inner] @ geometry.levers * strength
         for body in self._bodies:
             # as low as it can hang from the wrist, and as low as it can be about the goal
             lowest += body.mass * np.maximum(hanging - body.reach * strength, body.least_potential)
-        value[inside] = self._bound.of(displacement, lowest - potentials[inside])
-        return value
+        return lowest

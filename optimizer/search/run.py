@@ -208,7 +208,7 @@ class Run:
         # of a target that infinitely many configurations reach, only samples are solved: it is done only if a bound
         # rules all of it out
         family = min(
-            family_bound_of(prepared, candidates, incumbent.deadline),
+            family_bound_of(prepared, candidates, incumbent.deadline, objective),
             self_motion_bound(prepared, candidates, incumbent.deadline),
         )
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective

@@ -1,0 +1,116 @@
+"""Boxes of joint positions that are narrowed to what reaches a pose: nothing that does is lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.robot import Array
+from optimizer.kinematics.pose_boxes import PoseBoxes
+from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.kinematics.wrist_boxes import WristBoxes
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from tests.optimizer.chains import serial_chain
+from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem
+
+TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.9), np.array([0.03, -0.02, 0.15])).homogeneous
+# that joint positions may lie outside a box [rad]: angles are rounded, not bounds
+ROUNDING = 1e-12
+ARMS: dict[str, Arm] = {
+    "bare": Arm(robot=ROBOT),
+    "tool": Arm(robot=ROBOT, T_flange_tcp=TOOL, payload=PAYLOAD, gravity=TILTED),
+    "seven joints": Arm(robot=serial_chain(7)),
+    "four joints": Arm(robot=serial_chain(4)),
+}
+
+
+def reached(rng: np.random.Generator, arm: Arm, half_angle: float) -> tuple[Array, ConeOrientedPose]:
+    """A configuration, and a pose that it reaches: often right at the edge of its cone."""
+    q = rng.uniform(-np.pi, np.pi, arm.robot.nq)
+    q[rng.random(len(q)) < 0.2] = 0.0  # stretched and aligned, as singular ones are
+    T = tcp_pose(arm, q)
+    axis = rng.normal(size=3) if rng.random() < 0.5 else np.array([0.0, 0.0, 1.0])
+    axis /= np.linalg.norm(axis)
+    across = np.cross(axis, rng.normal(size=3))
+    turn = pin.exp3(across / np.linalg.norm(across) * half_angle * rng.choice([0.0, 0.5, 1.0]))
+    return q, ConeOrientedPose(T[:3, 3], axis, T[:3, :3] @ turn @ axis, half_angle)
+
+
+def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array, Array]:
+    """Random boxes that hold q, from narrow ones to the whole range: some with q in a corner."""
+    half = np.minimum(10 ** rng.uniform(-4, 0.6, (count, len(q))), np.pi)
+    within = np.where(
+        rng.random(half.shape) < 0.2, np.sign(rng.normal(size=half.shape)), rng.uniform(-1, 1, half.shape)
+    )
+    return q + half * within, half
+
+
+def lost(q: Array, centre: Array, half: Array, held: Array) -> Array:
+    """Which boxes (b,) do not hold q, full turns left out."""
+    away = np.abs((q - centre + np.pi) % (2 * np.pi) - np.pi)
+    return np.asarray(~(held & (away <= half + ROUNDING).all(axis=1)))
+
+
+@pytest.mark.parametrize("kind", [PoseBoxes, WristBoxes])
+@pytest.mark.parametrize("half_angle", [0.0, 0.02, 0.3, 1.6, np.pi])
+@pytest.mark.parametrize("name", ARMS)
+def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, kind: Any) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(60):
+        q, pose = reached(rng, ARMS[name], half_angle)
+        centre, half = boxes_around(rng, q, 64)
+        if kind is WristBoxes:
+            # the second joint of a wrist is never wider than half a turn
+            half[:, -2] = np.minimum(half[:, -2], np.pi / 2)
+            centre[:, -2] = q[-2] + np.clip(centre[:, -2] - q[-2], -half[:, -2], half[:, -2])
+        assert not lost(q, *kind(ARMS[name], pose).narrowed(centre, half)).any()
+        narrow, sides, held = kind(ARMS[name], pose).narrowed(centre, half)
+        assert (sides <= half + ROUNDING).all() and held.all()
+        assert not lost(q, *kind(ARMS[name], pose).narrowed(narrow, sides)).any()
+
+
+def test_small_boxes_shrink_onto_what_reaches_the_pose() -> None:
+    """About an axis through the TCP one angle is free: with it known, narrowing determines the other joints."""
+    rng, arm = np.random.default_rng(3), Arm(robot=ROBOT)
+    q = HOME + rng.uniform(-0.3, 0.3, 6)
+    T = tcp_pose(arm, q)
+    boxes = PoseBoxes(arm, ConeOrientedPose(T[:3, 3], np.array([0.0, 0.0, 1.0]), T[:3, 2], 0.0))
+    centre, half = q[None] + 0.01, np.full((1, 6), 0.02)
+    for _ in range(6):
+        centre, half, held = boxes.narrowed(centre, half)
+        assert held.all()
+    assert half[0, :5].max() < 4e-3  # a fifth of what it was, and the last joint is free
+
+
+def test_boxes_that_cannot_reach_the_pose_are_empty() -> None:
+    arm = Arm(robot=ROBOT)
+    T = tcp_pose(arm, GOAL)
+    pose = ConeOrientedPose(T[:3, 3] + [0.0, 0.0, 0.1], np.array([0.0, 0.0, 1.0]), T[:3, 2], 0.1)
+    assert not PoseBoxes(arm, pose).narrowed(GOAL[None], np.full((1, 6), 0.02))[2].any()
+    assert not WristBoxes(arm, pose).narrowed(GOAL[None], np.append(np.full(3, 0.01), np.full(3, 0.3))[None])[2].any()
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_no_configuration_in_a_box_has_less_potential_energy(name: str) -> None:
+    rng, arm = np.random.default_rng(5), ARMS[name]
+    made = PreparedProblem.of(replace(problem(), arm=arm, start=np.zeros(arm.robot.nq), goal=np.ones(arm.robot.nq)))
+    boxes = PoseBoxes(arm, ConeOrientedPose(np.array([0.4, 0.1, 0.3])))
+    assert rigid_body_model(arm).nq == arm.robot.nq
+    centre = rng.uniform(-np.pi, np.pi, (40, arm.robot.nq))
+    half = 10 ** rng.uniform(-3, 0.5, centre.shape)
+    least = boxes.least_potential(centre, half)
+    for _ in range(40):
+        within = rng.choice([-1.0, 1.0, 0.3], centre.shape)
+        potential = np.array([made.potential(q) for q in centre + half * within])
+        assert (potential >= least - 1e-9).all()
+    # a point's own potential energy is its bound
+    assert boxes.least_potential(centre, np.zeros_like(centre)) == pytest.approx(
+        np.array([made.potential(q) for q in centre]), abs=1e-9
+    )
