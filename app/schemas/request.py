@@ -225,7 +225,8 @@ class OptimizeRequest(MotionRequest):
     bound: BoundEffort = described(
         "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the answer get a second, "
         "greater one, which takes the copper loss of holding against gravity into account. It takes about a second per "
-        "candidate, lowest bound first, and ends before the `deadline`. For the objective `electrical`.",
+        "candidate, lowest bound first, and ends before the `deadline`. For the objective `electrical`. The bound of a "
+        "free orientation gets more effort, too.",
         None,
         "normal",
         default="normal",

@@ -33,17 +33,13 @@ from optimizer.search.ends import within_cone
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves
 
-# boxes along each inner joint at first, boxes split in a round, rounds a box is not split once its widest side is below
-# this [rad] length [m] that a radian of any joint counts as, beside the path that it moves the TCP by, where a side is
-# chosen to split times that a box is narrowed when it is made
-FIRST_BOXES, SPLIT, ROUNDS = 4, 160, 80
+# boxes along each inner joint at first, boxes split in a round, rounds, and rounds of a tight bound
+FIRST_BOXES, SPLIT, ROUNDS, TIGHT_ROUNDS = 4, 400, 24, 200
+# a box is not split once its widest side is below this [rad]
 SMALLEST = 0.01
-RADIAN = 0.3
-NARROWINGS = 2
-
-# half side [rad] from which on a box is as wide as can be where a side is chosen to split: inner joints come first
-WIDE = 0.3
-
+# where a side is chosen to split: what a radian of any joint counts as [m] beside the path that it moves the TCP by,
+# and the half side [rad] from which on a box is as wide as can be, so that inner joints come first
+RADIAN, WIDE = 0.3, 0.3
 # sum of half sides [rad] below which narrowing in all joints pays
 SMALL = 2.0
 
@@ -70,7 +66,7 @@ def family_bound_of(
         return np.inf
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
-    rounds = ROUNDS // len(poses)
+    rounds = (TIGHT_ROUNDS if prepared.problem.bound == "tight" else ROUNDS) // len(poses)
     return min(family_bound(prepared, pose, starts, rounds, deadline, half, enough) for pose in poses)
 
 
@@ -231,12 +227,11 @@ class _Family:
                 distance = np.linalg.norm(wrist - shell.centre, axis=1)
                 held &= (distance - blur <= shell.most) & (distance + blur >= shell.least)
         centre, half = centre.copy(), half.copy()
-        for _ in range(NARROWINGS):
-            if held.any() and self._wrist is not None:
-                centre[held], half[held], held[held] = self._wrist.narrowed(centre[held], half[held])
-            small = np.flatnonzero(held & (half.sum(axis=1) - self._boxes.free[-1] * half[:, -1] < SMALL))
-            if len(small):
-                centre[small], half[small], held[small] = self._boxes.narrowed(centre[small], half[small])
+        if held.any() and self._wrist is not None:
+            centre[held], half[held], held[held] = self._wrist.narrowed(centre[held], half[held])
+        small = np.flatnonzero(held & (half.sum(axis=1) - self._boxes.free[-1] * half[:, -1] < SMALL))
+        if len(small):
+            centre[small], half[small], held[small] = self._boxes.narrowed(centre[small], half[small])
         return centre, half, held
 
     def bounds(self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array) -> Array:
