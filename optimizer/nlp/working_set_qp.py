@@ -203,7 +203,9 @@ class WorkingSetQP:
             if not found and relaxed:
                 return None
             if not found:
+                # a relaxed QP without bounds may have a step of any length
                 relaxed = True
+                rows.add_bounds(bounds, np.ones_like(rows.bounded))
                 continue
             x = at.whitening @ y
             if attempt == QP_ROUNDS - 1 or not self._add_broken(rows, at, bounds, x):
@@ -241,11 +243,12 @@ class WorkingSetQP:
         return rows
 
     def _add_broken(self, rows: _Rows, at: QPInputs, bounds: Array, x: Array) -> bool:
-        """Add the bounds that the step x breaks, and the peaks that exceed a limit after it; whether there are any."""
+        """Add all bounds if the step x breaks one, else the peaks above a limit after it; whether any were added."""
+        if not rows.bounded.all() and ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any():
+            # all of them, and no peaks yet: a step without bounds may be so long that it breaks every limit
+            rows.add_bounds(bounds, np.ones_like(rows.bounded))
+            return True
         before = len(rows.most)
-        excess = np.array([bounds[0] - x, x - bounds[1]])
-        if (excess > BOUND_TOLERANCE).any():
-            rows.add_bounds(bounds, excess > BOUND_TOLERANCE)
         moved = (self._grid_free @ x[: self.count].reshape(at.free.shape)) / self.rates(at.T)[:, None, :]
         predicted = at.ratio + moved
         if self.free_time:

@@ -35,6 +35,8 @@ PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
 NEAR, RIVALS = 1.03, 2
 # half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
 WAVES, AMPLITUDES = 3, (0.1, 1.5)
+# share of each limit on speed, acceleration and jerk that a displacement may use
+SHARE = 0.5
 SEED = 0
 
 
@@ -82,10 +84,15 @@ class _Follower:
         waves = np.sin(np.pi * np.outer(t / line.duration, np.arange(1, WAVES + 1)))
         rng = np.random.default_rng(SEED)
         found = []
+        frequency = np.pi * np.arange(1, WAVES + 1) / line.duration
+        # greatest rate of a wave of amplitude 1 (derivative, wave) per limit
+        steepest = frequency ** np.arange(1, 4)[:, None]
         for _ in range(count):
             size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
-            moved = waves @ (rng.normal(size=(WAVES, q.shape[1])) * (size / np.arange(1, WAVES + 1)[:, None]))
-            guess = np.clip(q + moved, limits.q_min, limits.q_max)
+            amplitude = rng.normal(size=(WAVES, q.shape[1])) * (size / np.arange(1, WAVES + 1)[:, None])
+            # far beyond the limits, the SQP would spend its time on QPs without a solution
+            amplitude *= np.minimum(1.0, (SHARE * limits.rates / (steepest @ np.abs(amplitude))).min(axis=0))
+            guess = np.clip(q + waves @ amplitude, limits.q_min, limits.q_max)
             motion = self._from_samples(guess, t, WIDTH, FEW, PROGRESS)
             if motion is not None:
                 found.append(motion)
