@@ -216,7 +216,7 @@ def seeded(seed: int) -> dict[str, Problem]:
 
 
 # fronts that take many seconds
-SLOW = {"storage", "free goal", "isolated", "payload"}
+SLOW = {"storage", "free goal", "isolated", "payload", "mechanical", "weak motors", "bounded"}
 SEEDED = [
     pytest.param(seed, kind, marks=pytest.mark.long if seed or kind in SLOW else ())
     for seed in range(6)

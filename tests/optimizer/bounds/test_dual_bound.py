@@ -51,7 +51,9 @@ def around(task: PreparedProblem, start: Array, goal: Array, rng: np.random.Gene
     return Reference(x, fit * (rng.random(6) < 0.6))
 
 
-@pytest.mark.parametrize("name", list(CONDITIONS))
+@pytest.mark.parametrize(
+    "name", [pytest.param(k, marks=pytest.mark.long if number > 1 else ()) for number, k in enumerate(CONDITIONS)]
+)
 def test_no_motion_spends_less(name: str) -> None:
     """Straight and bent motions of every duration from the shortest on, with paths, multipliers and weights at
     random."""

@@ -84,6 +84,6 @@ def test_no_time_is_left() -> None:
     best = incumbent.best()
     assert best is not None
     spline = best.spline
-    incumbent.deadline = Deadline.after(-1.0)
+    incumbent.end = Deadline.after(-1.0)
     sharpen(incumbent, best)
     assert best.spline is spline
