@@ -22,6 +22,7 @@ from optimizer.methods.duration_intervals import DurationInterval, duration_inte
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
+from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.spline import Spline, lasting, sampled
 from optimizer.trajectories.time_scalings import quintic_spline
 
@@ -35,6 +36,9 @@ PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
 NEAR, RIVALS = 1.03, 2
 # half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
 WAVES, AMPLITUDES = 3, (0.1, 1.5)
+# a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
+# and there is next to nothing to gain
+LEAST_FREEDOM = 1.03
 # share of each limit on speed, acceleration and jerk that a displacement may use
 SHARE = 0.5
 SEED = 0
@@ -50,6 +54,9 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     if not incumbent.method.evenly_spaced or not (isolated or problem.objective == "mechanical"):
         return
     assert best.energy is not None
+    shortest = float(shortest_duration(best.q_goal - best.q_start, problem.arm.active_limits))
+    if best.spline.duration < LEAST_FREEDOM * shortest:
+        return
     near = [each for each in incumbent.candidates if each is not best and (each.energy or np.inf) <= NEAR * best.energy]
     _Follower(incumbent, best).follow(restarts=0 if isolated else RESTARTS)
     for rival in sorted(near, key=lambda each: each.energy or 0.0)[:RIVALS]:

@@ -136,8 +136,18 @@ def test_answers_are_true(name: str, method: str) -> None:
                 assert name in ("weak", "loaded to the rating")  # an end that cannot be held
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
-@pytest.mark.parametrize("name", list(CONDITIONS))
+# conditions in which the free spline is tried, too, in every run: it takes seconds
+QUICK = {"as it comes", "ceiling", "weak"}
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, marks=() if method == "time_scaling" or name in QUICK else pytest.mark.long)
+        for name in CONDITIONS
+        for method in ("bspline", "time_scaling")
+    ],
+)
 def test_mechanical_answers_are_true(name: str, method: str) -> None:
     """In 1.5 times the shortest duration, and in up to 1.2 times."""
     given = CONDITIONS[name]

@@ -351,10 +351,10 @@ def test_a_front_follows_a_goal_that_turns() -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        {"cycle": Cycle(time=4.0, hold="motors")},
+        pytest.param({"cycle": Cycle(time=4.0, hold="motors")}, marks=pytest.mark.long),
         {"cycle": Cycle(time=4.0, hold="brakes", brake_delay=0.3)},
         {"bus": Bus(mode="storage", capacity=20.0, efficiency=0.9)},
-        {"bus": Bus(mode="isolated")},
+        pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],
     ids=str,
 )
