@@ -21,6 +21,7 @@ from scipy.stats import spearmanr
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import Problem, optimize
+from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.problem.arm import Arm
 from optimizer.replay.evaluate import Evaluation, evaluate
@@ -181,7 +182,7 @@ def table_2() -> list[str]:
         q = configurations()[k]
         solutions = solver.solve(poses()[k])
         # configurations that differ by full turns are equal here
-        apart = [(solution.q - q + np.pi) % (2 * np.pi) - np.pi for solution in solutions]
+        apart = [wrapped(solution.q - q) for solution in solutions]
         best = int(np.argmin([np.abs(each).max() for each in apart]))
         branch = str(solutions[best].label).split(" ")[0]
         return [text(q), text(q + apart[best]), branch, f"{np.degrees(np.abs(apart[best]).max()):.1f}"]

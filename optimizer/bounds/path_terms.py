@@ -7,6 +7,7 @@ interpolation along one side errs by no more than that, and does not increase th
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -116,9 +117,8 @@ def path_terms(
     )  # fmt: skip
 
 
-def _sides(term: object) -> Array:
+def _sides(term: Callable[[slice], Array]) -> Array:
     """A term of the nodes at both ends of each step, (S, 2, ...)."""
-    assert callable(term)
     return np.stack([term(slice(None, -1)), term(slice(1, None))], axis=1)
 
 

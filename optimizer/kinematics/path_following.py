@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.angles import nearest_turn
 from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
 from optimizer.problem.arrays import frozen
@@ -131,7 +132,7 @@ class _Search:
             else:
                 damping *= 10
         # full turns of a joint reach the same pose: the configuration nearest to the start is meant
-        q = start + (q - start + np.pi) % (2 * np.pi) - np.pi
+        q = nearest_turn(q, start)
         return _Found(
             q,
             float(np.linalg.norm(error[:3])),

@@ -24,6 +24,7 @@ from models.robot import Array
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.problem.arm import Arm
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
@@ -61,6 +62,10 @@ class PoseBoxes:
         return joint_placements(rigid_body_model(self.arm))
 
     @cached_property
+    def _rates(self) -> Array:
+        return potential_rates(rigid_body_model(self.arm), np.asarray(self.arm.gravity))
+
+    @cached_property
     def _bodies(self) -> tuple[Array, Array]:
         """Mass (nq,) [kg] and centre of mass (nq, 3) [m], in its own frame, of each link."""
         bodies = list(rigid_body_model(self.arm).inertias)[1:]
@@ -86,20 +91,6 @@ class PoseBoxes:
         free[-1] = across < ROUNDING and (tilted < ROUNDING or self.pose.half_angle >= WIDEST_CONE)
         return free
 
-    @cached_property
-    def _mass_levers(self) -> Array:
-        """Σ_i m_i · (greatest distance of link i's centre of mass from joint j's origin) (nq,) [kg·m], over i ≥ j."""
-        masses, centres = self._bodies
-        lengths = np.linalg.norm(self._placements[1:, :3, 3], axis=1)
-        reach = [
-            [
-                float(np.linalg.norm(centres[i])) + float(lengths[j:i].sum()) if i >= j else 0.0
-                for i in range(len(masses))
-            ]
-            for j in range(len(masses))
-        ]
-        return np.asarray(np.array(reach) @ masses)
-
     def placed(self, q: Array) -> Placed:
         """The arm at q (b, nq) [rad]."""
         frames = link_frames(self._placements, q)[:, 1:]
@@ -107,7 +98,7 @@ class PoseBoxes:
         centres = np.einsum("bjxy,jy->bjx", frames[..., :3, :3], self._bodies[1]) + frames[..., :3, 3]
         return Placed(frames[..., :3, 2], frames[..., :3, 3], tcp[:, :3, 3], tcp[:, :3, :3] @ self.pose.axis, centres)
 
-    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Array]:
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose; which (b,) are not
         empty.
 
@@ -158,8 +149,8 @@ class PoseBoxes:
         beyond = np.cumsum((masses[:, None] * at.centres)[:, ::-1], axis=1)[:, ::-1]
         beyond = beyond - np.cumsum(masses[::-1])[::-1, None] * at.origins
         gradient = -np.cross(at.axes, beyond) @ g
-        levers = float(np.linalg.norm(g)) * self._mass_levers
-        fall = np.minimum(np.einsum("bj,bj->b", np.abs(gradient), half) + second_order(levers, half), half @ levers)
+        rates = self._rates
+        fall = np.minimum(np.einsum("bj,bj->b", np.abs(gradient), half) + second_order(rates, half), half @ rates)
         return np.asarray(potential - fall)
 
 

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from models.robot import Array
+from optimizer.kinematics.angles import wrapped
 from optimizer.problem.branches import Label
 
 # distance [m] beyond the reach at which the fourth axis may lie by rounding alone
@@ -128,7 +129,7 @@ class StretchedWrist:
         """The nearest parameter [rad] on an arc."""
         found = []
         for lower, upper in self.arcs:
-            near = parameter + 2 * np.pi * np.round(((lower + upper) / 2 - parameter) / (2 * np.pi))
+            near = parameter + 2 * np.pi * round(((lower + upper) / 2 - parameter) / (2 * np.pi))
             on_arc = float(np.clip(near, lower, upper))
             found.append((abs(near - on_arc), on_arc))
         return min(found)[1]
@@ -142,7 +143,7 @@ class StretchedWrist:
         q[:, 0], q[:, 4] = self.q1, self.q5
         q[:, 1], q[:, 2] = np.arctan2(z, x) - self._turned(shoulder, self.a2 < 0), self._turned(elbow, self._opposed)
         q[:, 3], q[:, 5] = h - q[:, 1] - q[:, 2], self.turn * (h - self.h0)
-        return np.clip(q - 2 * np.pi * np.round(q / (2 * np.pi)), -np.pi, np.pi)
+        return np.clip(wrapped(q), -np.pi, np.pi)
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion`. The fourth axis moves by at most |d5| per radian; both angles of the triangle are bounded

@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.robot import Array
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.forward import link_frames
 from optimizer.kinematics.tcp import T_last_tcp
-from optimizer.kinematics.wrist_geometry import OUTER
-from optimizer.problem.arm import Arm
+from optimizer.kinematics.wrist_geometry import WristGeometry
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 CELLS = 16
@@ -49,22 +48,13 @@ class _Vector:
 class WristBoxes:
     """What the first two joints of the wrist can be in boxes of joint positions if the TCP is at a pose."""
 
-    arm: Arm
+    geometry: WristGeometry
     pose: ConeOrientedPose
 
     @cached_property
-    def _placements(self) -> Array:
-        return joint_placements(rigid_body_model(self.arm))
-
-    @property
-    def inner(self) -> int:
-        """Number of joints before the wrist."""
-        return self.arm.robot.nq - OUTER
-
-    @cached_property
     def _vectors(self) -> list[_Vector]:
-        second, third = self._placements[self.inner + 1 :]
-        T = T_last_tcp(self.arm)
+        second, third = self.geometry.placements[self.geometry.inner + 1 :]
+        T = T_last_tcp(self.geometry.arm)
         point = third[:3, 3] + third[:3, 2] * T[2, 3]
         vectors = [_Vector(self.pose.position, second[:3, 3], point, float(np.hypot(*T[:2, 3])), True)]
         axis = T[:3, :3] @ self.pose.axis
@@ -78,9 +68,9 @@ class WristBoxes:
     def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose; which (b,) may hold
         any."""
-        w, second = self.inner, self._placements[self.inner + 1][:3, :3]
-        frames = link_frames(self._placements[:w], centre[:, :w])
-        wrist = frames[:, -1] @ self._placements[w]
+        w, second = self.geometry.inner, self.geometry.placements[self.geometry.inner + 1][:3, :3]
+        frames = link_frames(self.geometry.placements[:w], centre[:, :w])
+        wrist = frames[:, -1] @ self.geometry.placements[w]
         # cells (b, CELLS) of the second joint
         eta = half[:, w + 1] / CELLS
         cell = centre[:, w + 1, None] + eta[:, None] * (2 * np.arange(CELLS) + 1 - CELLS)
@@ -104,7 +94,7 @@ class WristBoxes:
             if reference is None:
                 reference, low, high = azimuth, -spread, spread
                 continue
-            apart = (azimuth - reference + np.pi) % (2 * np.pi) - np.pi
+            apart = wrapped(azimuth - reference)
             possible &= np.abs(apart) <= high + spread
             # one that reaches around the circle may meet the first on both sides
             around = np.abs(apart) + spread > np.pi
@@ -117,7 +107,7 @@ class WristBoxes:
         """How far (b,) a vector of the goal can move in the wrist's frame as the joints before it move in their
         boxes."""
         moved = np.zeros(len(half))
-        for j in range(self.inner):
+        for j in range(self.geometry.inner):
             axis = frames[:, j + 1, :3, 2]
             r = vector.base - frames[:, j + 1, :3, 3] if vector.is_point else np.tile(vector.base, (len(half), 1))
             radius = np.linalg.norm(np.cross(axis, r), axis=1)
@@ -137,7 +127,7 @@ def _hull(
     middle = reference + (low + high) / 2
     mean = np.angle((np.exp(1j * middle) * possible).sum(axis=1))
     centre[:, w] = np.where(anywhere, mean, centre[:, w])
-    away = (middle - centre[:, w, None] + np.pi) % (2 * np.pi) - np.pi
+    away = wrapped(middle - centre[:, w, None])
     wide = (high - low) / 2
     # an interval that reaches around the circle has parts at both sides
     around = np.abs(away) + wide > np.pi

@@ -71,13 +71,14 @@ class WristGeometry:
         return np.asarray(self.arm.gravity)
 
     @cached_property
-    def _placements(self) -> Array:
+    def placements(self) -> Array:
+        """Of each joint in the one before, with all joints at zero (nq, 4, 4)."""
         return joint_placements(self.model)
 
     @cached_property
     def levers(self) -> Array:
         """Greatest distance (inner,) of the wrist from each inner joint's origin [m]."""
-        lengths = np.linalg.norm(self._placements[1 : self.inner + 1, :3, 3], axis=1)
+        lengths = np.linalg.norm(self.placements[1 : self.inner + 1, :3, 3], axis=1)
         return np.asarray(np.cumsum(lengths[::-1])[::-1])
 
     @cached_property
@@ -87,17 +88,17 @@ class WristGeometry:
 
     def placed(self, q: Array) -> tuple[Array, Array]:
         """Wrist (b, 3) [m] and potential energy (b,) [J] of the inner links at inner joint positions q (b, inner)."""
-        frames = link_frames(self._placements[: self.inner], q)
+        frames = link_frames(self.placements[: self.inner], q)
         potential = np.zeros(len(q))
         for j in range(1, self.inner + 1):
             body, T = self.model.inertias[j], frames[:, j]
             potential -= body.mass * (T[:, :3, :3] @ body.lever + T[:, :3, 3]) @ self.gravity
-        return (frames[:, -1] @ self._placements[self.inner])[:, :3, 3], potential
+        return (frames[:, -1] @ self.placements[self.inner])[:, :3, 3], potential
 
     @cached_property
     def _wrist_lengths(self) -> Array:
         """Distances (2,) [m] from the wrist's first joint to its second, and from this one to its third."""
-        return np.asarray(np.linalg.norm(self._placements[self.inner + 1 :, :3, 3], axis=1))
+        return np.asarray(np.linalg.norm(self.placements[self.inner + 1 :, :3, 3], axis=1))
 
     def shells(self, pose: ConeOrientedPose) -> list[Shell]:
         """Where the wrist lies if the TCP is at the pose.
@@ -107,7 +108,7 @@ class WristGeometry:
         """
         tcp, lengths = T_last_tcp(self.arm), self._wrist_lengths
         angles = 2 * np.pi * np.arange(REACH_ANGLES) / REACH_ANGLES
-        last_two = self._placements[self.inner + 1] @ _about_z(angles) @ self._placements[self.inner + 2]
+        last_two = self.placements[self.inner + 1] @ _about_z(angles) @ self.placements[self.inner + 2]
         shells = []
         for s in ANCHORS if pose.half_angle < np.pi / 2 else (0.0,):
             anchor = tcp[:3, 3] + s * (tcp[:3, :3] @ pose.axis)
@@ -157,15 +158,6 @@ def potential_rates(model: pin.Model, gravity: Array, links: int | None = None) 
         for j in range(k + 1):
             rates[j] += body.mass * (float(np.linalg.norm(body.lever)) + float(lengths[j:k].sum()))
     return np.asarray(rates * float(np.linalg.norm(gravity)))
-
-
-def least_potential(arm: Arm) -> float:
-    """A lower bound [J] on the potential energy of an arm in any position: every link hangs as low as it can reach."""
-    model = rigid_body_model(arm)
-    reach = np.cumsum(np.linalg.norm(joint_placements(model)[:, :3, 3], axis=1)).tolist()
-    bodies = list(model.inertias)[1:]
-    moments = [body.mass * (far + float(np.linalg.norm(body.lever))) for body, far in zip(bodies, reach, strict=True)]
-    return -float(np.linalg.norm(arm.gravity) * sum(moments))
 
 
 def _about_z(angle: Array) -> Array:

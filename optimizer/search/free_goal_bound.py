@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.pose_boxes import PoseBoxes
 from optimizer.kinematics.wrist_boxes import WristBoxes
 from optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGeometry, potential_rates
@@ -42,8 +43,6 @@ SMALLEST = 0.01
 RADIAN, WIDE = 0.3, 0.3
 # sum of half sides [rad] below which narrowing in all joints pays
 SMALL = 2.0
-
-Marks = NDArray[np.bool_]
 
 
 def family_bound_of(
@@ -189,7 +188,7 @@ class _Family:
 
     @cached_property
     def _wrist(self) -> WristBoxes | None:
-        return None if self._geometry is None else WristBoxes(self.prepared.arm, self.pose)
+        return None if self._geometry is None else WristBoxes(self._geometry, self.pose)
 
     @cached_property
     def _geometry(self) -> WristGeometry | None:
@@ -216,7 +215,7 @@ class _Family:
         """Whether a box of half sides (nq,) [rad] is not worth splitting."""
         return bool(half[~self._boxes.free].max(initial=0.0) < SMALLEST)
 
-    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Marks]:
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Boxes (b, nq) that hold what of the given ones reaches the pose, and which of them (b,) may hold anything."""
         held = np.ones(len(centre), dtype=bool)
         if self._geometry is not None:
@@ -237,9 +236,7 @@ class _Family:
     def bounds(self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array) -> Array:
         """Bounds (b,) [J] on motions from boxes around starts (b, nq), of potential energy at most (b,) [J], into boxes
         (b, nq)."""
-        away = starts - centres
-        away = np.abs(away - 2 * np.pi * np.round(away / (2 * np.pi)))
-        displacement = np.maximum(away - halves - start_halves, 0.0)
+        displacement = np.maximum(np.abs(wrapped(starts - centres)) - halves - start_halves, 0.0)
         lowest = np.maximum(self._boxes.least_potential(centres, halves), self._hanging(centres, halves))
         return self._bound.of(displacement, lowest - potentials)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.exceptions import JoulepathError
+from optimizer.kinematics.angles import nearest_turn
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.orientation_tolerance import nearest_orientation
 from optimizer.kinematics.tcp import flange_pose, tcp_pose
@@ -112,7 +113,7 @@ def nearest_configuration(prepared: PreparedProblem, end: EndConfiguration, q: A
         assert end.tolerance is not None
         principal = _branches_of(prepared, end.tolerance, q)
     for branch in principal:
-        near = branch + 2 * np.pi * np.round((q - branch) / (2 * np.pi))
+        near = nearest_turn(branch, q)
         if ((near >= limits.q_min) & (near <= limits.q_max)).all():
             found.append(near)
     return min(found, key=lambda near: _distance(near, q), default=None)

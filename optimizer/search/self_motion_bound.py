@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
@@ -148,6 +149,6 @@ class _CellSearch:
         (q_start, start_half), (q_goal, goal_half) = self.start.boxes(starts), self.goal.boxes(goals)
         half = start_half + goal_half
         # a full turn of a joint changes neither the pose nor the potential energy
-        away = (q_goal - q_start + np.pi) % (2 * np.pi) - np.pi
+        away = wrapped(q_goal - q_start)
         potentials = [np.array([self.prepared.potential(q) for q in each]) for each in (q_start, q_goal)]
         return self.bound.of(np.maximum(np.abs(away) - half, 0.0), potentials[1] - potentials[0] - half @ self.rates)

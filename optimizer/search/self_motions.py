@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from optimizer.kinematics.angles import nearest_turn
 from optimizer.search.attempts import settled, solve
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import MEMBERS
@@ -70,7 +71,7 @@ def _moved(incumbent: Incumbent, candidate: Candidate, side: Literal["start", "g
     motion = end.self_motion
     assert motion is not None
     member = motion.at(np.array([motion.clipped(motion.parameter(q) + step)]))[0]
-    near = nearest_configuration(incumbent.prepared, end, member + 2 * np.pi * np.round((q - member) / (2 * np.pi)))
+    near = nearest_configuration(incumbent.prepared, end, nearest_turn(member, q))
     if near is None or (near == q).all():
         return None
     moved = {"start": candidate.q_start, "goal": candidate.q_goal, side: near}

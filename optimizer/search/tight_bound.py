@@ -33,6 +33,7 @@ from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.search.candidates import Candidate
 from optimizer.search.lower_bound import electrical
 from optimizer.trajectories.spline import sample
+from optimizer.trajectories.time_scalings import quintic_spline
 
 # steps of the path; ratio of the durations of a cell, cells that share their boxes, and the greatest ratio of all cells
 STEPS, CELL, GROUP, WINDOW = 24, 1.06, 2, 4.0
@@ -249,12 +250,9 @@ class _Piece:
         share = np.linspace(0.0, 1.0, STEPS + 1)
         if candidate.attempt is not None and candidate.attempt.spline is not None:
             spline = candidate.attempt.spline
-            q, v, a = sample(spline, share * spline.duration)
         else:
-            travel = candidate.q_goal - candidate.q_start
-            q = candidate.q_start + np.outer(share**3 * (10 - 15 * share + 6 * share**2), travel)
-            v = np.outer(30 * share**2 * (1 - share) ** 2, travel) / duration
-            a = np.outer(60 * share * (1 - share) * (1 - 2 * share), travel) / duration**2
+            spline = quintic_spline(candidate.q_start, candidate.q_goal, duration)
+        q, v, a = sample(spline, share * spline.duration)
         q = np.array(q)
         q[0], q[-1] = candidate.q_start, candidate.q_goal
         return q, prepared.torques(q, v, a) + prepared.friction.torque(v)

@@ -14,6 +14,7 @@ from optimizer.kinematics.pose_boxes import PoseBoxes
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.wrist_boxes import WristBoxes
+from optimizer.kinematics.wrist_geometry import WristGeometry
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -94,7 +95,11 @@ def test_boxes_that_cannot_reach_the_pose_are_empty() -> None:
     T = tcp_pose(arm, GOAL)
     pose = ConeOrientedPose(T[:3, 3] + [0.0, 0.0, 0.1], np.array([0.0, 0.0, 1.0]), T[:3, 2], 0.1)
     assert not PoseBoxes(arm, pose).narrowed(GOAL[None], np.full((1, 6), 0.02))[2].any()
-    assert not WristBoxes(arm, pose).narrowed(GOAL[None], np.append(np.full(3, 0.01), np.full(3, 0.3))[None])[2].any()
+    geometry = WristGeometry.of(arm)
+    assert geometry is not None
+    assert (
+        not WristBoxes(geometry, pose).narrowed(GOAL[None], np.append(np.full(3, 0.01), np.full(3, 0.3))[None])[2].any()
+    )
 
 
 @pytest.mark.parametrize("name", ARMS)

@@ -1,0 +1,17 @@
+"""Angles that differ by full turns."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.robot import Array
+
+
+def wrapped(angle: Array) -> Array:
+    """The angles [rad] less the full turns that bring them into [-π, π]."""
+    return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
+
+
+def nearest_turn(angle: Array, reference: Array) -> Array:
+    """The angles [rad] with the full turns that bring them within half a turn of `reference` [rad]."""
+    return angle + 2 * np.pi * np.round((reference - angle) / (2 * np.pi))
