@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 from models.robot import Array
+from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.pose_boxes import PoseBoxes
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import tcp_pose
@@ -55,11 +56,17 @@ def boxes_around(rng: np.random.Generator, q: Array, count: int) -> tuple[Array,
 
 def lost(q: Array, centre: Array, half: Array, held: Array) -> Array:
     """Which boxes (b,) do not hold q, full turns left out."""
-    away = np.abs((q - centre + np.pi) % (2 * np.pi) - np.pi)
-    return np.asarray(~(held & (away <= half + ROUNDING).all(axis=1)))
+    return np.asarray(~(held & (np.abs(wrapped(q - centre)) <= half + ROUNDING).all(axis=1)))
 
 
-@pytest.mark.parametrize("kind", [PoseBoxes, WristBoxes])
+def wrist_boxes(arm: Arm, pose: ConeOrientedPose) -> WristBoxes:
+    """The wrist's boxes of an arm of four joints or more."""
+    geometry = WristGeometry.of(arm)
+    assert geometry is not None
+    return WristBoxes(geometry, pose)
+
+
+@pytest.mark.parametrize("kind", [PoseBoxes, wrist_boxes])
 @pytest.mark.parametrize("half_angle", [0.0, 0.02, 0.3, 1.6, np.pi])
 @pytest.mark.parametrize("name", ARMS)
 def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, kind: Any) -> None:
@@ -67,7 +74,7 @@ def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, ki
     for _ in range(60):
         q, pose = reached(rng, ARMS[name], half_angle)
         centre, half = boxes_around(rng, q, 64)
-        if kind is WristBoxes:
+        if kind is wrist_boxes:
             # the second joint of a wrist is never wider than half a turn
             half[:, -2] = np.minimum(half[:, -2], np.pi / 2)
             centre[:, -2] = q[-2] + np.clip(centre[:, -2] - q[-2], -half[:, -2], half[:, -2])
