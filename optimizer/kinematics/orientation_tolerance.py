@@ -43,13 +43,10 @@ def sample_orientations(pose: ConeOrientedPose, count: int) -> Array:
     The tool axis is spread evenly over the cone's cap of the sphere, the rotation about it evenly over the circle. The
     points are of a Halton sequence.
     """
-    # few problems need it, and scipy.stats takes as long to import as the rest of scipy
-    from scipy.stats import qmc
-
-    points = qmc.Halton(3, scramble=False).random(count) if pose.half_angle > 0 else np.zeros((count, 3))
-    if pose.half_angle == 0:
-        points[:, 2] = np.arange(count) / count
-    level, azimuth, spin = points.T
+    if pose.half_angle > 0:
+        level, azimuth, spin = (_radical_inverse(base, count) for base in (2, 3, 5))
+    else:
+        level, azimuth, spin = np.zeros(count), np.zeros(count), np.arange(count) / count
     angles = np.arccos(1 - level * (1 - np.cos(pose.half_angle)))
     u = _across(pose.direction)
     across = np.cos(2 * np.pi * azimuth)[:, None] * u
@@ -77,3 +74,16 @@ def _least_rotation(a: Array, b: Array) -> Array:
     if sine < PARALLEL:
         return np.eye(3) if a @ b > 0 else np.asarray(pin.exp3(np.pi * _across(a)))
     return np.asarray(pin.exp3(normal / sine * np.arctan2(sine, a @ b)))
+
+
+def _radical_inverse(base: int, count: int) -> Array:
+    """The numbers 0 ... count - 1 with their digits mirrored at the point (count,): one axis of the Halton sequence.
+
+    scipy.stats has it, too, but takes longer to import than all else that a request needs.
+    """
+    number, found, weight = np.arange(count), np.zeros(count), 1.0
+    while number.any():
+        weight /= base
+        found += weight * (number % base)
+        number //= base
+    return found

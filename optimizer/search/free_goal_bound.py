@@ -34,8 +34,9 @@ from optimizer.search.ends import within_cone
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves
 
-# boxes along each inner joint at first, boxes split in a round, rounds, and rounds of a tight bound
-FIRST_BOXES, SPLIT, ROUNDS, TIGHT_ROUNDS = 4, 400, 24, 200
+# boxes along each inner joint at first, but for so many starts that there would be more than MOST_FIRST in all; boxes
+# split in a round, rounds, and rounds of a tight bound
+FIRST_BOXES, MOST_FIRST, SPLIT, ROUNDS, TIGHT_ROUNDS = (4, 2, 1), 4096, 400, 24, 200
 # a box is not split once its widest side is below this [rad]
 SMALLEST = 0.01
 # where a side is chosen to split: what a radian of any joint counts as [m] beside the path that it moves the TCP by,
@@ -142,8 +143,9 @@ class _BoxSearch:
         """Boxes that cover every position of the joints, for every start: the inner joints' range in parts."""
         nq, count = self.starts.shape[1], len(self.starts)
         inner = max(nq - OUTER, 0)
-        side = np.pi / FIRST_BOXES
-        one_side = -np.pi + side * (2 * np.arange(FIRST_BOXES) + 1)
+        along = next((n for n in FIRST_BOXES if 2 * n**inner * count <= MOST_FIRST), FIRST_BOXES[-1])
+        side = np.pi / along
+        one_side = -np.pi + side * (2 * np.arange(along) + 1)
         # both ways of bending the wrist
         parts = np.array(list(product(*[one_side] * inner, *[(-np.pi / 2, np.pi / 2)] * (nq > OUTER))))
         centre, half = np.zeros((len(parts), nq)), np.full((len(parts), nq), np.pi)

@@ -127,7 +127,7 @@ class Run:
                 incumbent.deadline,
                 most_solved,
             )
-            if incumbent.best() is not None or not activate_deferred(candidates):
+            if incumbent.best() is not None or incumbent.deadline.passed or not activate_deferred(candidates):
                 break
 
     def without_storage(self) -> tuple[Candidate, SolveResult, Energy] | None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.stats import qmc
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem, NoReachableTarget, UnreachablePose
@@ -26,15 +27,13 @@ from optimizer.problem.bus import Bus
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf
 from optimizer.search.free_goal import goal_constraints
-from optimizer.search.free_goal_bound import family_bound
-from optimizer.search.lower_bound import lower_bounds
 from optimizer.search.reserve import RESERVE
+from optimizer.search.run import Run
+from optimizer.search.sampled_ends import BATCH
 from optimizer.solution import Solution
 from optimizer.trajectories import bspline
-from tests.optimizer.chains import serial_chain
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
 
@@ -60,6 +59,13 @@ def rotations(seed: int, count: int) -> list[Array]:
 
 def energy(solution: Solution) -> float:
     return solution.energy.electrical.total
+
+
+def test_samples_are_of_the_halton_sequence() -> None:
+    """Against SciPy's, by the cosine of the tilt: the first coordinate in base 2."""
+    R = sample_orientations(ConeOrientedPose(np.zeros(3)), 100)
+    levels = qmc.Halton(3, scramble=False).random(100)[:, 0]
+    assert R[:, 2, 2] == pytest.approx(1 - 2 * levels, abs=ROUNDING)
 
 
 @pytest.mark.parametrize("half_angle", [0.0, 1e-3, 0.4, 2.5, np.pi])
@@ -167,7 +173,9 @@ def test_the_solver_keeps_to_the_leeway() -> None:
         assert (allowed.rows @ moved >= allowed.lower - 1e-8).all()
 
 
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize(
+    "number", [0, pytest.param(1, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.long)]
+)
 def test_what_is_freer_costs_no_more(number: int) -> None:
     """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five orientations."""
     pose = POSITIONS[number]
@@ -189,7 +197,7 @@ def test_what_is_freer_costs_no_more(number: int) -> None:
     assert energy(free) <= energy(five) * (1 + FOUND)
 
 
-@pytest.mark.parametrize("number", range(2))
+@pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_free_is_no_worse_than_any_orientation_sampled(number: int) -> None:
     """Twelve orientations that the search has not seen, each solved as a request of its own."""
     pose = ConeOrientedPose(POSITIONS[number].T[:3, 3])
@@ -230,67 +238,6 @@ def test_holds_under(condition: str) -> None:
         assert solution.goal.label.split("/")[1] == "up"
 
 
-def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float:
-    """The least `lower_bounds` of any branch of many orientations, joints as near to the start as full turns allow."""
-    made, kinematics = PreparedProblem.of(task), inverse_kinematics_for(ROBOT)
-    start = np.asarray(task.start)
-    q = np.array(
-        [
-            branch.q
-            for R in sample_orientations(pose, count)
-            for branch in kinematics.branches(pose.with_orientation(R).T @ np.linalg.inv(task.arm.T_flange_tcp))
-        ]
-    )
-    displacement = q - start
-    displacement -= 2 * np.pi * np.round(displacement / (2 * np.pi))
-    potential_gain = np.array([made.potential(each) for each in q]) - made.potential(start)
-    return float(lower_bounds(made, displacement, potential_gain)[0].min())
-
-
-@pytest.mark.parametrize("half_angle", [0.0, 0.3, np.pi])
-@pytest.mark.parametrize("given", [{}, {"T_flange_tcp": TOOL, "payload": PAYLOAD}, {"gravity": TILTED}], ids=str)
-def test_the_bound_holds_for_the_whole_family(half_angle: float, given: dict[str, Any]) -> None:
-    """It is below the bound of every configuration sampled, at every depth of the search, and rises with depth."""
-    rng = np.random.default_rng(4)
-    for _ in range(3):
-        start, goal = rng.uniform(-np.pi, np.pi, (2, 6))
-        task = problem(start, GOAL, **given)
-        T = tcp_pose(goal, given.get("T_flange_tcp")).T
-        pose = ConeOrientedPose(T[:3, 3], [0, 0, 1], T[:3, 2], half_angle)
-        values = [family_bound(PreparedProblem.of(task), pose, start[None], rounds) for rounds in (0, 5, 20)]
-        assert values == sorted(values)
-        assert values[-1] <= bound_of_samples(task, pose, 150)
-
-
-@pytest.mark.parametrize("nq", [2, 3, 4, 5, 7])
-@pytest.mark.parametrize("given", [{}, {"objective": "mechanical", "duration_max": 5.0}], ids=str)
-def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
-    """It is below the bound of a configuration that reaches the pose, also for chains without inner joints."""
-    robot, rng = serial_chain(nq), np.random.default_rng(nq)
-    for half_angle in (0.0, 0.3, np.pi):
-        start, goal = rng.uniform(-3, 3, (2, nq))
-        made = PreparedProblem.of(problem(start, goal, robot=robot, payload=Payload(mass=0.5), **given))
-        data = robot.model.createData()
-        pin.framesForwardKinematics(robot.model, data, goal)
-        T = data.oMf[robot.model.getFrameId("flange")].homogeneous
-        pose = ConeOrientedPose(T[:3, 3], [0, 1, 1], T[:3, :3] @ np.array([0, 1, 1]), half_angle)
-        displacement = (goal - start) - 2 * np.pi * np.round((goal - start) / (2 * np.pi))
-        gain = np.array([made.potential(goal) - made.potential(start)])
-        value = family_bound(made, pose, start[None], 5)
-        assert np.isfinite(value) and value <= lower_bounds(made, displacement[None], gain)[0][0]
-
-
-def test_the_bound_tells_far_from_near() -> None:
-    """On the other side of the base, the first joint's half turn alone is most of the energy."""
-    task = problem(HOME, GOAL)
-    opposite = tcp_pose(HOME).T[:3, 3] * np.array([-1, -1, 1])
-    near, far = (
-        family_bound(PreparedProblem.of(task), ConeOrientedPose(p), HOME[None])
-        for p in (tcp_pose(HOME).T[:3, 3], opposite)
-    )
-    assert far > near + 30
-
-
 def test_out_of_reach_in_every_orientation() -> None:
     far = ConeOrientedPose(np.array([2.0, 0.0, 0.3]))
     with pytest.raises(UnreachablePose) as refusal:
@@ -299,6 +246,19 @@ def test_out_of_reach_in_every_orientation() -> None:
     assert "each of the 96 orientations" in str(refusal.value)
     with pytest.raises(NoReachableTarget):
         optimize(problem(goal=AnyOf((far, far))))
+
+
+def test_no_sample_is_activated_after_the_deadline() -> None:
+    """Thousands of deferred samples: each batch of them is a search of its own, and none begins too late."""
+    rng, clock = np.random.default_rng(2), CountingClock(0.0)
+    starts = AnyOf(tuple(HOME + rng.normal(scale=0.3, size=6) for _ in range(12)))
+    run = Run(problem(starts, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])), clock=clock)
+    run.prepare()
+    deferred = [each for each in run.incumbent.candidates if each.deferred]
+    assert len(deferred) > 1000
+    clock.now += 1e6
+    run.explore()
+    assert sum(each.deferred for each in deferred) >= len(deferred) - BATCH
 
 
 def test_mixes_with_full_targets() -> None:
