@@ -22,16 +22,23 @@ endif
 
 export PYTHONUNBUFFERED := 1
 
-.PHONY: serve test test-long bench lock clean lint kernels
+.PHONY: serve test test-long bench lock clean lint kernels pytest pytest-long
 
 serve: $(VENV)/.runtime kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
-test: lint kernels
+# the linters run beside the tests, each line of either as it comes
+test: $(VENV)/.dev kernels
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint pytest
+
+test-long: $(VENV)/.dev kernels
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint pytest-long
+
+pytest:
 	$(PY) -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
 
 # an empty marker expression takes back the deselection in pyproject.toml
-test-long: lint kernels
+pytest-long:
 	$(PY) -m pytest -n auto --dist loadfile -m "" $(PYTEST_ARGS)
 
 lint: $(VENV)/.dev

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,7 @@ from tests.optimizer.moves import (
     tcp_pose,
     torques,
 )
+from tests.selection import long_but
 
 ROUNDING = 1e-9
 # relative; what a solver that stops where a step promises 5e-5 of the cost may leave behind, twice
@@ -136,17 +137,12 @@ def test_answers_are_true(name: str, method: str) -> None:
                 assert name in ("weak", "loaded to the rating")  # an end that cannot be held
 
 
-# conditions in which the free spline is tried, too, in every run: it takes seconds
-QUICK = {"as it comes", "ceiling", "weak"}
-
-
 @pytest.mark.parametrize(
     ("name", "method"),
-    [
-        pytest.param(name, method, marks=() if method == "time_scaling" or name in QUICK else pytest.mark.long)
-        for name in CONDITIONS
-        for method in ("bspline", "time_scaling")
-    ],
+    long_but(
+        [("as it comes", "bspline"), *((name, "time_scaling") for name in ("weak", "ceiling", "half recovered"))],
+        product(CONDITIONS, ("bspline", "time_scaling")),
+    ),
 )
 def test_mechanical_answers_are_true(name: str, method: str) -> None:
     """In 1.5 times the shortest duration, and in up to 1.2 times."""
@@ -243,7 +239,7 @@ def test_regeneration_gives_energy_back() -> None:
 @pytest.mark.parametrize("method", ["bspline", "time_scaling"])
 @pytest.mark.parametrize("objective", ["electrical", "mechanical"])
 def test_fixed_durations_are_kept_exactly(objective: str, method: str) -> None:
-    for duration in (0.74, 1.1, 2.345, 7.0):
+    for duration in (0.74, 2.345, 7.0):
         assert solved(problem(objective=objective, method=method, **fixed(duration))).duration == duration
 
 

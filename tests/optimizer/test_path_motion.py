@@ -15,6 +15,7 @@ from optimizer.problem.tool_cone import ToolCone
 from optimizer.solution import Solution
 from optimizer.trajectories.spline import sample
 from tests.optimizer.moves import problem_with
+from tests.selection import long_but
 
 # the tool points straight down at both ends, 12 cm from the flange
 START, GOAL = np.array([-0.77, -1.52, 1.82, -1.87, -1.57, -2.34]), np.array([0.66, -1.4, 0.75, -0.92, -1.57, -0.91])
@@ -67,7 +68,7 @@ def test_the_tool_stays_within_the_cone(half_angle: float) -> None:
     assert tilt.max() > 0.98 * half_angle, "the limit is made use of"
 
 
-@pytest.mark.parametrize("limit", [1.0, 0.5, 0.25])
+@pytest.mark.parametrize("limit", long_but([0.5], [1.0, 0.5, 0.25]))
 def test_tcp_and_elbow_keep_their_speeds(limit: float) -> None:
     solution = solved(tcp_speed=limit, elbow_speed=limit / 4)
     _, tcp, elbow = replayed(solution)

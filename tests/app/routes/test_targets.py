@@ -11,6 +11,7 @@ from app.schemas.errors import UnreachableTargets
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_validation import POSE, refused
+from tests.selection import long_but
 
 FAR = {"pose": {"position": [2.0, 0.0, 0.3], "rpy": [0.0, 0.0, 0.0]}}
 
@@ -48,17 +49,16 @@ def loose(orientation: Any, **fields: Any) -> dict[str, Any]:
     return {"pose": {"position": PLACE, "orientation": orientation, **fields}}
 
 
-@pytest.mark.parametrize(
-    "orientation",
-    [
-        "free",
-        {"cone": CONE},
-        {"free_about": [0, 0, 2], "quaternion": UPRIGHT},
-        {"free_about": [0, 1, 0], "rpy": [3.1, 0.1, 0.2]},
-        {"free_about": [0, 0, 1], "rotvec": [0, 3.1, 0]},
-    ],
-    ids=str,
-)
+ORIENTATIONS: list[Any] = [
+    "free",
+    {"cone": CONE},
+    {"free_about": [0, 0, 2], "quaternion": UPRIGHT},
+    {"free_about": [0, 1, 0], "rpy": [3.1, 0.1, 0.2]},
+    {"free_about": [0, 0, 1], "rotvec": [0, 3.1, 0]},
+]
+
+
+@pytest.mark.parametrize("orientation", long_but([ORIENTATIONS[k] for k in (0, 1, 4)], ORIENTATIONS), ids=str)
 def test_chooses_the_orientation(client: TestClient, orientation: Any) -> None:
     answer = client.post("/optimize", json=move(goal=loose(orientation)))
     assert answer.status_code == 200, answer.text

@@ -19,6 +19,7 @@ from optimizer.search.baselines import guesses
 from optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import ROBOT, problem
 from tests.optimizer.search.test_lower_bound import CONDITIONS, QUADRATURE, Torques, ends, motions
+from tests.selection import long_but
 
 STEPS = 6
 CHOICE = 1e-3  # relative; a cell has one multiplier of the displacement, found by bisection, and a duration its own
@@ -51,9 +52,7 @@ def around(task: PreparedProblem, start: Array, goal: Array, rng: np.random.Gene
     return Reference(x, fit * (rng.random(6) < 0.6))
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(k, marks=pytest.mark.long if number > 1 else ()) for number, k in enumerate(CONDITIONS)]
-)
+@pytest.mark.parametrize("name", long_but(list(CONDITIONS)[:2], CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
     """Straight and bent motions of every duration from the shortest on, with paths, multipliers and weights at
     random."""

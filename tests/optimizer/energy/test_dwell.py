@@ -20,6 +20,7 @@ from optimizer.problem.bus import Bus
 from optimizer.problem.cycle import Cycle
 from optimizer.solution import Solution
 from tests.optimizer.moves import ROBOT, fixed, problem
+from tests.selection import long_but
 
 BY_HAND = 1e-12  # relative; a few operations
 SCAN = 5e-3  # relative; neighbouring durations of the scan, and where each search stops
@@ -80,7 +81,7 @@ def test_its_pieces_are_its_value(cycle: Cycle) -> None:
         assert values
 
 
-@pytest.mark.parametrize("name", list(CYCLES))
+@pytest.mark.parametrize("name", long_but(("motors", "cheap brakes", "late brakes"), CYCLES))
 def test_no_duration_is_better(name: str) -> None:
     """Brute force: motions optimised for fixed durations, each with its wait by hand; certified, above the bound."""
     cycle = CYCLES[name]

@@ -23,6 +23,7 @@ from optimizer.trajectories.bspline import DEGREE, Basis
 from optimizer.trajectories.seven_segment import shortest_duration
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, fixed, limits, problem, random_moves, torques
 from tests.optimizer.nlp.ipopt_peer import Peer
+from tests.selection import long_but
 
 # relative; the peer's grid of limits is eight times coarser, which lets its peaks rise between the points by some 1e-3
 # of the limit, and costs bend little with limits
@@ -84,7 +85,7 @@ def conditions(k: int) -> dict[str, Any]:
     return {"own": given.pop("limits", ROBOT.limits)} | given
 
 
-@pytest.mark.parametrize("k", range(len(CONDITIONS)))
+@pytest.mark.parametrize("k", long_but((0, WEAK, 5), range(len(CONDITIONS))))
 def test_electrical_optimum_is_ipopts(peer: Peer, k: int) -> None:
     """From the same guess, one move per condition: the same cost, and nearly the same duration."""
     start, goal = list(random_moves(11, len(CONDITIONS)))[k]

@@ -36,6 +36,7 @@ from optimizer.solution import Solution
 from optimizer.trajectories import bspline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
+from tests.selection import long_but
 
 # the certificate's, of positions [m] and angles [rad]
 HELD = 1e-6
@@ -173,9 +174,7 @@ def test_the_solver_keeps_to_the_leeway() -> None:
         assert (allowed.rows @ moved >= allowed.lower - 1e-8).all()
 
 
-@pytest.mark.parametrize(
-    "number", [0, pytest.param(1, marks=pytest.mark.long), pytest.param(2, marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("number", long_but([0], range(3)))
 def test_what_is_freer_costs_no_more(number: int) -> None:
     """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five orientations."""
     pose = POSITIONS[number]
@@ -197,7 +196,7 @@ def test_what_is_freer_costs_no_more(number: int) -> None:
     assert energy(free) <= energy(five) * (1 + FOUND)
 
 
-@pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", long_but([0], range(2)))
 def test_free_is_no_worse_than_any_orientation_sampled(number: int) -> None:
     """Twelve orientations that the search has not seen, each solved as a request of its own."""
     pose = ConeOrientedPose(POSITIONS[number].T[:3, 3])
@@ -219,7 +218,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize("condition", long_but(("tool and payload", "time scaling", "mechanical"), CONDITIONS))
 def test_holds_under(condition: str) -> None:
     """Every other setting with a cone about a tool axis: in place, within the cone, above the bound."""
     given = {"payload": Payload(mass=0.5)} | CONDITIONS[condition]

@@ -26,6 +26,7 @@ from optimizer.trajectories.quadrature import quadrature
 from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.spline import peak_rates, spline_of
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, changed, fixed, limits, problem
+from tests.selection import long_but
 
 # relative; energies are sums over samples, and a true bound may lie below a motion by nothing but that
 QUADRATURE = 1e-4
@@ -116,7 +117,7 @@ def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Ar
     return lower_bounds(task, goal - start, potential_gain)
 
 
-@pytest.mark.parametrize("name", list(CONDITIONS))
+@pytest.mark.parametrize("name", long_but(("as it comes", "loaded and tilted", "all recovered", "lossy"), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
     """Thousands of motions over all conditions, electrical and mechanical, with free duration and with their own."""
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])

@@ -14,6 +14,7 @@ from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import Problem
 from optimizer.solution import Solution
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, fixed, limits, problem
+from tests.selection import long_but
 
 CASES: dict[str, dict[str, Any]] = {
     "as it comes": {},
@@ -36,7 +37,7 @@ def both(asked: Problem) -> tuple[Solution, Solution]:
 QUICK = {"as it comes", "duration near the shortest", "wait with brakes"}
 
 
-@pytest.mark.parametrize("name", [pytest.param(k, marks=() if k in QUICK else pytest.mark.long) for k in CASES])
+@pytest.mark.parametrize("name", long_but(QUICK, CASES))
 def test_it_is_between_the_plain_bound_and_the_energy(name: str) -> None:
     plain, tight = both(problem(**CASES[name]))
     assert np.array_equal(plain.trajectory.spline.control_points, tight.trajectory.spline.control_points)

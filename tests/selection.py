@@ -1,0 +1,19 @@
+"""Which parameters of a test every run tries, and which `make test-long` alone."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+import pytest
+
+
+def long_but(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
+    """The values, or tuples of values, as parameters of a test: those in `quick` as they are, the others `long`."""
+    found = list(values)
+    assert all(each in found for each in quick), "a quick parameter is none of the test's"
+    return [each if each in quick else _long(each) for each in found]
+
+
+def _long(each: Any) -> Any:
+    return pytest.param(*(each if isinstance(each, tuple) else (each,)), marks=pytest.mark.long)
