@@ -27,12 +27,12 @@ export PYTHONUNBUFFERED := 1
 serve: $(VENV)/.runtime kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
-# the linters run beside the tests, each line of either as it comes
+# the linters run beside the tests
 test: $(VENV)/.dev kernels
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint pytest
+	@$(MAKE) --no-print-directory --jobs=2 lint pytest
 
 test-long: $(VENV)/.dev kernels
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint pytest-long
+	@$(MAKE) --no-print-directory --jobs=2 lint pytest-long
 
 pytest:
 	$(PY) -m pytest -n auto --dist loadfile $(PYTEST_ARGS)

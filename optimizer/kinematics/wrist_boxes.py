@@ -9,7 +9,11 @@ moves a point at radius r by at most δ r, and earlier rotations have moved it b
 q_{w+1} is cut into cells. In a cell, v is within η of its middle's. The distance from axis w and the height along it
 differ by no more than two points do. So |(ρ, z)(x) - (ρ, z)(v)| ≤ e = β + across + η, or the cell holds no solution. If
 it may, the azimuths of x and Rz(q_w) v differ by at most asin(e / max(ρ_x, ρ_v)). The same holds for the tool's axis
-and the direction of its cone, with lengths of 1.
+and the direction d of its cone, with lengths of 1, if this axis is nearly the last joint's, u.
+
+If it makes an angle α with u, the last joint turns it around u. What is left of the cone: the angle between u and
+d is within half_angle of α. In a cell, u · d = ρ_u ρ_d cos(φ - q_w) + z_u z_d, φ the difference of their azimuths, and
+it is within e of its place for the middles. This leaves q_w two intervals, φ ± [least, most].
 """
 
 from __future__ import annotations
@@ -28,6 +32,8 @@ from optimizer.kinematics.wrist_geometry import WristGeometry
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 
 CELLS = 16
+# a tool's axis nearer than this to the last joint's is held by its place [rad, nearly], else by its angle
+ALIGNED = 0.1
 # what lengths [m, 1] are widened by, for rounding
 ROUNDING = 1e-9
 
@@ -45,6 +51,38 @@ class _Vector:
 
 
 @dataclass(frozen=True)
+class _Cells:
+    """Boxes: the frames (b, w + 1, 4, 4) of the joints before the wrist at their middles, half sides (b, nq), and cells
+    of the wrist's second joint, of half side `eta` (b,) around `angle` (b, CELLS) [rad]."""
+
+    frames: Array
+    half: Array
+    eta: Array
+    angle: Array
+
+    @cached_property
+    def cosine(self) -> Array:
+        return np.cos(self.angle)
+
+    @cached_property
+    def sine(self) -> Array:
+        return np.sin(self.angle)
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Per box and cell, (b, CELLS): difference of the azimuths of goal and tool, their distances (b, 1) and (b, CELLS)
+    from the wrist's first axis, their heights along it, and e, by how much both may be elsewhere."""
+
+    azimuth: Array
+    rho_goal: Array
+    rho_tool: Array
+    z_goal: Array
+    z_tool: Array
+    e: Array
+
+
+@dataclass(frozen=True)
 class WristBoxes:
     """What the first two joints of the wrist can be in boxes of joint positions if the TCP is at a pose."""
 
@@ -52,56 +90,76 @@ class WristBoxes:
     pose: ConeOrientedPose
 
     @cached_property
-    def _vectors(self) -> list[_Vector]:
+    def _tilt(self) -> float:
+        """Distance of the tool's axis from the last joint's, or from its opposite."""
+        return float(np.linalg.norm(self._axis - [0.0, 0.0, self._sign]))
+
+    @cached_property
+    def _axis(self) -> Array:
+        """The tool's axis (3,) in the last joint's frame."""
+        return np.asarray(T_last_tcp(self.geometry.arm)[:3, :3] @ self.pose.axis)
+
+    @property
+    def _sign(self) -> float:
+        return 1.0 if self._axis[2] >= 0 else -1.0
+
+    @cached_property
+    def _point(self) -> _Vector:
+        """The TCP."""
         second, third = self.geometry.placements[self.geometry.inner + 1 :]
         T = T_last_tcp(self.geometry.arm)
         point = third[:3, 3] + third[:3, 2] * T[2, 3]
-        vectors = [_Vector(self.pose.position, second[:3, 3], point, float(np.hypot(*T[:2, 3])), True)]
-        axis = T[:3, :3] @ self.pose.axis
-        sign = 1.0 if axis[2] >= 0 else -1.0
-        tilt = float(np.linalg.norm(axis - [0.0, 0.0, sign]))
-        slack = tilt + 2 * float(np.sin(self.pose.half_angle / 2))
-        if slack < 1:  # a wider one says nothing
-            vectors.append(_Vector(self.pose.direction, np.zeros(3), sign * third[:3, 2], slack, False))
-        return vectors
+        return _Vector(self.pose.position, second[:3, 3], point, float(np.hypot(*T[:2, 3])), True)
+
+    @cached_property
+    def _direction(self) -> _Vector:
+        """The last joint's axis, and the direction of the cone."""
+        third = self.geometry.placements[self.geometry.inner + 2]
+        slack = self._tilt + 2 * float(np.sin(self.pose.half_angle / 2)) if self._tilt < ALIGNED else 0.0
+        sign = self._sign if self._tilt < ALIGNED else 1.0
+        return _Vector(self.pose.direction, np.zeros(3), sign * third[:3, 2], slack, False)
+
+    @cached_property
+    def _cosines(self) -> tuple[float, float]:
+        """Least and greatest cosine of the angle between the last joint's axis and the direction of the cone."""
+        angle = float(np.arctan2(np.hypot(*self._axis[:2]), self._axis[2]))
+        half = self.pose.half_angle
+        return float(np.cos(min(angle + half, np.pi))), float(np.cos(max(angle - half, 0.0)))
 
     def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose; which (b,) may hold
         any."""
-        w, second = self.geometry.inner, self.geometry.placements[self.geometry.inner + 1][:3, :3]
+        w = self.geometry.inner
         frames = link_frames(self.geometry.placements[:w], centre[:, :w])
-        wrist = frames[:, -1] @ self.geometry.placements[w]
-        # cells (b, CELLS) of the second joint
         eta = half[:, w + 1] / CELLS
         cell = centre[:, w + 1, None] + eta[:, None] * (2 * np.arange(CELLS) + 1 - CELLS)
-        c, s = np.cos(cell)[..., None], np.sin(cell)[..., None]
-        possible = np.ones(cell.shape, dtype=bool)
-        low = high = np.zeros(cell.shape)
-        reference: Array | None = None
-        for vector in self._vectors:
-            x = vector.base - wrist[:, :3, 3] if vector.is_point else np.tile(vector.base, (len(centre), 1))
-            x = np.einsum("bxy,bx->by", wrist[:, :3, :3], x)
-            a = vector.arm
-            turned = np.concatenate([c * a[0] - s * a[1], s * a[0] + c * a[1], np.full_like(c, a[2])], axis=-1)
-            v = vector.offset + turned @ second.T
-            reach = self._moved(vector, frames, half) + vector.slack + ROUNDING
-            e = reach[:, None] + eta[:, None] * float(np.hypot(*a[:2]))
-            rho_x, rho_v = np.hypot(x[:, 0], x[:, 1])[:, None], np.hypot(v[..., 0], v[..., 1])
-            possible &= np.hypot(rho_x - rho_v, x[:, 2, None] - v[..., 2]) <= e
-            azimuth = np.arctan2(x[:, 1], x[:, 0])[:, None] - np.arctan2(v[..., 1], v[..., 0])
-            spread = np.arcsin(np.minimum(e / np.maximum(np.maximum(rho_x, rho_v), ROUNDING), 1.0))
-            spread = np.where(spread < np.pi / 2, spread + ROUNDING, np.pi)
-            if reference is None:
-                reference, low, high = azimuth, -spread, spread
-                continue
-            apart = wrapped(azimuth - reference)
-            possible &= np.abs(apart) <= high + spread
-            # one that reaches around the circle may meet the first on both sides
-            around = np.abs(apart) + spread > np.pi
-            low = np.where(around, low, np.maximum(low, apart - spread))
-            high = np.where(around, high, np.minimum(high, apart + spread))
-        assert reference is not None
+        cells = _Cells(frames, half, eta, cell)
+        reference, spread, possible = _nearby(self._places(self._point, cells))
+        low, high = -spread, spread
+        if self._tilt < ALIGNED and self._direction.slack < 1:  # a wider one says nothing
+            azimuth, other, may = _nearby(self._places(self._direction, cells))
+            low, high, held = _met(low, high, wrapped(azimuth - reference), np.zeros_like(other), other)
+            possible &= may & held
+        elif self._tilt >= ALIGNED and self._cosines != (-1.0, 1.0):
+            azimuth, least, most, may = _at_angle(self._places(self._direction, cells), *self._cosines)
+            low, high, held = _met(low, high, wrapped(azimuth - reference), least, most)
+            possible &= may & held
         return _hull(centre, half, w, reference, low, high, eta, possible)
+
+    def _places(self, vector: _Vector, cells: _Cells) -> _Places:
+        """A vector of the tool in every cell, and of the goal in every box."""
+        w = self.geometry.inner
+        wrist = cells.frames[:, -1] @ self.geometry.placements[w]
+        x = vector.base - wrist[:, :3, 3] if vector.is_point else np.tile(vector.base, (len(wrist), 1))
+        x = np.einsum("bxy,bx->by", wrist[:, :3, :3], x)
+        a, (c, s) = vector.arm, (cells.cosine, cells.sine)
+        turned = np.stack([c * a[0] - s * a[1], s * a[0] + c * a[1], np.full_like(c, a[2])], axis=-1)
+        v = vector.offset + turned @ self.geometry.placements[w + 1][:3, :3].T
+        reach = self._moved(vector, cells.frames, cells.half) + vector.slack + ROUNDING
+        e = reach[:, None] + cells.eta[:, None] * float(np.hypot(*a[:2]))
+        azimuth = np.arctan2(x[:, 1], x[:, 0])[:, None] - np.arctan2(v[..., 1], v[..., 0])
+        radii = np.hypot(x[:, 0], x[:, 1])[:, None], np.hypot(v[..., 0], v[..., 1])
+        return _Places(azimuth, *radii, x[:, 2, None], v[..., 2], e)
 
     def _moved(self, vector: _Vector, frames: Array, half: Array) -> Array:
         """How far (b,) a vector of the goal can move in the wrist's frame as the joints before it move in their
@@ -113,6 +171,39 @@ class WristBoxes:
             radius = np.linalg.norm(np.cross(axis, r), axis=1)
             moved = moved + half[:, j] * (radius + moved)
         return moved
+
+
+def _nearby(at: _Places) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The middle and half length of the interval of q_w that brings two vectors within e, and whether any may."""
+    possible = np.hypot(at.rho_goal - at.rho_tool, at.z_goal - at.z_tool) <= at.e
+    longest = np.maximum(np.maximum(at.rho_goal, at.rho_tool), ROUNDING)
+    spread = np.arcsin(np.minimum(at.e / longest, 1.0))
+    return at.azimuth, np.where(spread < np.pi / 2, spread + ROUNDING, np.pi), possible
+
+
+def _at_angle(at: _Places, lowest: float, highest: float) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Azimuth, and least and greatest difference of q_w from it, at which two unit vectors have a cosine between two
+    values, but for e; and whether any may have."""
+    across, along = at.rho_goal * at.rho_tool, at.z_goal * at.z_tool
+    low, high = lowest - at.e - along, highest + at.e - along
+    possible = (low <= across) & (high >= -across)
+    across = np.maximum(across, ROUNDING)
+    least = np.arccos(np.clip(high / across, -1.0, 1.0))
+    return at.azimuth, least, np.arccos(np.clip(low / across, -1.0, 1.0)), possible
+
+
+def _met(low: Array, high: Array, middle: Array, least: Array, most: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The hull of what [low, high] within [-π, π] has in common with middle ± [least, most], on the circle; whether
+    that is anything."""
+    first, last = np.full_like(low, np.inf), np.full_like(high, -np.inf)
+    for side in ((middle + least, middle + most), (middle - most, middle - least)):
+        for turns in (-2 * np.pi, 0.0, 2 * np.pi):
+            start, end = np.maximum(low, side[0] + turns), np.minimum(high, side[1] + turns)
+            common = start <= end
+            first = np.where(common, np.minimum(first, start), first)
+            last = np.where(common, np.maximum(last, end), last)
+    held = np.asarray(first <= last)
+    return np.where(held, first, low), np.where(held, last, high), held
 
 
 def _hull(
