@@ -12,6 +12,7 @@ from typing import ClassVar
 
 from models.robot import Array
 from optimizer.collision.path_planner import along, interpolation_is_free, length
+from optimizer.energy.plant import ROUGH_PROGRESS, has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import Guess, SqpMethod
 from optimizer.problem.problem import LEAST_DURATION
@@ -55,6 +56,8 @@ class FreeSpline(SqpMethod):
         If the result collides, from planned collision-free paths.
         """
         shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
+        if has_corners(self.prepared.problem.objective, self.prepared.arm):
+            self.progress = ROUGH_PROGRESS  # the best are followed to sharper corners anyway
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)

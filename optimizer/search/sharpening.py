@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from models.robot import Array
-from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
+from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH, has_corners
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate
@@ -32,7 +32,10 @@ RESTARTS, FOLLOWED = 8, 3
 FEW, MIDDLE, DENSE = 13, 24, 40
 # relative decrease of the cost that a further step must promise, and in the last solve
 PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
-# other candidates are followed if they need at most this ratio of the least energy, and so many of them
+# first solves are rough and coarse: those that need at most this ratio of the least energy are solved in the middle
+# space, and so many of them
+CONTENDING, CONTENDERS = 1.35, 6
+# then other candidates are followed if they need at most this ratio of the least energy, and so many of them
 NEAR, RIVALS = 1.03, 2
 # half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
 WAVES, AMPLITUDES = 3, (0.1, 1.5)
@@ -50,17 +53,30 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     Does nothing if the objective has no corner per joint, or if the method has no evenly spaced control points.
     """
     problem = incumbent.problem
-    isolated = problem.objective == "electrical" and problem.arm.bus.mode == "isolated"
-    if not incumbent.method.evenly_spaced or not (isolated or problem.objective == "mechanical"):
+    if not incumbent.method.evenly_spaced or not has_corners(problem.objective, problem.arm):
         return
-    assert best.energy is not None
     shortest = float(shortest_duration(best.q_goal - best.q_start, problem.arm.active_limits))
     if best.spline.duration < LEAST_FREEDOM * shortest:
         return
-    near = [each for each in incumbent.candidates if each is not best and (each.energy or np.inf) <= NEAR * best.energy]
-    _Follower(incumbent, best).follow(restarts=0 if isolated else RESTARTS)
-    for rival in sorted(near, key=lambda each: each.energy or 0.0)[:RIVALS]:
+    for rough in _near(incumbent, best, CONTENDING)[:CONTENDERS]:
+        follower = _Follower(incumbent, rough)
+        follower.solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
+    best = incumbent.best() or best
+    rivals = _near(incumbent, best, NEAR)[1 : RIVALS + 1]
+    _Follower(incumbent, best).follow(restarts=RESTARTS if problem.objective == "mechanical" else 0)
+    for rival in rivals:
         _Follower(incumbent, rival).follow(restarts=0)
+
+
+def _near(incumbent: Incumbent, best: Candidate, ratio: float) -> list[Candidate]:
+    """The candidates with a motion of at most this ratio of the best one's energy, which comes first."""
+    solved = [each for each in incumbent.candidates if each.energy is not None]
+    most = ratio * (best.energy or 0.0)
+    return sorted((each for each in solved if each is best or (each.energy or 0.0) <= most), key=_energy_of)
+
+
+def _energy_of(candidate: Candidate) -> float:
+    return np.inf if candidate.energy is None else candidate.energy
 
 
 @dataclass(frozen=True)
@@ -72,15 +88,13 @@ class _Follower:
 
     def follow(self, restarts: int) -> None:
         """Solve with sharper and sharper corners, from the candidate's motion or from the best of random ones."""
-        motions = [self.candidate.spline]
-        if restarts:
-            motions = sorted([*motions, *self._restarted(restarts)], key=self._energy)
-            middle = [self._solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in motions[:FOLLOWED]]
-            motions = [motion for motion in middle if motion is not None] or motions
+        coarse = sorted(self._restarted(restarts), key=self._energy)[:FOLLOWED]
+        middle = [self.solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in coarse]
+        motions = [self.candidate.spline, *(motion for motion in middle if motion is not None)]
         best: Spline | None = min(motions, key=self._energy)
         for width in SHARPER_WIDTHS:
             progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
-            best = None if best is None else self._solved(best, width, DENSE, progress)
+            best = None if best is None else self.solved(best, width, DENSE, progress)
 
     def _restarted(self, count: int) -> list[Spline]:
         """Coarse motions from random displacements of the rest-to-rest quintic."""
@@ -105,7 +119,8 @@ class _Follower:
                 found.append(motion)
         return found
 
-    def _solved(self, spline: Spline, width: float, count: int, progress: float) -> Spline | None:
+    def solved(self, spline: Spline, width: float, count: int, progress: float) -> Spline | None:
+        """The motion solved with corners of `width` [W] on `count` control points; None if there is none in time."""
         interval = self._interval(spline.duration, width)
         duration = float(np.clip(spline.duration, interval.t_min, interval.t_max))
         return self._from_samples(*sampled(lasting(spline, duration)), width, count, progress)
