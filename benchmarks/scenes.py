@@ -27,7 +27,7 @@ from optimizer import optimize
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.methods.free_spline import FROM_PLANNED_PATH
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem

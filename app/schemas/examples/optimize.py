@@ -72,8 +72,8 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
     },
     "time_scaling": {
         "summary": "Straight line in joint space, with a chosen friction model",
-        "description": "The path is the straight line between the two joint positions. Only its time scaling is "
-        "optimised.",
+        "description": "The path is the straight line between the two joint positions, which is clear. Only its time "
+        "scaling is optimised.",
         "value": {
             "robot": "ur5e",
             "start": {"q": HOME},
