@@ -209,11 +209,15 @@ class HalfSpaceObstacle(HalfSpace, _Obstacle):
 
 
 def _by_shape(*known: str) -> Discriminator:
-    """Discriminator of a union by the field `shape`; its error does not echo an unknown one."""
+    """Discriminator of a union by the field `shape`, whose members are tagged `a <shape>`.
+
+    Its error does not echo an unknown shape. A tag that were the name of a field, as `points` is, would be taken for
+    one in the location of an error.
+    """
 
     def choose(value: Any) -> str | None:
         shape = value.get("shape") if isinstance(value, dict) else getattr(value, "shape", None)
-        return shape if shape in known else None
+        return f"a {shape}" if shape in known else None
 
     return Discriminator(
         choose,
@@ -223,11 +227,11 @@ def _by_shape(*known: str) -> Discriminator:
 
 
 CarriedShape = Annotated[
-    Annotated[Box, Tag("box")]
-    | Annotated[Sphere, Tag("sphere")]
-    | Annotated[Cylinder, Tag("cylinder")]
-    | Annotated[Capsule, Tag("capsule")]
-    | Annotated[Mesh, Tag("mesh")],
+    Annotated[Box, Tag("a box")]
+    | Annotated[Sphere, Tag("a sphere")]
+    | Annotated[Cylinder, Tag("a cylinder")]
+    | Annotated[Capsule, Tag("a capsule")]
+    | Annotated[Mesh, Tag("a mesh")],
     _by_shape("box", "sphere", "cylinder", "capsule", "mesh"),
 ]
 
@@ -258,15 +262,15 @@ class CarriedBody(Request):
 
 
 Obstacle = Annotated[
-    Annotated[BoxObstacle, Tag("box")]
-    | Annotated[SphereObstacle, Tag("sphere")]
-    | Annotated[CylinderObstacle, Tag("cylinder")]
-    | Annotated[CapsuleObstacle, Tag("capsule")]
-    | Annotated[MeshObstacle, Tag("mesh")]
-    | Annotated[HalfSpaceObstacle, Tag("half_space")]
-    | Annotated[PointsObstacle, Tag("points")]
-    | Annotated[VoxelsObstacle, Tag("voxels")]
-    | Annotated[MeshFileObstacle, Tag("mesh_file")],
+    Annotated[BoxObstacle, Tag("a box")]
+    | Annotated[SphereObstacle, Tag("a sphere")]
+    | Annotated[CylinderObstacle, Tag("a cylinder")]
+    | Annotated[CapsuleObstacle, Tag("a capsule")]
+    | Annotated[MeshObstacle, Tag("a mesh")]
+    | Annotated[HalfSpaceObstacle, Tag("a half_space")]
+    | Annotated[PointsObstacle, Tag("a points")]
+    | Annotated[VoxelsObstacle, Tag("a voxels")]
+    | Annotated[MeshFileObstacle, Tag("a mesh_file")],
     _by_shape("box", "sphere", "cylinder", "capsule", "mesh", "half_space", "points", "voxels", "mesh_file"),
 ]
 

@@ -18,11 +18,13 @@ from optimizer.collision.coal_distance import SKIN, coal_shape
 from optimizer.collision.cores import Core
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.exceptions import InvalidProblem
+from optimizer.exceptions import InvalidProblem, StartInCollision
+from optimizer.optimize import optimize
 from optimizer.problem.clouds import MOST_POINTS, Points, TriangleMesh, Voxels
 from optimizer.problem.clouds import Cloud as Shape
 from optimizer.problem.scene import Attachment, Box, Mesh, Obstacle, Scene, Sphere
 from tests.optimizer.cells import LOADS, arm_in_cell, at, wander
+from tests.optimizer.moves import GOAL, START, problem_with
 
 # two exact computations of one distance [m] differ by rounding; by Coal's tolerance where it takes part
 ROUNDING, COAL = 1e-9, 1e-7
@@ -342,3 +344,15 @@ def test_the_margin_and_the_radius_are_kept() -> None:
     plain = by_body(model_of([Obstacle("cloud", Points(points, 0.01), POSE, 0.0)]), q)
     wide = by_body(model_of([replace(Obstacle("cloud", Points(points, 0.015), POSE, 0.0), margin=0.02)]), q)
     assert np.abs(plain - wide - 0.025).max() < ROUNDING
+
+
+def test_an_arm_that_starts_within_a_closed_mesh_collides() -> None:
+    """No surface is near: only the inside tells."""
+    room = np.array([6.0, 6.0, 6.0])
+    within = problem_with(START, GOAL, scene=Scene([Obstacle("rock", TriangleMesh(box_triangles(room)))]))
+    with pytest.raises(StartInCollision) as caught:
+        optimize(within)
+    assert "rock" in caught.value.pair and caught.value.depth > 1.0
+    # the same walls as a surface are a room, in which the arm may move
+    opened = Obstacle("room", TriangleMesh(box_triangles(room)[1:]))
+    assert optimize(problem_with(START, GOAL, scene=Scene([opened]))).certificate.valid
