@@ -36,7 +36,7 @@ class Settings(BaseSettings):
     queue_size: int = Field(
         default=16, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
     )
-    max_body_bytes: int = Field(default=4_194_304, ge=1024, description="Largest request body [byte].")
+    max_body_bytes: int = Field(default=8_388_608, ge=1024, description="Largest request body [byte].")
     max_upload_bytes: int = Field(
         default=67_108_864, ge=1024, description="Largest body of `POST /evaluate` [byte]; it goes to a file."
     )

@@ -1,6 +1,7 @@
 """Random tasks among obstacles, solved and replayed. The exit code is 1 if a requirement fails.
 
     python -m benchmarks.scenes --count 300 --seed 0
+    python -m benchmarks.scenes --count 60 --method time_scaling
 
 Tables, shelves, boxes and cages take turns; every task has a collision-free path. Each is solved twice: joint to joint,
 which is one candidate, and joint to pose, a whole request. Pinocchio and Coal replay every answer at a period of
@@ -27,10 +28,11 @@ from optimizer import optimize
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
-from optimizer.methods.free_spline import FROM_PLANNED_PATH
+from optimizer.methods import METHODS
+from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
-from optimizer.problem.problem import Problem
+from optimizer.problem.problem import MethodName, Problem
 from optimizer.trajectories.spline import sample
 
 REPLAY = 1e-4  # s
@@ -58,8 +60,8 @@ class Outcome:
         return f"{self.task.name}, {self.kind}"
 
 
-def run(task: CellTask, kind: str) -> Outcome:
-    """Solves and replays one task."""
+def run(task: CellTask, kind: str, method: MethodName = "bspline") -> Outcome:
+    """Solves and replays one task by a method."""
     arm = task.arm
     goal: Array | Pose = task.q_goal if kind == KINDS[0] else Pose(task.T_goal)
     problem = Problem(
@@ -67,6 +69,7 @@ def run(task: CellTask, kind: str) -> Outcome:
         start=task.q_start,
         goal=goal,
         windings=kind != KINDS[0],
+        method=method,
     )
     outcome = Outcome(task, kind)
     began = time.perf_counter()
@@ -80,7 +83,7 @@ def run(task: CellTask, kind: str) -> Outcome:
     outcome.wall = time.perf_counter() - began
     outcome.solves = solution.solver.nlp_solves
     outcome.from_planned_path = any(
-        candidate.reason.endswith(FROM_PLANNED_PATH)
+        candidate.reason.endswith((FROM_PLANNED_PATH, ALONG_PLANNED_PATH))
         for candidate in solution.candidates
         if candidate.status == "solved"
     )
@@ -153,9 +156,10 @@ def main() -> int:
     """Solves the tasks and checks the requirements."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=300, help="tasks (%(default)s)")
+    arguments.add_argument("--method", choices=METHODS, default="bspline", help="method (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
-    outcomes = [run(task, kind) for task in cell_tasks(given.seed, given.count) for kind in KINDS]
+    outcomes = [run(task, kind, given.method) for task in cell_tasks(given.seed, given.count) for kind in KINDS]
     results = summary(outcomes)
     print_summary(results)
     write_json(given.json, results)

@@ -116,6 +116,8 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
 
     obstacles = {obstacle.name for obstacle in problem.arm.scene.obstacles}
     for body in model.bodies:
+        if body.cloud is not None:
+            continue
         if body.name in obstacles:
             add(body, np.eye(4), OBSTACLE, 0.18 if body.core.is_half_space else 0.4)
             continue
@@ -130,6 +132,11 @@ def draw(request: OptimizeRequest, file: Path, instants: int, view: tuple[float,
 
     figure = plt.figure(figsize=(9, 7.2))
     axes = figure.add_subplot(projection="3d", computed_zorder=False)
+    for body in model.bodies:
+        if body.cloud is not None:
+            # the centres of its parts
+            centres = body.cloud.tree.centres[body.cloud.tree.parts(body.patch)]
+            axes.scatter(*(centres @ body.T_link_core[:3, :3].T + body.T_link_core[:3, 3]).T, color=OBSTACLE, s=2)
     axes.add_collection3d(Poly3DCollection(polygons, facecolors=colours, edgecolors="none", zsort="average"))
     path = tcp_pose(problem.arm, spline.curve(np.linspace(0, spline.duration, 200)))[:, :3, 3]
     axes.plot(*path.T, color="black", linewidth=1.6, zorder=10, label="path of the TCP")

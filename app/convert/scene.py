@@ -8,9 +8,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from app.convert.mesh_file import mesh_from_file
 from app.convert.pose import to_matrix
+from app.convert.voxels import occupied_cells
 from app.schemas import scene as asked
 from optimizer.exceptions import InvalidProblem
+from optimizer.problem.clouds import Points, Voxels
 from optimizer.problem.scene import (
     Attachment,
     Box,
@@ -58,6 +61,12 @@ def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:
         return Capsule(given.radius, given.length)
     if isinstance(given, asked.Mesh):
         return Mesh(np.array(given.vertices))
+    if isinstance(given, asked.Points):
+        return Points(np.array(given.points), given.radius)
+    if isinstance(given, asked.Voxels):
+        return Voxels(given.size, occupied_cells(given))
+    if isinstance(given, asked.MeshFile):
+        return mesh_from_file(given.format, given.data, given.scale)
     return HalfSpace()
 
 

@@ -217,7 +217,8 @@ class OptimizeRequest(MotionRequest):
         "space with an optimised time scaling. `lagrange`: one polynomial per joint, given by its values at Chebyshev "
         "nodes. `uniform_scaling`: the time-optimal motion, uniformly slowed down. `polynomial_ga`: one polynomial per "
         "joint, found by a genetic algorithm for at most three candidates; it takes seconds, and its `status` is never "
-        "`optimal`.",
+        "`optimal`. Every method goes around obstacles; where their own path collides, `time_scaling` and "
+        "`uniform_scaling` follow a planned path.",
         None,
         "bspline",
         default="bspline",

@@ -7,13 +7,19 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag
 
 from app.schemas.common import IDENTITY, NO_CONTROLS, PLAIN, Pose, Request, RobotWithTcp, Vector3, described
-from app.schemas.examples.values import BOX, TOOL, at
+from app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
 from optimizer.problem.arm import MOST_PARTS
+from optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
 from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
 _POSE_TEXT = "Pose of the shape: of an obstacle in the base frame, of a payload in the flange frame."
+# standard alphabet, filled to a multiple of four characters
+BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
+# most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
+MOST_CELLS, MOST_FILE_BYTES = 1 << 23, 1 << 22
+MOST_BITS_TEXT, MOST_FILE_TEXT = 4 * -(-MOST_CELLS // 8 // 3) + 4, 4 * -(-MOST_FILE_BYTES // 3)
 Size = Annotated[float, Field(ge=1e-4, le=100)]
 
 
@@ -54,7 +60,7 @@ class Capsule(_Shape):
 
 
 class Mesh(_Shape):
-    """The convex hull of points. Give a body that is not convex as several meshes."""
+    """The convex hull of points. An obstacle that is not convex is a `mesh_file`, or several meshes."""
 
     shape: Literal["mesh"] = described("Kind of shape.", None, "mesh")
     vertices: Annotated[list[Vector3], Field(min_length=4, max_length=MOST_VERTICES)] = described(
@@ -68,6 +74,85 @@ class HalfSpace(_Shape):
     """All points below the xy plane of its pose: a floor, or a wall whose z axis points to the arm."""
 
     shape: Literal["half_space"] = described("Kind of shape.", None, "half_space")
+
+
+class Points(_Shape):
+    """Balls of one radius about points: a point cloud. Every point counts; none is left out or merged."""
+
+    shape: Literal["points"] = described("Kind of shape.", None, "points")
+    points: Annotated[list[Vector3], Field(min_length=1, max_length=MOST_POINTS)] = described(
+        "Points [x, y, z] in the frame of the pose.", "m", [[0.4, 0.1, 0.0], [0.4, 0.12, 0.0], [0.4, 0.14, 0.01]]
+    )
+    radius: Size = described(
+        "Radius of the ball about each point: at least half of the distance between neighbours, so that nothing passes "
+        "between them.",
+        "m",
+        0.015,
+    )
+
+
+class VoxelBits(Request):
+    """The occupied cells of a grid as one bit each."""
+
+    dimensions: Annotated[list[Annotated[int, Field(ge=1, le=MOST_ALONG_EDGE)]], Field(min_length=3, max_length=3)] = (
+        described("Number of cells along x, y and z; at most 8,388,608 cells in all.", None, [4, 2, 2])
+    )
+    data: Annotated[str, Field(min_length=4, max_length=MOST_BITS_TEXT, pattern=BASE64)] = described(
+        "Base64 of the bits, eight to a byte, the lowest bit first; 1: occupied. Cell (i, j, k) is bit "
+        "i + dimensions[0] · (j + dimensions[1] · k). The last byte is filled with zeros.",
+        None,
+        "AwE=",
+    )
+
+
+class Voxels(_Shape):
+    """Cubes of a grid: an occupancy map. The pose is that of the corner of cell (0, 0, 0) with the least x, y and z."""
+
+    shape: Literal["voxels"] = described("Kind of shape.", None, "voxels")
+    size: Size = described("Length of the edges of a cell.", "m", 0.05)
+    cells: (
+        Annotated[
+            list[
+                Annotated[
+                    list[Annotated[int, Field(ge=-MOST_ALONG_EDGE, le=MOST_ALONG_EDGE)]],
+                    Field(min_length=3, max_length=3),
+                ]
+            ],
+            Field(min_length=1, max_length=MOST_VOXELS),
+        ]
+        | None
+    ) = described(
+        "Occupied cells [i, j, k]: each is the cube from (i, j, k) · size to (i + 1, j + 1, k + 1) · size. Give either "
+        "`cells` or `bits`.",
+        None,
+        [[0, 0, 0], [1, 0, 0], [1, 0, 1]],
+        default=None,
+    )
+    bits: VoxelBits | None = described(
+        "Occupied cells as bits: a hundred times smaller for dense grids. Give either `cells` or `bits`.",
+        None,
+        {"dimensions": [4, 2, 2], "data": "AwE="},
+        default=None,
+    )
+
+
+class MeshFile(_Shape):
+    """Triangles from a mesh file, of any form. Every triangle counts: nothing is simplified or made convex.
+
+    A closed mesh, in which every edge belongs to two triangles of opposite directions, is solid. Any other mesh is a
+    surface.
+    """
+
+    shape: Literal["mesh_file"] = described("Kind of shape.", None, "mesh_file")
+    format: Literal["stl", "obj", "glb"] = described(
+        "Format of the file: STL (binary or text), Wavefront OBJ, or binary glTF 2.0.", None, "stl"
+    )
+    data: Annotated[str, Field(min_length=4, max_length=MOST_FILE_TEXT, pattern=BASE64)] = described(
+        "Base64 of the file, of at most 4 MiB and 100,000 triangles.", None, MESH_FILE
+    )
+    scale: Annotated[float, Field(ge=1e-6, le=1e3)] = described(
+        "Length of one unit of the file: 0.001 for a file in millimetres.", "m", 0.001, default=1.0
+    )
 
 
 class _Obstacle(Request):
@@ -107,16 +192,32 @@ class MeshObstacle(Mesh, _Obstacle):
     """An obstacle in the shape of a convex mesh."""
 
 
+class PointsObstacle(Points, _Obstacle):
+    """An obstacle that is a point cloud."""
+
+
+class VoxelsObstacle(Voxels, _Obstacle):
+    """An obstacle that is a grid of voxels."""
+
+
+class MeshFileObstacle(MeshFile, _Obstacle):
+    """An obstacle from a mesh file."""
+
+
 class HalfSpaceObstacle(HalfSpace, _Obstacle):
     """An obstacle that is a floor or a wall."""
 
 
 def _by_shape(*known: str) -> Discriminator:
-    """Discriminator of a union by the field `shape`; its error does not echo an unknown one."""
+    """Discriminator of a union by the field `shape`, whose members are tagged `a <shape>`.
+
+    Its error does not echo an unknown shape. A tag that were the name of a field, as `points` is, would be taken for
+    one in the location of an error.
+    """
 
     def choose(value: Any) -> str | None:
         shape = value.get("shape") if isinstance(value, dict) else getattr(value, "shape", None)
-        return shape if shape in known else None
+        return f"a {shape}" if shape in known else None
 
     return Discriminator(
         choose,
@@ -126,11 +227,11 @@ def _by_shape(*known: str) -> Discriminator:
 
 
 CarriedShape = Annotated[
-    Annotated[Box, Tag("box")]
-    | Annotated[Sphere, Tag("sphere")]
-    | Annotated[Cylinder, Tag("cylinder")]
-    | Annotated[Capsule, Tag("capsule")]
-    | Annotated[Mesh, Tag("mesh")],
+    Annotated[Box, Tag("a box")]
+    | Annotated[Sphere, Tag("a sphere")]
+    | Annotated[Cylinder, Tag("a cylinder")]
+    | Annotated[Capsule, Tag("a capsule")]
+    | Annotated[Mesh, Tag("a mesh")],
     _by_shape("box", "sphere", "cylinder", "capsule", "mesh"),
 ]
 
@@ -161,13 +262,16 @@ class CarriedBody(Request):
 
 
 Obstacle = Annotated[
-    Annotated[BoxObstacle, Tag("box")]
-    | Annotated[SphereObstacle, Tag("sphere")]
-    | Annotated[CylinderObstacle, Tag("cylinder")]
-    | Annotated[CapsuleObstacle, Tag("capsule")]
-    | Annotated[MeshObstacle, Tag("mesh")]
-    | Annotated[HalfSpaceObstacle, Tag("half_space")],
-    _by_shape("box", "sphere", "cylinder", "capsule", "mesh", "half_space"),
+    Annotated[BoxObstacle, Tag("a box")]
+    | Annotated[SphereObstacle, Tag("a sphere")]
+    | Annotated[CylinderObstacle, Tag("a cylinder")]
+    | Annotated[CapsuleObstacle, Tag("a capsule")]
+    | Annotated[MeshObstacle, Tag("a mesh")]
+    | Annotated[HalfSpaceObstacle, Tag("a half_space")]
+    | Annotated[PointsObstacle, Tag("a points")]
+    | Annotated[VoxelsObstacle, Tag("a voxels")]
+    | Annotated[MeshFileObstacle, Tag("a mesh_file")],
+    _by_shape("box", "sphere", "cylinder", "capsule", "mesh", "half_space", "points", "voxels", "mesh_file"),
 ]
 
 

@@ -8,11 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from models.robot import Array, Robot
+from optimizer.collision.clouds import Cloud, cloud_of
 from optimizer.collision.cores import Core, core_of
+from optimizer.collision.cores import Indices as Indices
 from optimizer.problem.arm import PAYLOAD, TOOL, Arm
-from optimizer.problem.scene import Attachment
-
-Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
+from optimizer.problem.clouds import Cloud as CloudShape
+from optimizer.problem.clouds import Points
+from optimizer.problem.scene import Attachment, Obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +22,7 @@ class Body:
     """A core at `T_link_core` (4, 4) in the frame of a link; the base and the scene have link 0.
 
     Other bodies must stay at least `margin` [m] away from it. `touches` are the links that it touches by design.
+    A body with a `cloud` is its `patch`: then the core is only a box around it, with the radius of its parts.
     """
 
     name: str
@@ -28,6 +31,8 @@ class Body:
     T_link_core: Array
     margin: float = 0.0
     touches: frozenset[int] = frozenset()
+    cloud: Cloud | None = None
+    patch: int = 0
 
     @cached_property
     def points(self) -> Array:
@@ -48,7 +53,7 @@ class Body:
     def is_segment(self) -> bool:
         """Whether the core is a point or a segment."""
         core = self.core
-        return len(core.points) <= 2 and core.disc_radius == 0 and not core.is_half_space
+        return self.cloud is None and len(core.points) <= 2 and core.disc_radius == 0 and not core.is_half_space
 
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
@@ -66,8 +71,28 @@ def bodies_of(arm: Arm) -> tuple[Body, ...]:
         Body(name, last, core_of(p.shape), T_last_flange @ p.T_flange_shape, touches=_touched(p, robot))
         for name, p in parts
     ]
-    obstacles = [Body(o.name, 0, core_of(o.shape), o.T_base_shape, o.margin) for o in arm.scene.obstacles]
+    obstacles = [body for obstacle in arm.scene.obstacles for body in _bodies_of_obstacle(obstacle)]
     return (*links, *attached, *obstacles)
+
+
+def _bodies_of_obstacle(obstacle: Obstacle) -> list[Body]:
+    """The obstacle as one body, or the patches of its cloud."""
+    shape = obstacle.shape
+    if not isinstance(shape, CloudShape):
+        return [Body(obstacle.name, 0, core_of(shape), obstacle.T_base_shape, obstacle.margin)]
+    cloud, radius = cloud_of(shape), shape.radius if isinstance(shape, Points) else 0.0
+    return [
+        Body(
+            obstacle.name,
+            0,
+            Core(cloud.box(patch), radius),
+            obstacle.T_base_shape,
+            obstacle.margin,
+            cloud=cloud,
+            patch=patch,
+        )
+        for patch in cloud.patches
+    ]
 
 
 def _touched(part: Attachment, robot: Robot) -> frozenset[int]:

@@ -15,6 +15,13 @@ The Bernstein coefficients of the spline's polynomial in a knot span bound |v_k|
 the two ends of the interval, whichever gives the higher bound. The bound holds for every n: a poor normal makes it
 weaker, not wrong. An interval whose bound is too far below the least sampled distance is halved.
 
+An obstacle of many parts has no such normal as a whole. Its distance changes no faster than L (below), so that
+
+    distance(t) ≥ (distance(begin) + distance(end) - L h) / 2.
+
+Once an interval is so short that L h ≤ EXPANDED, the parts that can come within the least sampled distance there take
+the place of the obstacle: each is convex. The distance of all others stays above the least sampled one.
+
 Pairs that are far apart are removed first: the relative speed of a point of the second body is at most
 L = Σ_k lever_k |v_k|. If ball(t) bounds the distance from below by that of the bodies' enclosing balls, the distance is
 at least (ball(begin) + ball(end) - L h) / 2 throughout the interval.
@@ -23,7 +30,7 @@ at least (ball(begin) + ball(end) - L h) / 2 throughout the interval.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -31,6 +38,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.collision.model import CollisionModel
+from optimizer.collision.pair_distance import WitnessPoints
 from optimizer.solution import Clearance
 from optimizer.trajectories.spline import Spline
 
@@ -39,6 +47,10 @@ GAP, RELATIVE_GAP = 1e-4, 0.01
 LEAST_INTERVALS = 32
 # the proof ends with the bound reached so far after this many halvings, or checks of a pair over an interval
 MOST_LEVELS, MOST_CHECKS = 20, 400_000
+# distances of whole clouds are not computed if they are greater than the least sampled one by this [m]
+BEYOND = 0.1
+# travel [m] of a body over an interval below which the parts of a cloud are checked one by one
+EXPANDED = 0.02
 
 
 @dataclass(frozen=True)
@@ -54,19 +66,37 @@ class _Instants:
 
 @dataclass(frozen=True)
 class _Checks:
-    """Pairs over intervals (k,): indices of the pair and of the instants at both ends, and both normals (k, 3) there.
+    """Pairs over intervals (k,): indices of the pair and of the instants at both ends, and the distances there.
 
-    The normals are those from the first body to the second, in the base frame.
+    `part` (k,) is the part of the first body if that is a patch of a cloud, -1 for all of its parts.
     """
 
     pair: Indices
+    part: Indices
     begin: Indices
     end: Indices
-    normals: tuple[Array, Array]
+    at_begin: WitnessPoints
+    at_end: WitnessPoints
 
     def __getitem__(self, chosen: Indices) -> _Checks:
-        first, second = self.normals
-        return _Checks(self.pair[chosen], self.begin[chosen], self.end[chosen], (first[chosen], second[chosen]))
+        return _Checks(
+            self.pair[chosen],
+            self.part[chosen],
+            self.begin[chosen],
+            self.end[chosen],
+            self.at_begin[chosen],
+            self.at_end[chosen],
+        )
+
+    def with_more(self, more: _Checks) -> _Checks:
+        return _Checks(
+            np.concatenate([self.pair, more.pair]),
+            np.concatenate([self.part, more.part]),
+            np.concatenate([self.begin, more.begin]),
+            np.concatenate([self.end, more.end]),
+            self.at_begin.with_more(more.at_begin),
+            self.at_end.with_more(more.at_end),
+        )
 
     def distinct_intervals(self) -> tuple[Indices, Indices]:
         """The different intervals (m, 2), as indices of instants, and which of them each check (k,) is about."""
@@ -102,7 +132,7 @@ class _Proof:
             proven = min(proven, float(bound[~is_open].min(initial=np.inf)))
             if not is_open.any():
                 break
-            instants, checks = self.halved(instants, checks[np.flatnonzero(is_open)])
+            instants, checks = self.halved(instants, self.expanded(instants, checks[np.flatnonzero(is_open)]))
         # rounding may put a bound that is exact above the sample
         pair, t = self.closest
         return Clearance(min(proven, self.least), self.least, self.model.names(pair), t)
@@ -117,7 +147,7 @@ class _Proof:
         n, p = len(t), len(self.model.pairs)
         # those of half-spaces, which no ball encloses, are exact
         ball_distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
-        self.sample_normals(instants, np.arange(n), ball_distances.argmin(axis=1))
+        self.sample_normals(instants, np.arange(n), ball_distances.argmin(axis=1), np.full(n, -1))
         v, _, h = self.rate_bounds(t[:-1], t[1:])
         travel = (v * h[:, None]) @ self.levers.T
         is_open = (ball_distances[:-1] + ball_distances[1:] - travel) / 2 < self.least
@@ -125,48 +155,88 @@ class _Proof:
         is_needed[:-1] |= is_open
         is_needed[1:] |= is_open
         instant, pair = np.nonzero(is_needed)
-        normals = np.zeros((n, p, 3))
-        normals[instant, pair] = self.sample_normals(instants, instant, pair)
+        found = self.sample_normals(instants, instant, pair, np.full(len(pair), -1))
+        row = np.zeros((n, p), dtype=np.intp)
+        row[instant, pair] = np.arange(len(pair))
         begin, pair = np.nonzero(is_open)
-        return instants, _Checks(pair, begin, begin + 1, (normals[begin, pair], normals[begin + 1, pair]))
+        part = np.full(len(pair), -1)
+        return instants, _Checks(pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]])
+
+    def expanded(self, instants: _Instants, checks: _Checks) -> _Checks:
+        """The checks, with those of clouds over short intervals replaced by checks of the parts that may be nearest."""
+        of_cloud = self.model.geometry.is_cloud[checks.pair] & (checks.part < 0)
+        if not of_cloud.any():
+            return checks
+        travel = self.travels(instants, checks)
+        chosen = np.flatnonzero(of_cloud & (travel <= EXPANDED))
+        whole = checks[chosen]
+        # a part that is farther away at the begin stays farther away than the least sampled distance
+        case, part = self.geometry.near_parts(
+            instants.frames, whole.begin, whole.pair, np.maximum(self.least, 0.0) + travel[chosen]
+        )
+        pair, begin, end = whole.pair[case], whole.begin[case], whole.end[case]
+        parts = _Checks(
+            pair,
+            part,
+            begin,
+            end,
+            self.sample_normals(instants, begin, pair, part),
+            self.sample_normals(instants, end, pair, part),
+        )
+        return checks[np.flatnonzero(~of_cloud | (travel > EXPANDED))].with_more(parts)
 
     def halved(self, instants: _Instants, checks: _Checks) -> tuple[_Instants, _Checks]:
         """Both halves of every interval, with the normals at the middle."""
         intervals, which = checks.distinct_intervals()
         middle = which + len(instants.t)
         instants = instants.with_more(self.instants(instants.t[intervals].mean(axis=1)))
-        normal = self.sample_normals(instants, middle, checks.pair)
-        first, second = checks.normals
-        return instants, _Checks(
-            np.concatenate([checks.pair, checks.pair]),
-            np.concatenate([checks.begin, middle]),
-            np.concatenate([middle, checks.end]),
-            (np.concatenate([first, normal]), np.concatenate([normal, second])),
-        )
+        found = self.sample_normals(instants, middle, checks.pair, checks.part)
+        first = replace(checks, end=middle, at_end=found)
+        return instants, first.with_more(replace(checks, begin=middle, at_begin=found))
 
-    def sample_normals(self, instants: _Instants, instant: Indices, pair: Indices) -> Array:
-        """Normals (k, 3) of pairs (k,) at instants (k,). Their distances update the least sampled distance."""
-        found = self.geometry.witness_points(instants.frames, instant, pair)
+    def sample_normals(self, instants: _Instants, instant: Indices, pair: Indices, part: Indices) -> WitnessPoints:
+        """Distances and normals of pairs (k,) at instants (k,). They update the least sampled distance."""
+        within = max(self.least, 0.0) + BEYOND
+        found = self.geometry.witness_points(instants.frames, instant, pair, within, part)
+        # patches of a cloud that are farther away: a lower bound is enough
+        found.distance[np.isinf(found.distance)] = within
         if len(pair):
             k = int(found.distance.argmin())
             if found.distance[k] < self.least:
                 self.least, self.closest = float(found.distance[k]), (int(pair[k]), float(instants.t[instant[k]]))
-        return found.normal
+        return found
 
     def bounds(self, instants: _Instants, checks: _Checks) -> Array:
         """Lower bounds (k,) [m] on the distances over the intervals."""
+        of_cloud = self.model.geometry.is_cloud[checks.pair] & (checks.part < 0)
+        if of_cloud.any():
+            whole, convex = checks[np.flatnonzero(of_cloud)], checks[np.flatnonzero(~of_cloud)]
+            result = np.empty(len(of_cloud))
+            result[~of_cloud] = self.convex_bounds(instants, convex)
+            result[of_cloud] = (whole.at_begin.distance + whole.at_end.distance - self.travels(instants, whole)) / 2
+            return result
+        return self.convex_bounds(instants, checks)
+
+    def convex_bounds(self, instants: _Instants, checks: _Checks) -> Array:
+        """The same for convex bodies and parts."""
         begin, end, pair = checks.begin, checks.end, checks.pair
         link = self.geometry.links[self.model.pairs[pair, 0]]
         R_begin, R_end = instants.frames[begin, link][:, :3, :3], instants.frames[end, link][:, :3, :3]
         best = np.full(len(pair), -np.inf)
-        for normal, R_from in zip(checks.normals, (R_begin, R_end), strict=True):
+        for normal, R_from in ((checks.at_begin.normal, R_begin), (checks.at_end.normal, R_end)):
             in_link = np.einsum("kij,ki->kj", R_from, normal)
             separations = [
-                self.geometry.separation(instants.frames, at, pair, np.einsum("kij,kj->ki", R_to, in_link))
+                self.geometry.separation(instants.frames, at, pair, np.einsum("kij,kj->ki", R_to, in_link), checks.part)
                 for at, R_to in ((begin, R_begin), (end, R_end))
             ]
             best = np.maximum(best, np.minimum(*separations))
         return best - self.chord_errors(instants, checks)
+
+    def travels(self, instants: _Instants, checks: _Checks) -> Array:
+        """L h (k,) [m]: how far a point of the second body moves at most, relative to the first."""
+        intervals, which = checks.distinct_intervals()
+        v, _, h = self.rate_bounds(*instants.t[intervals].T)
+        return np.asarray((self.levers[checks.pair] * v[which]).sum(axis=1) * h[which])
 
     def chord_errors(self, instants: _Instants, checks: _Checks) -> Array:
         """A h² / 8 (k,) [m]."""

@@ -111,6 +111,55 @@ def _penetration(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
     return depth[rows, best], normal, point
 
 
+def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
+    """Signed distance (k,) [m], normal (k, 3) from triangle to segment, and witness point (k, 3) [m] of the segment.
+
+    triangles (k, 3, 3) [m]: corners; b (k, 2, 3) [m]: segments. Unless they cross, the nearest points are on an edge,
+    or one of them is an end of the segment above the triangle. The candidates for the normal of a segment that crosses
+    are those of the facets of the triangle swept along the segment.
+    """
+    corner, edge = triangles, np.roll(triangles, -1, axis=1) - triangles
+    face = np.cross(edge[:, 0], edge[:, 1])
+    face = face / np.maximum(np.linalg.norm(face, axis=1), 1e-300)[:, None]
+    found = [segment_segment(np.stack([corner[:, i], corner[:, i] + edge[:, i]], axis=1), b) for i in range(3)]
+    heights = np.einsum("kei,ki->ke", b - corner[:, :1], face)
+    inward = np.cross(face[:, None], edge)
+    above = [(np.einsum("kci,kci->kc", b[:, e, None] - corner, inward) >= 0).all(axis=1) for e in range(2)]
+    distances = np.stack([d for d, *_ in found] + [np.where(above[e], np.abs(heights[:, e]), np.inf) for e in range(2)])
+    up = [np.where(heights[:, e, None] >= 0, face, -face) for e in range(2)]
+    normals = np.stack([n for _, n, *_ in found] + up)
+    points = np.stack([r for *_, r in found] + [b[:, 0], b[:, 1]])
+    best, rows = distances.argmin(axis=0), np.arange(len(b))
+    distance, normal, point = distances[best, rows], normals[best, rows], points[best, rows]
+    u = b[:, 1] - b[:, 0]
+    drop = heights[:, 0] - heights[:, 1]
+    opposite = heights[:, 0] * heights[:, 1] < 0
+    fraction = np.clip(heights[:, 0] / np.where(drop == 0, 1.0, drop), 0.0, 1.0)
+    at = b[:, 0] + fraction[:, None] * u
+    crossed = opposite & (np.einsum("kci,kci->kc", at[:, None] - corner, inward) >= 0).all(axis=1)
+    if crossed.any():
+        on_edges = points[:3, crossed]
+        distance[crossed], normal[crossed], point[crossed] = _crossing(
+            triangles[crossed], edge[crossed], face[crossed], b[crossed], on_edges
+        )
+    return distance, normal, point
+
+
+def _crossing(triangles: Array, edge: Array, face: Array, b: Array, on_edges: Array) -> tuple[Array, Array, Array]:
+    """The same for segments that cross the triangle; `on_edges` (3, k, 3) are their points nearest to the edges."""
+    sideways = np.cross(edge, (b[:, 1] - b[:, 0])[:, None])
+    length = np.linalg.norm(sideways, axis=2, keepdims=True)
+    sideways = np.where(length > NONE, sideways / np.maximum(length, NONE), face[:, None])
+    directions = np.concatenate([face[:, None], sideways], axis=1)
+    directions = np.concatenate([directions, -directions], axis=1)
+    ends = np.einsum("kmi,kei->kme", directions, b)
+    depth = ends.min(axis=2) - np.einsum("kmi,kci->kmc", directions, triangles).max(axis=2)
+    best, rows = depth.argmax(axis=1), np.arange(len(b))
+    lowest = b[rows, ends[rows, best].argmin(axis=1)]
+    point = np.concatenate([lowest[None], on_edges])[best % 4, rows]
+    return depth[rows, best], directions[rows, best], point
+
+
 def _dot(x: Array, y: Array) -> Array:
     return np.asarray(np.einsum("ki,ki->k", x, y))
 

@@ -119,7 +119,8 @@ def coal_shape(core: Core) -> tuple[coal.CollisionGeometry, float, coal.Transfor
     vertices, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for vertex in points:
         vertices.append(vertex)
-    for triangle in _outward(points):
+    # a triangle is a body with two faces and no volume
+    for triangle in [[0, 1, 2], [0, 2, 1]] if len(points) == 3 else _outward(points):
         triangles.append(coal.Triangle(*triangle))
     return coal.Convex(vertices, triangles), 0.0, _transform(local)
 

@@ -10,9 +10,13 @@ from dataclasses import dataclass
 from typing import assert_never
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from models.robot import Array
+from optimizer.problem.clouds import Points, TriangleMesh, Voxels
 from optimizer.problem.scene import Box, Capsule, Cylinder, HalfSpace, Mesh, Shape, Sphere
+
+Indices = np.ndarray[tuple[int, ...], np.dtype[np.intp]]
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class Core:
 
 
 def core_of(shape: Shape) -> Core:
-    """Core of a shape, in the frame of the shape."""
+    """Core of a shape, in the frame of the shape. Obstacles of many parts have none: see `clouds`."""
     match shape:
         case Sphere():
             return Core(np.zeros((1, 3)), shape.radius)
@@ -46,8 +50,27 @@ def core_of(shape: Shape) -> Core:
             return Core(np.zeros((1, 3)), is_half_space=True)
         case Mesh():
             return Core(shape.vertices)
+        case Points() | Voxels() | TriangleMesh():
+            raise TypeError(f"{type(shape).__name__} is no convex shape")
         case _:
             assert_never(shape)
+
+
+def box_corners(low: Array, high: Array) -> Array:
+    """The corners (8, 3) [m] of the box between two of them."""
+    return np.array(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij")).reshape(3, 8).T
+
+
+def least_height(core: Core, points: Array) -> Array:
+    """Lower bounds (k,) [m] on the distances of points (k, 3) [m] from a convex core, all in the frame of the core."""
+    if core.half_size is not None:
+        return np.asarray(np.linalg.norm(np.maximum(np.abs(points) - core.half_size, 0.0), axis=1))
+    if core.disc_radius:
+        half = np.abs(core.points[:, 2]).max()
+        outside = np.stack([np.abs(points[:, 2]) - half, np.hypot(points[:, 0], points[:, 1]) - core.disc_radius])
+        return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=0))
+    equations = ConvexHull(core.points).equations
+    return np.asarray(np.maximum((points @ equations[:, :3].T + equations[:, 3]).max(axis=1), 0.0))
 
 
 def _on_z_axis(length: float) -> Array:

@@ -85,12 +85,19 @@ class CollisionModel:
     def pair_distances(self, frames: Array, pairs: Indices | None = None, within: float = np.inf) -> PairDistances:
         """Signed distances of `pairs` (p,), by default of every pair, at n configurations.
 
-        They are exact for half-spaces, and for pairs whose enclosing balls are at most `within` [m] apart.
+        They are exact for half-spaces, and for pairs whose enclosing balls are at most `within` [m] apart, of patches
+        of a cloud only those that are at most `within` apart themselves.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
         distance = self.geometry.ball_distances(frames, pairs)
         configuration, column = np.nonzero(distance <= within)
-        nearest = self.geometry.witness_points(frames, configuration, pairs[column])
+        nearest = self.geometry.witness_points(frames, configuration, pairs[column], within)
+        if self.geometry.is_cloud.any() and np.isfinite(within):
+            # no part of these patches is within the limit, which is then the better lower bound
+            beyond = np.isinf(nearest.distance)
+            far = configuration[beyond], column[beyond]
+            distance[far] = np.maximum(distance[far], within)
+            configuration, column, nearest = configuration[~beyond], column[~beyond], nearest[~beyond]
         distance[configuration, column] = nearest.distance
         return PairDistances(distance, configuration, column, nearest)
 
@@ -150,7 +157,7 @@ class CollisionModel:
 def _checked_pairs(arm: Arm, bodies: Sequence[Body]) -> Indices:
     """Indices (p, 2) of the bodies of every checked pair."""
     links = range(len(arm.robot.capsules))
-    moving = range(len(bodies) - len(arm.scene.obstacles))
+    moving = range(len(arm.robot.capsules) + len(arm.tool) + (arm.payload.shape is not None))
     pairs: list[tuple[int, int]] = []
     for k in moving:
         link = bodies[k].link

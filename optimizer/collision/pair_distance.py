@@ -16,6 +16,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.bodies import Body, Indices
 from optimizer.collision.closed_form_distance import box_segment, segment_segment
+from optimizer.collision.cloud_pairs import CloudPairs
 from optimizer.collision.coal_distance import ConvexPairs
 
 
@@ -27,6 +28,7 @@ class PairKind(IntEnum):
     SEGMENT_BOX = 2
     HALF_SPACE = 3
     CONVEX = 4
+    CLOUD = 5
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,15 @@ class WitnessPoints:
     normal: Array
     point: Array
 
+    def __getitem__(self, chosen: Indices) -> WitnessPoints:
+        return WitnessPoints(self.distance[chosen], self.normal[chosen], self.point[chosen])
+
+    def with_more(self, more: WitnessPoints) -> WitnessPoints:
+        """These and others."""
+        return WitnessPoints(
+            *(np.concatenate([getattr(self, name), getattr(more, name)]) for name in ("distance", "normal", "point"))
+        )
+
 
 class PairGeometry:
     """Cores of bodies, and the `pairs` (p, 2) of them whose distances are computed.
@@ -52,6 +63,7 @@ class PairGeometry:
         cores = [body.core for body in bodies]
         most = max((len(body.points) for body in bodies), default=0)
         # cores with fewer points repeat their last point
+        # the box around a patch of a cloud stands for the patch: its separations are lower bounds
         self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
         self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
         self._disc_radii = np.array([core.disc_radius for core in cores])
@@ -65,14 +77,24 @@ class PairGeometry:
         self._half_space_first = np.array([core.is_half_space for core in cores], dtype=bool)[pairs][:, 0]
         segment = np.array([body.is_segment for body in bodies], dtype=bool)[pairs]
         box = np.array([core.half_size is not None for core in cores], dtype=bool)[pairs]
+        of_cloud = np.array([body.cloud is not None for body in bodies], dtype=bool)[pairs][:, 0]
         kinds = np.select(
-            [self._half_space_first, segment.all(axis=1), box[:, 0] & segment[:, 1], segment[:, 0] & box[:, 1]],
-            [PairKind.HALF_SPACE, PairKind.SEGMENT_SEGMENT, PairKind.BOX_SEGMENT, PairKind.SEGMENT_BOX],
+            [
+                self._half_space_first,
+                segment.all(axis=1),
+                box[:, 0] & segment[:, 1],
+                segment[:, 0] & box[:, 1],
+                of_cloud,
+            ],
+            [PairKind.HALF_SPACE, PairKind.SEGMENT_SEGMENT, PairKind.BOX_SEGMENT, PairKind.SEGMENT_BOX, PairKind.CLOUD],
             PairKind.CONVEX,
         )
         self._kinds = kinds
         # pairs (p,) whose distance is exact, not iterated
-        self.is_closed_form = kinds != PairKind.CONVEX
+        self.is_closed_form = (kinds != PairKind.CONVEX) & ~of_cloud
+        # pairs (p,) whose first body is a patch of a cloud
+        self.is_cloud = of_cloud
+        self._clouds = CloudPairs(bodies)
         self._convex = ConvexPairs(cores)
 
     def ball_distances(self, frames: Array, pairs: Indices) -> Array:
@@ -89,8 +111,14 @@ class PairGeometry:
         distance[:, self._half_space_first[pairs]] = -np.inf
         return np.asarray(distance)
 
-    def witness_points(self, frames: Array, configuration: Indices, pair: Indices) -> WitnessPoints:
-        """Witness points of pairs (k,) at configurations (k,)."""
+    def witness_points(
+        self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf, part: Indices | None = None
+    ) -> WitnessPoints:
+        """Witness points of pairs (k,) at configurations (k,).
+
+        The distance of a patch of a cloud is that of its nearest part, infinite if above `within` [m]. Where `part`
+        (k,) is not negative, it is that of this part.
+        """
         first, second = self.pairs[pair].T
         k = len(pair)
         result = WitnessPoints(np.empty(k), np.empty((k, 3)), np.empty((k, 3)))
@@ -103,18 +131,39 @@ class PairGeometry:
             if chosen.size:
                 found = solver(frames, configuration[chosen], first[chosen], second[chosen])
                 result.distance[chosen], result.normal[chosen], result.point[chosen] = found
+        chosen = np.flatnonzero(kinds == PairKind.CLOUD)
+        if chosen.size:
+            case = frames, configuration[chosen], first[chosen], second[chosen]
+            parts = np.full(len(chosen), -1) if part is None else part[chosen]
+            found = self._clouds.witness_points(*case, within + self._growth[pair[chosen]], parts)
+            result.distance[chosen], result.normal[chosen], result.point[chosen] = found
         result.distance[:] -= self._growth[pair]
         return result
 
-    def separation(self, frames: Array, configuration: Indices, pair: Indices, normal: Array) -> Array:
-        """min n·x over the second body - max n·x over the first (k,) [m], for unit vectors n (k, 3) in the base frame.
+    def near_parts(
+        self, frames: Array, configuration: Indices, pair: Indices, within: Array
+    ) -> tuple[Indices, Indices]:
+        """All (case, part) (m,) of clouds with distances of at most `within` (k,) [m], for pairs (k,) of patches.
 
-        It never exceeds the signed distance, whatever n is. For a half-space, n must be its outward normal.
+        A few that are farther away are among them.
         """
         first, second = self.pairs[pair].T
-        gap = self._support(frames, configuration, second, normal) + self._support(
-            frames, configuration, first, -normal
-        )
+        return self._clouds.near(frames, configuration, first, second, within + self._growth[pair])
+
+    def separation(
+        self, frames: Array, configuration: Indices, pair: Indices, normal: Array, part: Indices | None = None
+    ) -> Array:
+        """min n·x over the second body - max n·x over the first (k,) [m], for unit vectors n (k, 3) in the base frame.
+
+        It never exceeds the signed distance, whatever n is. For a half-space, n must be its outward normal. Where
+        `part` (k,) is not negative, the first body is this part of a cloud; else it is the box around the patch.
+        """
+        first, second = self.pairs[pair].T
+        lowest = self._support(frames, configuration, first, -normal)
+        chosen = np.zeros(0, dtype=np.intp) if part is None else np.flatnonzero(part >= 0)
+        if part is not None and chosen.size:
+            lowest[chosen] = -self._clouds.highest(first[chosen], part[chosen], normal[chosen])
+        gap = self._support(frames, configuration, second, normal) + lowest
         return np.asarray(gap - self._growth[pair])
 
     def _support(self, frames: Array, configuration: Indices, body: Indices, normal: Array) -> Array:

@@ -109,13 +109,13 @@ def along(path: Array, duration: float, v_max: Array) -> tuple[Array, Array]:
     The fraction of the path's length, with each joint divided by v_max (nq,) [rad/s], is 10 τ³ - 15 τ⁴ + 6 τ⁵ at
     τ = t / duration.
     """
-    lengths = _lengths(path, v_max)
+    reached = lengths(path, v_max)
     tau = np.linspace(0.0, 1.0, SAMPLES)
     fraction = quintic.fraction(tau)
     # the mean over a window, which narrows to nothing at the ends: they must not move
     half_window = np.minimum(ROUNDING, np.minimum(fraction, 1 - fraction))
     averaged = fraction[:, None] + half_window[:, None] * np.linspace(-1.0, 1.0, ROUNDING_POINTS)
-    q = np.stack([np.interp(averaged, lengths / lengths[-1], joint).mean(axis=1) for joint in path.T], axis=1)
+    q = np.stack([np.interp(averaged, reached / reached[-1], joint).mean(axis=1) for joint in path.T], axis=1)
     return q, tau * duration
 
 
@@ -124,7 +124,7 @@ def length(path: Array, v_max: Array) -> float:
 
     It is the least duration under the limit ‖v / v_max‖ ≤ 1.
     """
-    return float(_lengths(path, v_max)[-1])
+    return float(lengths(path, v_max)[-1])
 
 
 def interpolation_is_free(model: CollisionModel, path: Array, other: Array) -> bool:
@@ -211,7 +211,7 @@ def _state(space: ob.RealVectorStateSpace, q: Array) -> ob.RealVectorStateType:
     return state
 
 
-def _lengths(path: Array, v_max: Array) -> Array:
+def lengths(path: Array, v_max: Array) -> Array:
     """Weighted length (k,) [s] from the start of a path to each of its points, as in `length`."""
     steps = np.linalg.norm(np.diff(path, axis=0) / v_max, axis=1)
     return np.append(0.0, np.cumsum(steps))

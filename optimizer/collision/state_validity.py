@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from models.robot import Array
 from optimizer.collision.bodies import Body
-from optimizer.collision.coal_distance import coal_shape
+from optimizer.collision.coal_distance import SKIN, coal_shape
 from optimizer.collision.model import CollisionModel
 from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
@@ -34,7 +34,8 @@ class StateValidityChecker:
         self._axis = None if self._cone is None else T_last_tcp(arm)[:3, :3] @ self._cone.axis
         self._geometry = pin.GeometryModel()
         skins = [self._add(number, body) for number, body in enumerate(model.bodies)]
-        pairs = model.pairs.tolist()
+        self._clouds, self._model, self._reserve = np.flatnonzero(model.geometry.is_cloud), model, reserve
+        pairs = model.pairs[~model.geometry.is_cloud].tolist()
         for first, second in pairs:
             self._geometry.addCollisionPair(pin.CollisionPair(first, second))
         self._geometry_data = pin.GeometryData(self._geometry)
@@ -47,17 +48,29 @@ class StateValidityChecker:
         """Whether q (nq,) [rad] is collision-free with its margins, and within the tool cone."""
         if pin.computeCollisions(self._robot, self._data, self._geometry, self._geometry_data, q, True):
             return False
+        if len(self._clouds) and self._hits_cloud(q):
+            return False
         if self._cone is None:
             return True
         # computeCollisions has updated the joint placements
         tool_axis = self._data.oMi[self._robot.nq].rotation @ self._axis
         return bool(tool_axis @ self._cone.direction >= math.cos(self._cone.half_angle))
 
+    def _hits_cloud(self, q: Array) -> bool:
+        """Whether a body comes nearer to a part of a cloud than allowed: by the cloud's own tree."""
+        frames = self._model.frames(q[None])
+        least = self._model.pair_distances(frames, self._clouds, self._reserve).distance.min()
+        return bool(least < self._reserve)
+
     def _add(self, number: int, body: Body) -> float:
         """Add a body to the geometry. Returns the radius [m] by which Coal's shape is grown beyond the core."""
         T, skin = np.eye(4), 0.0
-        if body.core.is_half_space:
-            shape: coal.CollisionGeometry = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        shape: coal.CollisionGeometry
+        if body.cloud is not None:
+            # its own tree checks it; here it keeps the number of the body
+            shape = coal.Sphere(SKIN)
+        elif body.core.is_half_space:
+            shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         else:
             shape, skin, transform = coal_shape(body.core)
             T[:3, :3], T[:3, 3] = transform.getRotation(), transform.getTranslation()

@@ -11,16 +11,16 @@ from dataclasses import replace
 from typing import ClassVar
 
 from models.robot import Array
-from optimizer.collision.path_planner import along, interpolation_is_free, length
 from optimizer.energy.plant import ROUGH_PROGRESS, has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import Guess, SqpMethod
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH
+from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
 from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
-from optimizer.trajectories.spline import Spline, sample
+from optimizer.trajectories.spline import Spline
 
 # control points of the first attempt, with evenly spaced knots
 COARSE = 13
@@ -28,12 +28,6 @@ COARSE = 13
 TIGHT = 1.12
 # multiplicity of knots at the switches of jerk: with 2 the slope of jerk may jump there, with 3 jerk itself
 REFINED, EXACT = 2, 3
-# fractions of the time left for path planning, and for planning and the solves from planned paths together
-PLANNING, PATIENCE = 0.1, 0.3
-# planned paths longer than this multiple of the shortest one are skipped
-DETOUR = 1.3
-# appended to the reason of a motion with a planned path as initial guess
-FROM_PLANNED_PATH = ", from a planned collision-free path"
 
 
 class FreeSpline(SqpMethod):
@@ -65,32 +59,8 @@ class FreeSpline(SqpMethod):
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
-            tried.append(self.from_planned_paths(tried[-1]))
-        return _with_effort(tried[-1], tried)
-
-    def from_planned_paths(self, failed: SolveResult) -> SolveResult:
-        """The motion of least energy from planned collision-free paths as initial guesses; `failed` if there is none.
-
-        A path is skipped if linear interpolation between it and a motion already found is almost collision-free: the
-        NLP would find the same motion again.
-        """
-        prepared, space = self.prepared, bspline.uniform(COARSE)
-        v_max, left = prepared.problem.arm.active_limits.v_max, max(self.deadline.left, 0.0)
-        planning, patience = self.deadline.within(PLANNING * left), self.deadline.within(PATIENCE * left)
-        paths = prepared.surroundings.planned_paths(self.q_start, self.q_goal, planning)
-        found: list[SolveResult] = []
-        for path in paths:
-            if patience.passed or length(path, v_max) > DETOUR * length(paths[0], v_max):
-                break
-            q, t = along(path, 1.0, v_max)
-            motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
-            if any(interpolation_is_free(prepared.surroundings.model, q, motion) for motion in motions):
-                continue
-            points = space.fit(self.coordinates.from_joints(q), t)
-            result = self.improve(Guess(space, points, 0.0, collision_free=True), deadline=patience)
-            found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
-        energies = [(self._energy(a.spline), k) for k, a in enumerate(found) if a.spline is not None]
-        return _with_effort(found[min(energies)[1]] if energies else failed, found)
+            tried.append(self.from_planned_paths(bspline.uniform(COARSE), tried[-1]))
+        return with_effort(tried[-1], tried)
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
@@ -139,8 +109,3 @@ class FreeSpline(SqpMethod):
         points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
         points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
         return points
-
-
-def _with_effort(result: SolveResult, tried: list[SolveResult]) -> SolveResult:
-    """A result with the effort of all attempts."""
-    return replace(result, iterations=sum(a.iterations for a in tried), solves=sum(a.solves for a in tried))

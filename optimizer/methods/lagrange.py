@@ -14,7 +14,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import Guess, SqpMethod
+from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
 from optimizer.solution import BaselineName
 from optimizer.trajectories.polynomial import polynomials
 from optimizer.trajectories.ruckig_motion import time_optimal
@@ -44,19 +44,30 @@ class Lagrange(SqpMethod):
     )
 
     def solve(self) -> SolveResult:
-        """From the time-optimal jerk-limited motion; if that finds no motion, from the quintic."""
+        """From the time-optimal jerk-limited motion; if that finds no motion, from the quintic.
+
+        If both collide, from planned collision-free paths.
+        """
         fastest = time_optimal(self.coordinates.limits, self.q_start, self.q_goal)
         straight = quintic(self.q_start, self.q_goal, 1.0)
-        if fastest.duration == 0:
-            return self.solve_from(straight.q, straight.t, fine=False)
-        first = self.solve_from(fastest.q, fastest.t, fine=False)
-        if first.status in (SolveStatus.SOLVED, SolveStatus.OUT_OF_TIME):
-            return first
-        second = self.solve_from(straight.q, straight.t, fine=False)
+        tried: list[SolveResult] = []
+        for guess in (fastest, straight) if fastest.duration > 0 else (straight,):
+            tried.append(self.solve_from(guess.q, guess.t, fine=False))
+            if tried[-1].status in (SolveStatus.SOLVED, SolveStatus.OUT_OF_TIME):
+                return with_effort(tried[-1], tried)
         # of two failures, the one with a collision came further
-        collided = second.status is SolveStatus.FAILED and second.collision is None and first.collision is not None
-        result = first if collided else second
-        return replace(result, iterations=first.iterations + second.iterations, solves=first.solves + second.solves)
+        collided = [result for result in tried if result.status is SolveStatus.FAILED and result.collision is not None]
+        if tried[-1].status is SolveStatus.FAILED and collided:
+            tried.append(self._around(collided[-1]))
+        return with_effort(tried[-1], tried)
+
+    def _around(self, failed: SolveResult) -> SolveResult:
+        """The polynomial of least energy from planned paths; if there is none, the result says so of the method."""
+        assert failed.collision is not None
+        space = polynomials(NODES)
+        message = failed.collision.message
+        reason = f"no polynomial of degree {space.degree} was found around the obstacles: {message}"
+        return self.from_planned_paths(space, replace(failed, reason=reason))
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,)."""

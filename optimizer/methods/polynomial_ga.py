@@ -3,19 +3,24 @@
 R.-F. Fung, Y.-H. Cheng, "Trajectory planning based on minimum absolute input energy for an LCD glass-handling robot",
 Appl. Math. Model. 38, 2014: high-degree polynomials by a real-coded genetic algorithm. The algorithm is PyGAD's (A. F.
 Gad, "PyGAD: an intuitive genetic algorithm Python library", Multimed. Tools Appl. 83, 2024). It has no test of
-convergence, so its answers never count as optimal. It does not avoid obstacles: a motion that collides is a failure.
+convergence, so its answers never count as optimal. If its motion collides, it runs again: from polynomials fitted to a
+planned path, with a penalty for the clearance that is missing.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from models.robot import Array
+from optimizer.collision.path_planner import along
+from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH, planned_paths
 from optimizer.trajectories import quintic
 from optimizer.trajectories.polynomial import PolynomialBasis, polynomials
 from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
@@ -34,12 +39,15 @@ SLOWEST = 4.0
 RATES_USED, TORQUE_USED = 1 - 1e-3, 1 - 5e-3
 # relative increase of the cost for a limit exceeded by 100 %
 PENALTY = 20.0
+# one in so many nodes of a motion is checked for collisions, with this clearance [m] beyond the margins, since a motion
+# comes nearer between them
+EVERY, KEPT = 3, 5e-3
 # a motion that exceeds torque between the nodes is retimed by this factor, at most so many times
 TIME_SCALE, RETIMINGS = 1.01, 60
 
 
 class PolynomialGA(Method):
-    """Solves a candidate by a genetic algorithm; genes are the deviations from the straight line, and the duration."""
+    """Solves a candidate by a genetic algorithm; genes are the duration, and the deviations from a line or path."""
 
     # each takes seconds: only the candidates of least lower bound are solved
     most_solved: ClassVar[int | None] = 3
@@ -48,6 +56,8 @@ class PolynomialGA(Method):
     # generations so far, and the least cost [J] of the first population
     generations: int = 0
     first_cost: float = np.inf
+    # values at the nodes (NODES, nq) [rad] from which the genes deviate; None: those of the straight line
+    _planned: Array | None = None
 
     @property
     def space(self) -> PolynomialBasis:
@@ -65,16 +75,32 @@ class PolynomialGA(Method):
         return np.maximum(DISPLACEMENT_FRACTION * np.abs(self.q_goal - self.q_start), LEAST_REACH)
 
     def solve(self) -> SolveResult:
+        """The best motion of all generations; if it collides, of generations that deviate from a planned path."""
+        if self.deadline.passed:
+            return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+        first = self._evolved()
+        if first.collision is None or self.deadline.passed:
+            return first
+        paths = planned_paths(self.prepared, self.q_start, self.q_goal, self.deadline)
+        if not paths:
+            return first
+        self._planned = self.space.fit(*along(paths[0], 1.0, self.prepared.problem.arm.active_limits.v_max))[1:-1]
+        second = self._evolved()
+        if second.spline is not None:
+            return replace(second, reason=f"{second.reason}{FROM_PLANNED_PATH}", solves=2)
+        degree, message = self.space.degree, first.collision.message
+        reason = f"no polynomial of degree {degree} was found around the obstacles: {message}"
+        return replace(first, reason=reason, iterations=self.generations, solves=2)
+
+    def _evolved(self) -> SolveResult:
         """Run all generations, or until the deadline, and bring the best motion within the limits."""
         import pygad  # a request for another method need not wait for it
 
-        if self.deadline.passed:
-            return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
         rng = np.random.default_rng(SEED)
         genes = NODES * len(self.q_start) + 1
         first = np.clip(rng.normal(0.0, SPREAD, (POPULATION, genes)), -1.0, 1.0)
         first[:, -1] = np.linspace(-1.0, 1.0, POPULATION)
-        # a quarter are straight lines, at several durations
+        # a quarter do not deviate, at several durations
         first[::4, :-1] = 0.0
         self.first_cost = float(self.costs(first).min())
         ga = pygad.GA(
@@ -115,12 +141,24 @@ class PolynomialGA(Method):
         q = z[:, :, 0]
         beyond = np.maximum(limits.q_min - q.min(axis=1), q.max(axis=1) - limits.q_max) / self._reach
         broken = np.maximum(torque - 1, 0).sum(axis=1) + np.maximum(beyond, 0).sum(axis=1) + late
+        if self._planned is not None:
+            broken = broken + self._colliding(q[:, ::EVERY])
         return np.asarray(total + PENALTY * broken * np.abs(total))
+
+    def _colliding(self, q: Array) -> Array:
+        """The share (P,) of samples that collide, of motions with samples q (P, k, nq) [rad]."""
+        return np.array([np.mean([not self._checker.is_valid(each) for each in motion]) for motion in q])
+
+    @cached_property
+    def _checker(self) -> StateValidityChecker:
+        """Checks one configuration at a time: penalties need no distance."""
+        return StateValidityChecker(self.prepared.problem.arm, self.prepared.surroundings.model, KEPT)
 
     def _decoded(self, genes: Array) -> tuple[Array, Array, Array]:
         """Points (P, NODES + 2, nq), durations (P,) [s], and the relative excess over the longest duration (P,)."""
         count, nq = len(genes), len(self.q_start)
-        values = self._line + genes[:, :-1].reshape(count, NODES, nq) * self._reach
+        centre = self._line if self._planned is None else self._planned
+        values = centre + genes[:, :-1].reshape(count, NODES, nq) * self._reach
         ends = np.ones((count, 1, 1))
         points = np.concatenate([ends * self.q_start, values, ends * self.q_goal], axis=1)
         limits = self.prepared.problem.arm.active_limits

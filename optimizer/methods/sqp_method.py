@@ -9,6 +9,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
+from optimizer.collision.path_planner import along, interpolation_is_free
 from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.methods.limit_repair import (
     MARGIN,
@@ -21,13 +22,14 @@ from optimizer.methods.limit_repair import (
     with_repaired_path,
 )
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH, PATIENCE, planned_paths
 from optimizer.nlp.coordinates import Coordinates
 from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Clearance
 from optimizer.trajectories.bspline import Basis
-from optimizer.trajectories.spline import Spline, spline_of, time_scale
+from optimizer.trajectories.spline import Spline, sample, spline_of, time_scale
 
 # times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 8
@@ -108,6 +110,28 @@ class SqpMethod(Method):
                 return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
             stage = self._repaired(stage, result, check)
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
+
+    def from_planned_paths(self, space: Basis, failed: SolveResult) -> SolveResult:
+        """The motion of `space` of least energy from planned paths as initial guesses; `failed` if there is none.
+
+        A path is skipped if linear interpolation between it and a motion already found is almost collision-free: the
+        NLP would find the same motion again.
+        """
+        prepared, v_max = self.prepared, self.prepared.problem.arm.active_limits.v_max
+        patience = self.deadline.within(PATIENCE * max(self.deadline.left, 0.0))
+        found: list[SolveResult] = []
+        for path in planned_paths(prepared, self.q_start, self.q_goal, self.deadline):
+            if patience.passed:
+                break
+            q, t = along(path, 1.0, v_max)
+            motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
+            if any(interpolation_is_free(prepared.surroundings.model, q, motion) for motion in motions):
+                continue
+            points = space.fit(self.coordinates.from_joints(q), t)
+            result = self.improve(Guess(space, points, 0.0, collision_free=True), deadline=patience)
+            found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
+        energies = [(self._energy(a.spline), k) for k, a in enumerate(found) if a.spline is not None]
+        return with_effort(found[min(energies)[1]] if energies else failed, found)
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
         """Excess (nq,) [rad] of a motion below and above the position limits.
@@ -197,6 +221,11 @@ class SqpMethod(Method):
         # the SQP takes no step for positions alone: it bounds them
         free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
         return _Stage(program, limits, nearby, free, result.duration, result.multiplier)
+
+
+def with_effort(result: SolveResult, tried: list[SolveResult]) -> SolveResult:
+    """A result with the effort of all attempts."""
+    return replace(result, iterations=sum(a.iterations for a in tried), solves=sum(a.solves for a in tried))
 
 
 def _failed(reason: str, collision: Clearance | None, iterations: int, solves: int) -> SolveResult:

@@ -1,36 +1,45 @@
 """`time_scaling`: the straight line in joint space with the time scaling s(t) of least energy.
 
-s(t), the fraction of the line, is a quintic B-spline; its control points and the duration are optimised together.
+s(t), the fraction of the line, is a quintic B-spline; its control points and the duration are optimised together. If
+the line collides, s(t) runs along smooth planned paths instead.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar
 
-from models.robot import Limits
+from models.robot import Array, Limits
+from optimizer.methods.around_obstacles import along_path, around_obstacles
 from optimizer.methods.free_spline import COARSE, EXACT, FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import Guess
 from optimizer.methods.time_optimal_scaling import time_optimal_on_line
 from optimizer.nlp.coordinates import Coordinates
-from optimizer.solution import BaselineName
+from optimizer.solution import BaselineName, Clearance
 from optimizer.trajectories import bspline, seven_segment
+from optimizer.trajectories.bspline import Basis
+from optimizer.trajectories.spline import Spline
 from optimizer.trajectories.time_scalings import quintic_spline
 
 
 class TimeScaling(FreeSpline):
-    """Solves a candidate along its straight line, from the time-optimal scaling within the torque limits."""
+    """Solves a candidate along its straight line, or along planned paths if the line collides."""
 
     # only baselines along the straight line are initial guesses
     guess_baselines: ClassVar[tuple[BaselineName, ...]] = ("trapezoid", "quintic")
     accepted_baselines: ClassVar[tuple[BaselineName, ...]] = ("quintic",)
 
+    @cached_property
+    def _collision(self) -> Clearance | None:
+        """The collision on the straight line; None if there is none."""
+        return self.prepared.surroundings.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
+
     def solve(self) -> SolveResult:
-        """From toppra's time-optimal scaling."""
-        collision = self.prepared.surroundings.worst_violation(quintic_spline(self.q_start, self.q_goal, 1.0))
-        if collision is not None:
-            reason = f"on the straight line, {collision.message}"
-            return SolveResult(SolveStatus.INFEASIBLE, reason, collision=collision)
+        """From toppra's time-optimal scaling; along planned paths if the straight line collides."""
+        if self._collision is not None:
+            return around_obstacles(self, "the straight line", self._collision, self._retimed)
         scaling = time_optimal_on_line(self.prepared, self.q_start, self.q_goal)
         if scaling is None:
             reason = "the straight line needs more torque than the joints have"
@@ -45,6 +54,18 @@ class TimeScaling(FreeSpline):
         coarse = bspline.uniform(COARSE).knots
         points = bspline.refit(scaling.fractions(coarse)[:, None], coarse, space.knots)
         return self.improve(Guess(space, points, self.t_min))
+
+    def _solve_in(self, space: Basis, q: Array, t: Array) -> SolveResult:
+        """From samples q (k, nq) at times t (k,): on the straight line, or along the samples if the line collides."""
+        if self._collision is None:
+            return super()._solve_in(space, q, t)
+        if not self.prepared.surroundings.is_collision_free(q):
+            return SolveResult(SolveStatus.FAILED, f"on the straight line, {self._collision.message}")
+        return along_path(self, q, self._retimed)
+
+    def _retimed(self, path: Spline) -> SolveResult:
+        """The motion of least cost along a path."""
+        return PathRetiming(self.prepared, path, self.interval).solve()
 
     def _coordinates(self, limits: Limits) -> Coordinates:
         return Coordinates.straight_line(self.q_start, self.q_goal, limits)

@@ -2,19 +2,23 @@
 
 D. Meike, M. Pellicciari, G. Berselli, "Energy efficient use of multirobot production lines in the automotive industry:
 detailed system modeling and optimization", IEEE Trans. Autom. Sci. Eng. 11, 2014: one factor per motion scales the time
-of the controller's motion. Here this is the time-optimal jerk-limited motion of all joints together.
+of the controller's motion. Here this is the time-optimal jerk-limited motion of all joints together. If that collides,
+it is the time-optimal motion along smooth planned paths.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
+from optimizer.methods.around_obstacles import around_obstacles
+from optimizer.methods.duration_intervals import fastest
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from optimizer.methods.path_retiming import PathRetiming
+from optimizer.methods.sqp_method import with_effort
 from optimizer.trajectories.quadrature import grid
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample
@@ -43,27 +47,37 @@ class _Samples:
 class UniformScaling(Method):
     """Solves a candidate by the factor that scales the time of its time-optimal motion."""
 
-    _evaluations: int = 0
+    def solve(self) -> SolveResult:
+        """The factor of least cost within the limits and the allowed durations; on planned paths after a collision."""
+        given = time_optimal_spline(self.prepared.problem.arm.active_limits, self.q_start, self.q_goal)
+        collision = self.prepared.surroundings.worst_violation(given)
+        if collision is not None:
+            return around_obstacles(self, "the time-optimal motion", collision, self._along)
+        return _UniformScale(self, given).solve()
 
-    @cached_property
-    def given(self) -> Spline:
-        """The time-optimal motion."""
-        return time_optimal_spline(self.prepared.problem.arm.active_limits, self.q_start, self.q_goal)
+    def _along(self, path: Spline) -> SolveResult:
+        """The time-optimal motion along a path, scaled."""
+        found = PathRetiming(self.prepared, path, fastest(self.prepared)).solve()
+        if found.spline is None:
+            return found
+        return with_effort(scaled := _UniformScale(self, found.spline).solve(), [found, scaled])
 
-    @cached_property
-    def _samples(self) -> _Samples:
-        q, v, a = sample(self.given, grid(self.given.duration))
+
+class _UniformScale:
+    """The factor on the time of a `given` motion, and the number of energies evaluated."""
+
+    def __init__(self, method: UniformScaling, given: Spline) -> None:
+        self.prepared, self.interval, self.deadline = method.prepared, method.interval, method.deadline
+        self.t_min, self.t_max = method.t_min, method.t_max
+        self.given, self.evaluations = given, 0
+        q, v, a = sample(given, grid(given.duration))
         still = np.zeros_like(q)
         static = self.prepared.torques(q, still, still)
-        return _Samples(q, v, static, self.prepared.torques(q, v, a) - static)
+        self._samples = _Samples(q, v, static, self.prepared.torques(q, v, a) - static)
 
     def solve(self) -> SolveResult:
         """The factor of least cost within the limits and the allowed durations."""
         length = self.given.duration
-        collision = self.prepared.surroundings.worst_violation(self.given)
-        if collision is not None:
-            reason = f"the time-optimal motion collides: {collision.message}"
-            return SolveResult(SolveStatus.INFEASIBLE, reason, collision=collision)
         needed = least_time_scale(self.given, self.prepared.problem.arm.active_limits.rates * RATES_USED)
         least, most = max(needed, self.t_min / length), self.t_max / length
         if least > most:
@@ -72,12 +86,12 @@ class UniformScaling(Method):
         factors, costs = [least], [self._cost(least)]
         while factors[-1] < most and (np.isinf(costs).all() or len(costs) - int(np.argmin(costs)) <= PATIENCE):
             if self.deadline.passed:
-                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, self._evaluations)
+                return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, self.evaluations)
             factors.append(min(factors[-1] * RATIO, most))
             costs.append(self._cost(factors[-1]))
         best = int(np.argmin(costs))
         if np.isinf(costs[best]):
-            return SolveResult(SolveStatus.FAILED, "found no time scale within the limits", self._evaluations)
+            return SolveResult(SolveStatus.FAILED, "found no time scale within the limits", self.evaluations)
         factor, low, high = factors[best], factors[max(best - 1, 0)], factors[min(best + 1, len(factors) - 1)]
         if high > low:
             found = minimize_scalar(
@@ -85,7 +99,7 @@ class UniformScaling(Method):
             )
             if found.fun < costs[best]:
                 factor = float(found.x)
-        return SolveResult(SolveStatus.SOLVED, CONVERGED, self._evaluations, 1, self._retimed(factor))
+        return SolveResult(SolveStatus.SOLVED, CONVERGED, self.evaluations, 1, self._retimed(factor))
 
     def _retimed(self, factor: float) -> Spline:
         # rounding must not leave the duration's bounds
@@ -93,7 +107,7 @@ class UniformScaling(Method):
 
     def _cost(self, factor: float) -> float:
         """The cost [J], or the duration [s] for minimum time; infinite if torque or a path constraint is exceeded."""
-        self._evaluations += 1
+        self.evaluations += 1
         given, v = self._samples, self._samples.v / factor
         tau = given.static + given.moving / factor**2 + self.prepared.friction.torque(v)
         if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_USED).any():

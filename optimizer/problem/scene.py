@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arrays import LARGEST, SMALLEST, frozen, placement
+from optimizer.problem.clouds import MOST_PARTS_IN_SCENE, Cloud, parts_of
 from optimizer.problem.names import check_name, first_repeated
 
 # most obstacles in a scene, and most vertices of a mesh: they bound the work of a request
@@ -93,7 +94,7 @@ class Mesh:
         object.__setattr__(self, "vertices", frozen(vertices[hull.vertices], (-1, 3), "vertices"))
 
 
-Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh
+Shape = Sphere | Capsule | Cylinder | Box | HalfSpace | Mesh | Cloud
 
 
 @dataclass(frozen=True)
@@ -130,6 +131,8 @@ class Attachment:
     def __post_init__(self) -> None:
         if isinstance(self.shape, HalfSpace):
             raise InvalidProblem("shape", "A half-space cannot be carried: use a box.")
+        if isinstance(self.shape, Cloud):
+            raise InvalidProblem("shape", "Points, voxels and mesh files cannot be carried: use a `mesh` or a box.")
         object.__setattr__(self, "T_flange_shape", placement(self.T_flange_shape, "shape"))
         if self.touches is not None:
             object.__setattr__(self, "touches", tuple(self.touches))
@@ -145,6 +148,12 @@ class Scene:
         object.__setattr__(self, "obstacles", tuple(self.obstacles))
         if len(self.obstacles) > MOST_OBSTACLES:
             raise InvalidProblem("scene.obstacles", f"A scene has at most {MOST_OBSTACLES} obstacles.")
+        parts = sum(parts_of(o.shape) for o in self.obstacles if isinstance(o.shape, Cloud))
+        if parts > MOST_PARTS_IN_SCENE:
+            raise InvalidProblem(
+                "scene.obstacles",
+                f"The points, voxels and triangles of a scene are {parts}: give at most {MOST_PARTS_IN_SCENE} in all.",
+            )
         repeated = first_repeated(self.names)
         if repeated is not None:
             raise InvalidProblem(

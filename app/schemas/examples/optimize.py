@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import HOME, OPTIMIZE, at
+from app.schemas.examples.values import HOME, MESH_FILE, OPTIMIZE, at
 
 _DOWN = [0.0, 1.0, 0.0, 0.0]
 _TCP = {"position": [0.0, 0.0, 0.12], "quaternion": [0.0, 0.0, 0.0, 1.0]}
@@ -72,8 +72,8 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
     },
     "time_scaling": {
         "summary": "Straight line in joint space, with a chosen friction model",
-        "description": "The path is the straight line between the two joint positions. Only its time scaling is "
-        "optimised.",
+        "description": "The path is the straight line between the two joint positions, which is clear. Only its time "
+        "scaling is optimised.",
         "value": {
             "robot": "ur5e",
             "start": {"q": HOME},
@@ -110,6 +110,40 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
             "payload": {"mass": 3.0, "com": [0.0, 0.0, 0.06]},
             "cycle": {"time": 4.0, "hold": "brakes", "brake_delay": 0.5, "brake_power": 15.0},
             "link_mass_scale": 0.8,
+        },
+    },
+    "past_a_scan": {
+        "summary": "Past a post seen by a depth camera, and a part from a mesh file",
+        "description": "Every point and every triangle counts. A scan has up to 100,000 points.",
+        "value": {
+            "start": {"q": _LEFT},
+            "goal": {"q": _RIGHT},
+            "scene": {
+                "obstacles": [
+                    {
+                        "name": "scan",
+                        "shape": "points",
+                        "points": [[-0.52, y, z] for z in (0.0, 0.1, 0.2, 0.3, 0.4) for y in (-0.03, 0.03)],
+                        "radius": 0.05,
+                        "margin": 0.01,
+                    },
+                    {
+                        "name": "shelf",
+                        "shape": "voxels",
+                        "size": 0.1,
+                        "bits": {"dimensions": [4, 2, 2], "data": "DwA="},
+                        "pose": at(-0.2, 0.7, 0.1),
+                    },
+                    {
+                        "name": "bracket",
+                        "shape": "mesh_file",
+                        "format": "stl",
+                        "scale": 0.001,
+                        "data": MESH_FILE,
+                        "pose": at(0.4, 0.4, 0.0),
+                    },
+                ]
+            },
         },
     },
     "over_a_post": {

@@ -28,6 +28,14 @@ BOX = {"shape": "box", "size": [0.1, 0.1, 0.2], "pose": {"position": [0.0, 0.0, 
 """A shape in the flange frame."""
 TOOL = {"capsules": [{"start": [0.0, 0.0, 0.03], "end": [0.0, 0.0, 0.12], "radius": 0.04}]}
 
+MESH_FILE = (
+    "AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAEAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAyEIAAAAAAADIQgAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA"
+    "AAAAAAAAAAAAAMhCAAAAAAAAAAAAAAAAAAAAAAAAyEIAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAADIQgAAAAAA"
+    "AMhCAAAAAAAAAAAAAAAAAAAAAAAAAADIQgAAAAAAAAAAAAAAAAAAyEIAAAAAAAAAAAAAAAAAAMhCAAA="
+)
+"""Base64 of a binary STL: a tetrahedron with edges of 100 mm along the axes."""
+
 
 def at(x: float, y: float, z: float) -> dict[str, list[float]]:
     """A pose at a position [m], not rotated."""

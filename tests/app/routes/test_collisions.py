@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 from starlette.testclient import TestClient
@@ -120,12 +121,85 @@ def test_some_branches_in_collision_are_candidates_ruled_out(client: TestClient)
 
 
 def test_no_way(client: TestClient) -> None:
-    # the straight line in joint space leads through the post, and the method knows no other
-    request = EXAMPLES["over_a_post"] | {"method": "time_scaling"}
+    # a wall outwards from the base, between start and goal, higher and wider than the arm reaches
+    wall = {"name": "post", "shape": "box", "size": [1.4, 0.02, 3.0], "margin": 0.0, "pose": at(-0.85, 0.0, 1.0)}
+    request = EXAMPLES["over_a_post"] | {"method": "time_scaling", "scene": {"obstacles": [wall]}}
     content = refused(client.post("/optimize", json=request), problems.NoCollisionFreeTrajectory)
     assert "post" in content["pair"] and content["depth"] > 0 and content["time"] > 0
-    assert content["candidates"][0]["status"] == "infeasible" and "post and" in content["candidates"][0]["reason"]
+    assert content["candidates"][0]["status"] == "failed" and "post and" in content["candidates"][0]["reason"]
     assert content["start"] == content["candidates"][0]["start"]
+
+
+def test_a_scan_voxels_and_a_mesh_file_are_obstacles(client: TestClient) -> None:
+    """All three at once, by every method that takes no seconds; Pinocchio's replay keeps off every point."""
+    request = EXAMPLES["past_a_scan"]
+    methods = ["bspline", "time_scaling", "lagrange", "uniform_scaling"]
+    rows = answered(client, request | {"methods": methods, "answers": True, "deadline": 60.0}, "/compare")["methods"]
+    free = answered(client, request | {"collisions": False})
+    assert [row["valid"] for row in rows] == [True] * 4
+    scan = request["scene"]["obstacles"][0]
+    for answer in (*(row["answer"] for row in rows), free):
+        spline = answer["trajectory"]["spline"]
+        curve = BSpline(spline["knots"], spline["control_points"], spline["degree"])
+        gap = least_gap(curve(np.linspace(0.0, spline["knots"][-1], 2000)), np.array(scan["points"]))
+        kept = gap >= scan["radius"] + scan["margin"]
+        assert kept == (answer is not free)
+    assert rows[0]["electrical"] > free["energy"]["electrical"]["total"]
+
+
+def least_gap(q: np.ndarray, points: np.ndarray) -> float:
+    """Least distance [m] of points (m, 3) from the capsules of the moving links, by Pinocchio and a plain formula."""
+    model, least = ROBOT.model, np.inf
+    data = model.createData()
+    for each in q:
+        pin.forwardKinematics(model, data, each)
+        for capsule in ROBOT.capsules:
+            if capsule.link == 0:
+                continue
+            a, b = (data.oMi[capsule.link].act(np.asarray(end)) for end in np.asarray(capsule.axis)[[0, -1]])
+            share = np.clip((points - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-12), 0.0, 1.0)
+            least = min(least, np.linalg.norm(points - a - share[:, None] * (b - a), axis=1).min() - capsule.radius)
+    return float(least)
+
+
+def test_many_points_are_answered_and_warned_of(client: TestClient) -> None:
+    """A wall of 20,000 points; the warning names the obstacle, as of any other shape."""
+    y, z = np.meshgrid(np.linspace(-0.8, 0.8, 200), np.linspace(0.0, 1.2, 100))
+    wall = np.stack([np.full(y.size, 0.35), y.ravel(), z.ravel()], axis=1).round(4)
+    request = move(scene={"obstacles": [{"name": "wall", "shape": "points", "points": wall.tolist(), "radius": 0.01}]})
+    content = answered(client, request)
+    assert content["certificate"]["clearance"]["min_clearance"] >= 0
+    nearest = answered(
+        client,
+        {"configurations": [request["start"]["q"]] * 2, "time_per_segment": 1.0} | {"scene": request["scene"]},
+        "/evaluate",
+    )["nearest"]
+    assert nearest["distance"] > 0
+
+
+@pytest.mark.parametrize(
+    ("fields", "where"),
+    [
+        ({"shape": "points", "points": [], "radius": 0.1}, ["points"]),
+        ({"shape": "points", "points": [[0.0, 0.0, 0.0]] * 100_001, "radius": 0.1}, ["points"]),
+        ({"shape": "points", "points": [[0.0, 0.0]], "radius": 0.1}, ["points", 0]),
+        ({"shape": "points", "points": [[0.5, 0.5, 0.5]], "radius": 0.0}, ["radius"]),
+        ({"shape": "points", "points": [[0.5, 0.5, 0.5]], "radius": -1.0}, ["radius"]),
+        ({"shape": "voxels", "size": 0.1}, ["cells"]),
+        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [2, 2, 2], "data": "AA=="}}, ["cells"]),
+        ({"shape": "mesh_file", "format": "stl", "data": "AAAA"}, ["data"]),
+        ({"shape": "mesh_file", "format": "step", "data": "AAAA"}, ["format"]),
+        ({"shape": "mesh_file", "format": "glb", "data": "not base64!"}, ["data"]),
+    ],
+)
+def test_refused_worlds(client: TestClient, fields: dict[str, Any], where: list[Any]) -> None:
+    scene = {"obstacles": [{"name": "scan"} | fields]}
+    for path, request in (
+        ("/optimize", move(scene=scene)),
+        ("/evaluate", {"configurations": [HOME, HOME[::-1]], "time_per_segment": 2.0, "scene": scene}),
+    ):
+        errors = refused(client.post(path, json=request), problems.Validation)["errors"]
+        assert errors[0]["loc"] == ["body", "scene", "obstacles", 0, *where]
 
 
 def test_ends_outside_the_cone(client: TestClient) -> None:
@@ -173,9 +247,9 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
 
 def test_compare_and_pareto_keep_clear_too(client: TestClient) -> None:
     request = EXAMPLES["over_a_post"]
-    compared = answered(client, request | {"methods": ["bspline", "time_scaling"]}, "/compare")["methods"]
-    assert compared[0]["valid"]
-    assert compared[1]["problem"]["type"] == "/problems/no-collision-free-trajectory", "the straight line hits the post"
+    # all methods; the straight line hits the post
+    compared = answered(client, request | {"deadline": 60.0}, "/compare")["methods"]
+    assert len(compared) == 5 and all(row["valid"] and row["problem"] is None for row in compared)
     front = answered(client, request | {"points": 2, "duration": {"max": 1.5}}, "/pareto")
     kept = client.get(front["points"][0]["answer"]).json()["answer"]
     assert kept["certificate"]["clearance"]["min_clearance"] >= 0

@@ -155,10 +155,10 @@ def test_head_is_refused_alike(client: TestClient) -> None:
 @pytest.mark.parametrize("declared", [True, False])
 def test_body_too_large(client: TestClient, declared: bool) -> None:
     def chunks() -> Iterator[bytes]:
-        for _ in range(100):
+        for _ in range(200):
             yield b" " * 50_000
 
-    content = b" " * 5_000_000 if declared else chunks()
+    content = b" " * 10_000_000 if declared else chunks()
     answer = client.post("/optimize", content=content, headers={"content-type": "application/json"})
     refused(answer, problems.BodyTooLarge)
 

@@ -19,7 +19,7 @@ from optimizer.exceptions import NoTrajectory
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
-from optimizer.methods.free_spline import FROM_PLANNED_PATH
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between

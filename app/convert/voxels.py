@@ -1,0 +1,41 @@
+"""From the occupied cells of a grid in a request to those of the library."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+
+import numpy as np
+import numpy.typing as npt
+
+from app.schemas.scene import MOST_CELLS, VoxelBits, Voxels
+from optimizer.exceptions import InvalidProblem
+
+
+def occupied_cells(given: Voxels) -> npt.NDArray[np.int64]:
+    """Cells (n, 3) that are occupied. Raises InvalidProblem, with the field named."""
+    if (given.cells is None) == (given.bits is None):
+        raise InvalidProblem("cells", "Give the occupied cells either as `cells` or as `bits`.")
+    return np.array(given.cells, dtype=np.int64) if given.bits is None else _from_bits(given.bits)
+
+
+def _from_bits(bits: VoxelBits) -> npt.NDArray[np.int64]:
+    count = int(np.prod(bits.dimensions))
+    if count > MOST_CELLS:
+        raise InvalidProblem(
+            "bits.dimensions", f"bits.dimensions must make at most {MOST_CELLS} cells: use larger ones."
+        )
+    try:
+        data = base64.b64decode(bits.data, validate=True)
+    except binascii.Error:
+        raise InvalidProblem(
+            "bits.data", "bits.data is not valid base64: fill it to a multiple of 4 characters."
+        ) from None
+    if len(data) != -(-count // 8):
+        raise InvalidProblem(
+            "bits.data",
+            f"bits.data holds {len(data)} bytes, but {count} cells need {-(-count // 8)}: one bit per cell, eight to a "
+            "byte.",
+        )
+    numbers = np.flatnonzero(np.unpackbits(np.frombuffer(data, dtype=np.uint8), count=count, bitorder="little"))
+    return np.stack(np.unravel_index(numbers, bits.dimensions, order="F"), axis=1).astype(np.int64)

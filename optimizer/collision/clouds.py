@@ -1,0 +1,286 @@
+"""Signed distances of obstacles of many parts: balls, voxels and triangles, each part exact, found by a bounding tree.
+
+Everything is in the frame of the obstacle's shape. A closed mesh is solid: a body within it has a negative distance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from typing import overload
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
+from optimizer.collision.closed_form_distance import box_segment, segment_segment, triangle_segment
+from optimizer.collision.coal_distance import ConvexPairs
+from optimizer.collision.cores import Core, Indices, box_corners, least_height
+from optimizer.problem.clouds import Cloud as Shape
+from optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
+
+# trees that are kept for the next request with the same obstacle: of so many parts in all [1]. A part takes up to 200
+# bytes
+MOST_KEPT_PARTS = 400_000
+# patches of an obstacle at most. Each is a body of its own: the optimiser bounds the distance of each
+MOST_PATCHES = 8
+# longest edge [m] of the triangles that a tree holds, and the number of them at which the division ends
+LONGEST_EDGE, MOST_DIVIDED = 0.05, 200_000
+# direction of the rays that tell the inside of a closed mesh: along no edge or face that a design would have
+RAY = np.array([0.5657, 0.6213, 0.5422])
+
+Witness = tuple[Array, Array, Array]
+
+
+class Cloud:
+    """The parts of an obstacle, without the radius of its points, and the tree over them."""
+
+    def __init__(self, shape: Shape) -> None:
+        self.count = parts_of(shape)
+        self.corners: Array | None = None
+        self.half_size: Array | None = None
+        self.is_solid = False
+        match shape:
+            case Points():
+                centres, radii = shape.points, np.zeros(self.count)
+            case Voxels():
+                centres = np.asarray((shape.cells + 0.5) * shape.size, dtype=float)
+                self.half_size = np.full(3, shape.size / 2)
+                radii = np.full(self.count, float(np.linalg.norm(self.half_size)))
+            case TriangleMesh():
+                self.corners, self.is_solid = divided(shape.corners), shape.is_closed
+                self.count = len(self.corners)
+                centres = (self.corners.min(axis=1) + self.corners.max(axis=1)) / 2
+                radii = np.linalg.norm(self.corners - centres[:, None], axis=2).max(axis=1)
+        self.tree = BoundingTree(centres, radii)
+        # the inside of a solid has no parts: only its root knows of it
+        self.patches = [0] if self.is_solid else self.tree.patches(MOST_PATCHES)
+        self._low, self._high = self._box(self.tree.parts(0))
+
+    def box(self, patch: int) -> Array:
+        """The corners (8, 3) [m] of the box around a patch."""
+        return box_corners(*self._box(self.tree.parts(patch)))
+
+    def nearest(self, segments: Array, root: Indices, within: Array) -> Witness:
+        """Distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3), from the part nearest to each.
+
+        The normal leads to the segment, on which the point is. `root` (k,) are patches. A distance above `within` (k,)
+        [m] is infinite, except within a solid.
+        """
+        may_be_inside = ((segments[:, 0] >= self._low) & (segments[:, 0] <= self._high)).all(axis=1) & self.is_solid
+        within = np.where(may_be_inside, np.inf, within)
+        query, part = self.tree.near(segments, np.zeros(len(segments)), within, root, nearest=True)
+        query, part = self._promising(segments, query, part)
+        found = _least(self.to_segments(part, segments[query]), query, len(segments), within)
+        if self.is_solid:
+            apart = np.flatnonzero(may_be_inside & (found[0] > 0))
+            inside = apart[self.inside(segments[apart, 0])]
+            found[0][inside] *= -1
+            found[1][inside] *= -1
+        return found
+
+    def _promising(self, segments: Array, query: Indices, part: Indices) -> tuple[Indices, Indices]:
+        """Those (query, part) that may be nearer than the part of each query whose ball is nearest."""
+        if not self.tree.radii.any():
+            return query, part
+        least = point_segment(self.tree.centres[part], segments[query]) - self.tree.radii[part]
+        order = np.lexsort((least, query))
+        first = order[np.unique(query[order], return_index=True)[1]]
+        reached = np.full(len(segments), np.inf)
+        reached[query[first]] = self.to_segments(part[first], segments[query[first]])[0] + ROUNDING
+        kept = least <= np.maximum(reached[query], 0.0)
+        return query[kept], part[kept]
+
+    def to_segments(self, part: Indices, segments: Array) -> Witness:
+        """Signed distance (k,), normal (k, 3) and point (k, 3) of segments (k, 2, 3) from parts (k,)."""
+        if self.corners is not None:
+            return triangle_segment(self.corners[part], segments)
+        centres = self.tree.centres[part]
+        if self.half_size is None:
+            distance, normal, _, point = segment_segment(np.repeat(centres[:, None], 2, axis=1), segments)
+            return distance, normal, point
+        half_size = np.broadcast_to(self.half_size, centres.shape)
+        distance, normal, point = box_segment(half_size, segments - centres[:, None])
+        return distance, normal, point + centres
+
+    def highest(self, part: Indices, direction: Array) -> Array:
+        """max n·x (k,) [m] over parts (k,) for n (k, 3)."""
+        if self.corners is not None:
+            return np.asarray(np.einsum("kci,ki->kc", self.corners[part], direction).max(axis=1))
+        height = np.einsum("ki,ki->k", self.tree.centres[part], direction)
+        return np.asarray(height if self.half_size is None else height + np.abs(direction) @ self.half_size)
+
+    def inside(self, points: Array) -> Indices:
+        """Indices of the points (k, 3) that a closed mesh encloses: the crossings of a ray do not cancel out."""
+        assert self.corners is not None
+        rays = np.stack([points, points + RAY * 2 * np.linalg.norm(self._high - self._low)], axis=1)
+        none = np.zeros(len(points))
+        query, part = self.tree.near(rays, none, none, np.zeros(len(points), dtype=np.intp))
+        triangles, ray = self.corners[part], rays[query]
+        sides = [_volume(ray[:, 0], ray[:, 1], triangles[:, i], triangles[:, i - 2]) for i in range(3)]
+        forward, backward = (np.all([sign * side > 0 for side in sides], axis=0) for sign in (1, -1))
+        ends = [_volume(ray[:, e], triangles[:, 0], triangles[:, 1], triangles[:, 2]) for e in range(2)]
+        crosses = ends[0] * ends[1] < 0
+        turns = np.zeros(len(points))
+        np.add.at(turns, query, crosses * (forward.astype(float) - backward))
+        return np.flatnonzero(turns != 0)
+
+    def _box(self, parts: Indices) -> tuple[Array, Array]:
+        if self.corners is not None:
+            points = self.corners[parts].reshape(-1, 3)
+            return points.min(axis=0), points.max(axis=0)
+        grow = 0.0 if self.half_size is None else self.half_size
+        centres = self.tree.centres[parts]
+        return centres.min(axis=0) - grow, centres.max(axis=0) + grow
+
+
+class ConvexAgainstCloud:
+    """Distances of one convex core that is no segment, part by part, by Coal."""
+
+    def __init__(self, cloud: Cloud, core: Core) -> None:
+        self._cloud, self._core = cloud, core
+        # a ball around the core, whose centre is in it
+        self._centre = core.points.mean(axis=0)
+        self._radius = float(np.linalg.norm(core.points - self._centre, axis=1).max()) + core.disc_radius
+        self._pairs = ConvexPairs(_Cores(cloud, core))
+
+    def nearest(self, T: Array, root: Indices, within: Array) -> Witness:
+        """As `Cloud.nearest`, for the core at T (k, 4, 4) in the frame of the cloud."""
+        cloud = self._cloud
+        balls, reach = self.balls(T)
+        if cloud.is_solid:
+            within = np.full(len(T), np.inf)
+        query, part = cloud.tree.near(balls, reach, within, root, nearest=True)
+        R, origin = T[query, :3, :3], T[query, :3, 3]
+        in_core = np.einsum("kij,ki->kj", R, cloud.tree.centres[part] - origin)
+        least = least_height(self._core, in_core) - cloud.tree.radii[part]
+        order = np.lexsort((least, query))
+        distance, normal, point = np.full(len(T), np.inf), np.tile([0.0, 0.0, 1.0], (len(T), 1)), balls[:, 0].copy()
+        for k in order.tolist():
+            q = int(query[k])
+            # the parts of a query come in the order of their lower bounds
+            if least[k] < min(distance[q], within[q]):
+                d, n, p = self.to_cores(part[k : k + 1], T[q : q + 1])
+                if d[0] < distance[q] and d[0] <= within[q]:
+                    distance[q], normal[q], point[q] = d[0], n[0], p[0]
+        if cloud.is_solid:
+            apart = np.flatnonzero(distance > 0)
+            inside = apart[cloud.inside(balls[apart, 0])]
+            distance[inside] *= -1
+            normal[inside] *= -1
+        return distance, normal, point
+
+    def balls(self, T: Array) -> tuple[Array, Array]:
+        """Segments (k, 2, 3) of no length and radii (k,) [m]: balls around the core at T (k, 4, 4)."""
+        centres = T[:, :3, :3] @ self._centre + T[:, :3, 3]
+        return np.repeat(centres[:, None], 2, axis=1), np.full(len(T), self._radius)
+
+    def to_cores(self, part: Indices, T: Array) -> Witness:
+        """As `Cloud.to_segments`, for the core at T (k, 4, 4)."""
+        T_part = np.tile(np.eye(4), (len(part), 1, 1))
+        if self._cloud.corners is None:
+            T_part[:, :3, 3] = self._cloud.tree.centres[part]
+        return self._pairs.witness_points((part + 1).tolist(), [0] * len(part), T_part, T)
+
+
+class _Cores(Sequence[Core]):
+    """The moving core, then the cores of the parts, each in its own frame: only those in use are made."""
+
+    def __init__(self, cloud: Cloud, core: Core) -> None:
+        self._cloud, self._core = cloud, core
+
+    def __len__(self) -> int:
+        return self._cloud.count + 1
+
+    @overload
+    def __getitem__(self, index: int) -> Core: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Core]: ...
+    def __getitem__(self, index: int | slice) -> Core | Sequence[Core]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        if index == 0:
+            return self._core
+        if self._cloud.corners is not None:
+            return Core(self._cloud.corners[index - 1])
+        half_size = self._cloud.half_size
+        if half_size is None:
+            return Core(np.zeros((1, 3)))
+        return Core(box_corners(-half_size, half_size), half_size=half_size)
+
+
+def divided(triangles: Array) -> Array:
+    """Triangles (m, 3, 3) [m] whose union is that of triangles (k, 3, 3), without edges longer than LONGEST_EDGE.
+
+    Balls around long triangles would be mostly empty. The longest edges are halved; at MOST_DIVIDED triangles it ends.
+    """
+    while True:
+        edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
+        long = edges.max(axis=1) > LONGEST_EDGE
+        if not long.any() or len(triangles) + long.sum() > MOST_DIVIDED:
+            return triangles
+        # the longest edge is turned to the front: from corner 0 to corner 1
+        turn = (edges[long].argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = (triangles[long][np.arange(len(turn)), turn[:, i]] for i in range(3))
+        middle = (a + b) / 2
+        halves = [np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)]
+        triangles = np.concatenate([triangles[~long], *halves])
+
+
+def cloud_of(shape: Shape) -> Cloud:
+    """The parts of an obstacle and their tree. Those of the last requests are kept, by content."""
+    return _KEPT.get(shape)
+
+
+class _Kept:
+    """Clouds by a digest of their content, the least recently used first, of MOST_KEPT_PARTS in all."""
+
+    def __init__(self) -> None:
+        self._clouds: OrderedDict[bytes, Cloud] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, shape: Shape) -> Cloud:
+        key = _digest(shape)
+        with self._lock:
+            if key in self._clouds:
+                self._clouds.move_to_end(key)
+                return self._clouds[key]
+        cloud = Cloud(shape)
+        with self._lock:
+            # two threads may both make it; all go on with the first
+            cloud = self._clouds.setdefault(key, cloud)
+            while sum(each.count for each in self._clouds.values()) > MOST_KEPT_PARTS:
+                self._clouds.popitem(last=False)
+        return cloud
+
+
+_KEPT = _Kept()
+
+
+def _digest(shape: Shape) -> bytes:
+    """A digest of the parts; the radius of points is none of them."""
+    match shape:
+        case Points():
+            content = [b"points", shape.points.tobytes()]
+        case Voxels():
+            content = [b"voxels", np.float64(shape.size).tobytes(), shape.cells.tobytes()]
+        case TriangleMesh():
+            content = [b"triangles", shape.corners.tobytes()]
+    return hashlib.blake2b(b"".join(content)).digest()
+
+
+def _least(found: Witness, query: Indices, count: int, within: Array) -> Witness:
+    """The nearest of the parts of every query; infinitely far if there is none within its limit."""
+    distance, normal, point = np.full(count, np.inf), np.tile([0.0, 0.0, 1.0], (count, 1)), np.zeros((count, 3))
+    order = np.lexsort((found[0], query))
+    first = order[np.unique(query[order], return_index=True)[1]]
+    first = first[found[0][first] <= within[query[first]]]
+    distance[query[first]], normal[query[first]], point[query[first]] = (each[first] for each in found)
+    return distance, normal, point
+
+
+def _volume(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Six times the signed volumes (k,) [m³] of tetrahedra."""
+    return np.asarray(np.einsum("ki,ki->k", np.cross(b - a, c - a), d - a))

@@ -1,0 +1,184 @@
+"""Point clouds, voxels and mesh files from a request: what they become, and what is refused."""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from app.convert import mesh_file
+from app.convert.mesh_file import MOST_KEPT_TRIANGLES, mesh_from_file
+from app.convert.scene import to_scene
+from app.schemas.examples.values import MESH_FILE
+from app.schemas.scene import MOST_CELLS, Scene
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.clouds import MOST_TRIANGLES, Points, TriangleMesh, Voxels
+
+# a file in single precision rounds coordinates of a metre to this [m]
+SINGLE = 1e-7
+
+
+def base64_of(content: bytes | str) -> str:
+    return base64.b64encode(content.encode() if isinstance(content, str) else content).decode()
+
+
+def shape_of(**fields: Any) -> Any:
+    scene = Scene.model_validate_json(json.dumps({"obstacles": [{"name": "scan"} | fields]}))
+    return to_scene(scene).obstacles[0].shape
+
+
+def bits_of(occupied: Any) -> str:
+    """Base64 of an occupancy grid (nx, ny, nz) as the contract describes it."""
+    return base64_of(np.packbits(np.asarray(occupied, dtype=bool).ravel(order="F"), bitorder="little").tobytes())
+
+
+def torus() -> Any:
+    return trimesh.creation.torus(0.3, 0.05, major_sections=16, minor_sections=8)
+
+
+def in_order(triangles: Array) -> Array:
+    """Triangles (n, 9), each with its least corner first, sorted."""
+    rows = []
+    for triangle in np.round(np.asarray(triangles), 5).tolist():
+        k = triangle.index(min(triangle))
+        rows.append([x for corner in triangle[k:] + triangle[:k] for x in corner])
+    return np.array(sorted(rows))
+
+
+def test_points() -> None:
+    shape = shape_of(shape="points", points=[[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]], radius=0.02)
+    assert isinstance(shape, Points) and shape.points.tolist() == [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]
+    assert shape.radius == 0.02
+
+
+def test_voxels_by_cells_and_by_bits_are_the_same() -> None:
+    grid = np.random.default_rng(1).random((5, 3, 4)) < 0.3
+    cells = shape_of(shape="voxels", size=0.05, cells=np.argwhere(grid).tolist())
+    bits = shape_of(shape="voxels", size=0.05, bits={"dimensions": [5, 3, 4], "data": bits_of(grid)})
+    assert isinstance(cells, Voxels) and isinstance(bits, Voxels)
+    assert cells.cells.tolist() == bits.cells.tolist() == np.argwhere(grid).tolist()
+
+
+@pytest.mark.parametrize("format_", ["stl", "obj", "glb"])
+def test_a_mesh_file_keeps_every_triangle(format_: Any) -> None:
+    """Each of them, at the scale asked for, and closed as the mesh is."""
+    found = mesh_from_file(format_, base64_of(torus().export(file_type=format_)), 0.5)
+    assert found.is_closed and found.corners.shape == (256, 3, 3)
+    ours, theirs = in_order(found.corners * 2), in_order(torus().triangles)
+    assert np.abs(ours - theirs).max() < 2e-5  # rounded to five digits, so that corners can be sorted
+
+
+def test_text_stl_and_a_scene_of_several_bodies() -> None:
+    found = mesh_from_file("stl", base64_of(torus().export(file_type="stl_ascii")), 1.0)
+    assert np.abs(in_order(found.corners) - in_order(torus().triangles)).max() < 2e-5
+    moved = torus().apply_translation([1.0, 0.0, 0.0])
+    scene = trimesh.Scene([torus(), moved])
+    both = mesh_from_file("glb", base64_of(scene.export(file_type="glb")), 1.0)
+    assert len(both.corners) == 512 and both.corners[..., 0].max() == pytest.approx(1.35, abs=SINGLE)
+
+
+def test_the_example_of_the_contract_is_a_tetrahedron() -> None:
+    found = mesh_from_file("stl", MESH_FILE, 0.001)
+    assert found.is_closed and sorted(np.unique(found.corners.reshape(-1, 3), axis=0).tolist()) == [
+        [0, 0, 0],
+        [0, 0, pytest.approx(0.1)],
+        [0, pytest.approx(0.1), 0],
+        [pytest.approx(0.1), 0, 0],
+    ]
+
+
+def glb(**fields: Any) -> bytes:
+    """A GLB whose JSON part has these fields, without any data."""
+    text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]} | fields).encode()
+    text += b" " * (-len(text) % 4)
+    return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
+
+
+ACCESSOR = {"componentType": 5126, "count": 2**31, "type": "VEC3"}
+BOMB = {"accessors": [ACCESSOR], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0}]}
+REPEATED = {"nodes": [{"children": [1, 1]}, {"children": [2, 2]}, {"children": [3, 3]}, {}]}
+ONE_BIT = {"dimensions": [1, 1, 1], "data": "AQ=="}
+WITH_NAN = "v nan 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 2 3 4\n"
+
+
+@pytest.mark.parametrize(
+    ("format_", "content"),
+    [
+        ("stl", b""),
+        ("stl", b"\xff" * 200),  # the header promises four billion triangles
+        ("stl", b"\0" * 84),
+        ("stl", b"solid nothing\nfacet"),
+        ("obj", b""),
+        ("obj", b"hello"),
+        ("obj", b"v 0 0 0\nf 1 2 3\n"),
+        ("obj", WITH_NAN.encode()),
+        ("obj", b"v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
+        ("obj", b"mtllib /etc/passwd\nv 0 0 0\n"),
+        ("glb", b""),
+        ("glb", b"glTF" + b"\0" * 40),
+        ("glb", b"\xff" * 200),
+        ("glb", glb(**BOMB)),
+        ("glb", glb(**REPEATED)),
+        ("glb", glb(nodes=[{}] * 5000)),
+        ("glb", glb(nodes={"a": 1})),
+        ("glb", torus().export(file_type="glb")[:3000]),
+    ],
+)
+def test_a_broken_file_is_refused_at_its_field(format_: Any, content: bytes) -> None:
+    with pytest.raises(InvalidProblem) as caught:
+        mesh_from_file(format_, base64_of(content), 1.0)
+    assert caught.value.field == "data"
+
+
+def test_too_many_triangles_are_refused() -> None:
+    stl = b"\0" * 80 + struct.pack("<I", MOST_TRIANGLES + 1) + bytes(50) * (MOST_TRIANGLES + 1)
+    with pytest.raises(InvalidProblem, match="simplify the mesh") as caught:
+        mesh_from_file("stl", base64_of(stl), 1.0)
+    assert caught.value.field == "data"
+
+
+@pytest.mark.parametrize(
+    ("fields", "field"),
+    [
+        ({"shape": "points", "points": [[200.0, 0.0, 0.0]], "radius": 0.1}, "points"),
+        ({"shape": "voxels", "size": 0.1}, "cells"),
+        ({"shape": "voxels", "size": 0.1, "cells": [[0, 0, 0]], "bits": ONE_BIT}, "cells"),
+        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [1, 1, 1], "data": "AAAA"}}, "bits.data"),
+        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [1, 1, 1], "data": "AAAAA"}}, "bits.data"),
+        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [2, 2, 2], "data": "AA=="}}, "cells"),
+        ({"shape": "voxels", "size": 0.1, "bits": {"dimensions": [4096, 4096, 1], "data": "AA=="}}, "bits.dimensions"),
+        ({"shape": "mesh_file", "format": "stl", "data": "AAAAA"}, "data"),
+        ({"shape": "mesh_file", "format": "obj", "data": MESH_FILE}, "data"),
+        ({"shape": "mesh_file", "format": "stl", "data": MESH_FILE, "scale": 1000.0}, "data"),
+    ],
+)
+def test_bad_obstacles_name_the_field(fields: dict[str, Any], field: str) -> None:
+    with pytest.raises(InvalidProblem) as caught:
+        shape_of(**fields)
+    assert caught.value.field == f"scene.obstacles.0.{field}"
+
+
+def test_all_cells_of_the_greatest_grid_fit() -> None:
+    """One occupied cell, the last one: the text of the bits is within the length that the contract allows."""
+    grid = np.zeros((256, 256, 128), dtype=bool)
+    assert grid.size == MOST_CELLS
+    grid[-1, -1, -1] = True
+    shape = shape_of(shape="voxels", size=0.01, bits={"dimensions": [256, 256, 128], "data": bits_of(grid)})
+    assert shape.cells.tolist() == [[255, 255, 127]]
+
+
+def test_a_file_is_read_once_and_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert mesh_from_file("stl", MESH_FILE, 0.001) is mesh_from_file("stl", MESH_FILE, 0.001)
+    assert mesh_from_file("stl", MESH_FILE, 0.002) is not mesh_from_file("stl", MESH_FILE, 0.001)
+    assert MOST_KEPT_TRIANGLES >= MOST_TRIANGLES
+    kept = mesh_file._Kept()
+    monkeypatch.setattr(mesh_file, "MOST_KEPT_TRIANGLES", 8)
+    content = base64.b64decode(MESH_FILE)
+    made: list[TriangleMesh] = [kept.get("stl", content, scale) for scale in (1e-3, 2e-3, 3e-3)]
+    assert kept.get("stl", content, 3e-3) is made[2] and kept.get("stl", content, 1e-3) is not made[0]
