@@ -3,6 +3,7 @@
     make bench                                all sections
     make bench BENCH_ARGS="--fraction 0.1"    a tenth of the tasks, to test the benchmarks
     make bench BENCH_ARGS="--only scaling"    some sections; the others keep their last results
+    make bench BENCH_ARGS="--foreign FILE"    planning problems of others too, see docs/foreign_scenes.md
 
 Each section is a module with a command of its own. The sections run one after another, in a process each.
 """
@@ -27,6 +28,8 @@ from benchmarks.service import ROOT
 
 FOLDER = ROOT / "build" / "bench"
 PLANNER_TASKS = 20
+# problems of each family of a file from elsewhere, if not all of them are asked
+FOREIGN_COUNT = 40
 # name: module, arguments, count of tasks (0: not by count)
 SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "solver": ("solver_times", (), 200),
@@ -44,19 +47,31 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
 def run(name: str, fraction: float) -> dict[str, Any] | None:
     """Runs one section and returns its results; None if it wrote none."""
     module, given, count = SECTIONS[name]
+    arguments = list(given)
+    if count:
+        arguments += ["--count", str(max(round(count * fraction), 3))]
+    elif name == "load":
+        arguments += ["--seconds", str(max(60 * fraction, 5))]
+    return _run(name, module, arguments)
+
+
+def _run(name: str, module: str, arguments: list[str]) -> dict[str, Any] | None:
+    """Runs the command of a section and returns its results; None if it wrote none."""
     path = FOLDER / f"{name}.json"
     path.unlink(missing_ok=True)
-    command = [sys.executable, "-m", f"benchmarks.{module}", *given, "--json", str(path)]
-    if count:
-        command += ["--count", str(max(round(count * fraction), 3))]
-    elif name == "load":
-        command += ["--seconds", str(max(60 * fraction, 5))]
+    command = [sys.executable, "-m", f"benchmarks.{module}", *arguments, "--json", str(path)]
     print(f"== {name}", flush=True)
     began = time.perf_counter()
     # the exit code reports failed requirements, which the report shows
     subprocess.run(command, cwd=ROOT, env=os.environ | dict.fromkeys(THREADS, "1"), check=False)
     print(f"   {time.perf_counter() - began:.0f} s", flush=True)
     return stored(name)
+
+
+def foreign(file: Path, fraction: float) -> dict[str, Any] | None:
+    """Runs the section of the planning problems in a file and returns its results; None if it wrote none."""
+    count = 0 if fraction >= 1 else max(round(FOREIGN_COUNT * fraction), 1)
+    return _run("foreign", "foreign", [str(file), "--count", str(count)])
 
 
 def stored(name: str) -> dict[str, Any] | None:
@@ -71,10 +86,14 @@ def main() -> int:
     parser.add_argument("--fraction", type=float, default=1.0, help="fraction of the tasks (%(default)s)")
     parser.add_argument("--only", nargs="+", choices=SECTIONS, default=list(SECTIONS), help="sections (all)")
     parser.add_argument("--output", type=Path, default=report.RESULTS, help="file for the report (%(default)s)")
+    parser.add_argument("--foreign", type=Path, help="file of planning problems of others; without it, none are run")
     given = parser.parse_args()
     FOLDER.mkdir(parents=True, exist_ok=True)
     machine, began = described(), time.perf_counter()
     results = {name: run(name, given.fraction) if name in given.only else stored(name) for name in SECTIONS}
+    results["foreign"] = (
+        stored("foreign") if given.foreign is None else foreign(given.foreign.resolve(), given.fraction)
+    )
     took = time.perf_counter() - began
     report.write(given.output, machine, results, took, whole=len(given.only) == len(SECTIONS))
     broken = [name for name in given.only if results[name] is None]

@@ -74,7 +74,7 @@ def cell_task(seed: int, index: int) -> CellTask:
         q_start = from_[int(rng.integers(len(from_)))]
         # the nearest configuration of the goal to which there is a path
         for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
-            if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, model=model):
+            if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, model=model).paths:
                 blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
                 return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
     raise AssertionError

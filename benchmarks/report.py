@@ -22,6 +22,7 @@ def write(path: Path, machine: Results, results: dict[str, Results | None], took
         _notes(results),
         _load(results.get("load")),
         _growth(results.get("scaling")),
+        _foreign(results.get("foreign")),
     ]
     if planners.rows:
         draw(planners, path.with_name(PLOT))
@@ -181,3 +182,23 @@ def _times(row: Results, digits: int = 1) -> list[str]:
 
 def _solved(row: Results) -> list[str]:
     return [f"{row['iterations']['p50']:.0f}", f"{PERCENT * row['solved'] / row['wall']['count']:.0f}"]
+
+
+def _foreign(found: Results | None) -> str:
+    """Planning problems of others, per kind of goal and family."""
+    if found is None:
+        return ""
+    times = ["time: median [s]", "95th percentile [s]"]
+    rows = (
+        [
+            row["kind"],
+            row["family"],
+            f"{row['answered']} of {row['count']}",
+            *(f"{row['wall'][name]:.2f}" for name in ("p50", "p95")),
+            "" if row["energy"]["p50"] is None else f"{row['energy']['p50']:.0f}",
+            ", ".join(f"{count} {name}" for name, count in row["problems"].items()),
+        ]
+        for row in found["rows"]
+    )
+    header = ["goal", "family", "answered", *times, "energy: median [J]", "problems"]
+    return "## Planning problems of others\n\n" + table(header, rows)

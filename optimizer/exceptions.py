@@ -189,14 +189,19 @@ class NoTrajectory(JoulepathError):
 
 class NoCollisionFreeTrajectory(NoTrajectory):
     """Every candidate failed, some because of a collision. `best` is the least deep collision of any candidate's
-    motion, `start` and `goal` are the branches of this candidate. `depth` [m] is the missing clearance of `pair`."""
+    motion, `start` and `goal` are the branches of this candidate. `depth` [m] is the missing clearance of `pair`.
+    `cut_short`: the deadline ended the search for a path of some candidate."""
 
-    def __init__(self, candidates: Sequence[CandidateReport], best: Clearance, start: str, goal: str) -> None:
+    def __init__(
+        self, candidates: Sequence[CandidateReport], best: Clearance, start: str, goal: str, cut_short: bool = False
+    ) -> None:
         super().__init__(candidates)
+        before = " before the deadline ended the search for a path: allow a longer deadline" if cut_short else ""
         self.args = (
-            "No collision-free motion was found. `pair` names the two bodies that collide: move the obstacle among "
-            "them, move the start or the goal, or leave `branch` out.",
+            f"No collision-free motion was found{before}. `pair` names the two bodies that collide: move the obstacle "
+            "among them, move the start or the goal, or leave `branch` out.",
         )
+        self.cut_short = cut_short
         self.pair, self.time, self.start, self.goal = best.pair, best.time, start, goal
         self.depth = max(-best.min_clearance, 0.0)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +12,7 @@ from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.collision.clearance_proof import proven_clearance
 from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.collision.path_planner import plan_paths
+from optimizer.collision.path_planner import MOST_STATES, PlannedPaths, PlanningEnd, plan_paths
 from optimizer.deadline import Deadline
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
@@ -83,25 +84,44 @@ class Surroundings:
         constraints = [*path_constraint_list(self.arm), ClearanceConstraint(self.model, pairs)]
         return PathConstraints(joint_placements(self.arm.robot.model), constraints)
 
-    def planned_paths(self, q_start: Array, q_goal: Array, deadline: Deadline) -> list[Array]:
-        """Collision-free joint paths (k, nq) [rad] from q_start to q_goal (nq,); see `plan_paths`.
+    def planned_paths(
+        self,
+        q_start: Array,
+        q_goal: Array,
+        deadline: Deadline,
+        other_goals: Sequence[Array] = (),
+        most_states: int = MOST_STATES,
+    ) -> PlannedPaths:
+        """Collision-free joint paths from q_start to q_goal or one of the others, (nq,) [rad]; see `plan_paths`.
 
-        They are planned once, before `deadline`; later calls with the same ends return the same paths.
+        Paths found are kept: a later call for the goal that they lead to returns them. A planning without a path is
+        kept only until more states are allowed, and not at all if the deadline ended it.
         """
-        ends = q_start.tobytes() + q_goal.tobytes()
-        if ends not in self._paths:
-            self._paths[ends] = plan_paths(self.arm, q_start, q_goal, deadline, model=self.model)
-        return self._paths[ends]
+        known = self._planned.get(_key(q_start, q_goal))
+        if known is not None and (known.paths or known.checked_states >= most_states):
+            return known
+        goals = np.vstack([q_goal, *other_goals])
+        planned = plan_paths(self.arm, q_start, goals, deadline, model=self.model, most_states=most_states)
+        for goal in {path[-1].tobytes(): path[-1] for path in planned.paths}.values():
+            self._planned[_key(q_start, goal)] = replace(planned, paths=planned.leading_to(goal))
+        if planned.end is PlanningEnd.EXHAUSTED:
+            self._planned.update({_key(q_start, goal): planned for goal in goals})
+        return planned
 
     def has_planned_paths(self, q_start: Array, q_goal: Array) -> bool:
         """Whether paths from q_start to q_goal (nq,) have been planned and found."""
-        return bool(self._paths.get(q_start.tobytes() + q_goal.tobytes()))
+        known = self._planned.get(_key(q_start, q_goal))
+        return known is not None and bool(known.paths)
 
     @cached_property
-    def _paths(self) -> dict[bytes, list[Array]]:
+    def _planned(self) -> dict[bytes, PlannedPaths]:
         return {}
 
     def _sampled_distances(self, spline: Spline, within: float) -> Array:
         """Signed distances (CONTACT_SAMPLES, pairs) [m] at equal steps of a motion, exact up to `within`."""
         q = spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES))
         return self.model.pair_distances(self.model.frames(q), within=within).distance
+
+
+def _key(q_start: Array, q_goal: Array) -> bytes:
+    return q_start.tobytes() + q_goal.tobytes()

@@ -115,7 +115,7 @@ class _Proof:
     def __init__(self, model: CollisionModel, spline: Spline) -> None:
         self.model, self.geometry, self.spline = model, model.geometry, spline
         self.curve = spline.curve
-        self.levers = model.levers() * model.joints_between
+        self.levers = model.levers_between
         self.least = np.inf
         self.closest = (0, 0.0)
 

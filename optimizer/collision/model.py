@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from models.robot import Array, Robot
 from optimizer.collision.bodies import Body, Indices, bodies_of
 from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.kinematics.path_constraints import Mask
 from optimizer.problem.arm import Arm
 
 
@@ -31,8 +32,8 @@ class ClosestPair:
 class PairDistances:
     """Signed distances (n, p) [m] of p pairs at n configurations; k of them are exact.
 
-    `configuration`, `column` (k,) index the exact ones, `nearest` holds their witness points. The others are the
-    distances of the balls that enclose the bodies: lower bounds.
+    `configuration`, `column` (k,) index the exact ones, `nearest` holds their witness points. The others are
+    lower bounds.
     """
 
     distance: Array
@@ -82,15 +83,25 @@ class CollisionModel:
         gradient[exact] = self.gradients(frames, *exact, found.nearest)
         return found.distance, gradient
 
-    def pair_distances(self, frames: Array, pairs: Indices | None = None, within: float = np.inf) -> PairDistances:
+    def pair_distances(
+        self, frames: Array, pairs: Indices | None = None, within: float = np.inf, known: Array | None = None
+    ) -> PairDistances:
         """Signed distances of `pairs` (p,), by default of every pair, at n configurations.
 
-        They are exact for half-spaces, and for pairs whose enclosing balls are at most `within` [m] apart, of patches
-        of a cloud only those that are at most `within` apart themselves.
+        They are exact for half-spaces, and for pairs whose lower bounds are at most `within` [m], of patches of a cloud
+        only those that are at most `within` apart themselves. `known` (n, p) are lower bounds that take the place of
+        the distances of the balls.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
-        distance = self.geometry.ball_distances(frames, pairs)
+        distance = self.geometry.ball_distances(frames, pairs) if known is None else known
         configuration, column = np.nonzero(distance <= within)
+        if np.isfinite(within):
+            # the ball around a shelf encloses half of the cell: a second bound leaves out most of these pairs
+            near = configuration, column
+            bound = self.geometry.bead_distances(frames, configuration, pairs[column])
+            distance[near] = np.maximum(distance[near], bound)
+            chosen = bound <= within
+            configuration, column = configuration[chosen], column[chosen]
         nearest = self.geometry.witness_points(frames, configuration, pairs[column], within)
         if self.geometry.is_cloud.any() and np.isfinite(within):
             # no part of these patches is within the limit, which is then the better lower bound
@@ -98,6 +109,14 @@ class CollisionModel:
             far = configuration[beyond], column[beyond]
             distance[far] = np.maximum(distance[far], within)
             configuration, column, nearest = configuration[~beyond], column[~beyond], nearest[~beyond]
+        distance[configuration, column] = nearest.distance
+        return PairDistances(distance, configuration, column, nearest)
+
+    def chosen_distances(self, frames: Array, pairs: Indices, wanted: Mask) -> PairDistances:
+        """Exact signed distances of those of `pairs` (p,) that are `wanted` (n, p); the others are zero."""
+        configuration, column = np.nonzero(wanted)
+        nearest = self.geometry.witness_points(frames, configuration, pairs[column])
+        distance = np.zeros(wanted.shape)
         distance[configuration, column] = nearest.distance
         return PairDistances(distance, configuration, column, nearest)
 
@@ -134,6 +153,11 @@ class CollisionModel:
         gradient = np.einsum("kji,ki->kj", axes[configuration], moment)
         gradient -= np.einsum("kji,ki->kj", np.cross(axes, origins)[configuration], found.normal)
         return np.asarray(gradient * self.joints_between[pair])
+
+    @cached_property
+    def levers_between(self) -> Array:
+        """Levers (p, nq) [m] of the joints between, else 0: a pair's distance changes by no more per radian."""
+        return np.asarray(self.levers() * self.joints_between)
 
     def levers(self) -> Array:
         """Upper bounds (p, nq) [m], over all configurations, on the distance of a pair's second core from each axis."""

@@ -14,6 +14,7 @@ from enum import IntEnum
 import numpy as np
 
 from models.robot import Array
+from optimizer.collision.beads import Beads
 from optimizer.collision.bodies import Body, Indices
 from optimizer.collision.closed_form_distance import box_segment, segment_segment
 from optimizer.collision.cloud_pairs import CloudPairs
@@ -96,6 +97,7 @@ class PairGeometry:
         self.is_cloud = of_cloud
         self._clouds = CloudPairs(bodies)
         self._convex = ConvexPairs(cores)
+        self._beads = Beads(bodies, pairs)
 
     def ball_distances(self, frames: Array, pairs: Indices) -> Array:
         """Signed distances (n, p) [m] of the balls that enclose the bodies of `pairs` (p,): lower bounds.
@@ -110,6 +112,10 @@ class PairGeometry:
         distance -= self._ball_radii[first] + self._ball_radii[second] + self._growth[pairs]
         distance[:, self._half_space_first[pairs]] = -np.inf
         return np.asarray(distance)
+
+    def bead_distances(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
+        """Lower bounds (k,) [m] on the signed distances of pairs (k,) at configurations (k,); -inf if it has none."""
+        return np.asarray(self._beads.distances(frames, configuration, pair) - self._growth[pair])
 
     def witness_points(
         self, frames: Array, configuration: Indices, pair: Indices, within: float = np.inf, part: Indices | None = None

@@ -1,7 +1,7 @@
-"""Collision-free joint paths between two configurations: initial guesses for the optimiser.
+"""Collision-free joint paths between configurations: initial guesses for the optimiser.
 
-J. J. Kuffner, S. M. LaValle, "RRT-Connect: an efficient approach to single-query path planning", IEEE ICRA 2000, in the
-implementation of OMPL, run several times; OMPL's path simplifier shortens each path.
+Several searches by RRT-Connect (see `path_search`) take turns in short slices, each in a box of its own: which of them
+finds a path, and how fast, differs from task to task.
 """
 
 from __future__ import annotations
@@ -9,32 +9,29 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from enum import Enum
 
 import numpy as np
-from ompl import base as ob
-from ompl import geometric as og
 from ompl import util as ou
 
 from models.robot import Array, Limits
 from optimizer.collision.model import CollisionModel, collision_model
+from optimizer.collision.path_search import Box, PathSearch, joint_weights
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
 from optimizer.trajectories import quintic
 
-# sampling bounds: how far [rad] they extend beyond the range between start and goal, one value per run in turn. Narrow
-# bounds come first, and none lets a path turn a joint by a needless full turn
-BOUND_MARGINS = (0.7, 1.6, 2.8)
-# largest distance [rad], Euclidean over the joints, between the checked states of an edge
-STEP = 0.03
-# clearance [m] of a path beyond the margins: the first that start and goal have, too
-RESERVES = (5e-3, 5e-4)
-# OMPL's range: maximum length [rad] of an edge of the planner's trees
-RANGE = 0.8
-# a run is given up after this many checked states
-MOST_STATES = 20_000
-# runs per path asked for, and shortcuts tried on each path
-RUNS, SHORTCUTS = 3, 40
+# clearance [m] of a path beyond the margins: the first that the start and a goal have, too
+RESERVES = (5e-3, 5e-4, 0.0)
+# distance [rad] between the checked states of an edge, in weighted joints. A region where it was too long to see that a
+# path collides has half of it from then on
+STEP = 0.06
+# checked states of a planning, of all its searches
+MOST_STATES = 200_000
+# checked states for further paths, once one is found
+MORE_STATES = 3_000
 # two paths are the same if no joint differs by this much [rad] at the same fraction of their lengths
 SAME_PATH = 0.5
 # linear interpolation between two paths: samples of each path, steps from one to the other, and penetration [m] that is
@@ -51,40 +48,175 @@ PATIENCE = 0.02
 _OMPL = threading.Lock()
 
 
+@dataclass(frozen=True)
+class Region:
+    """Where a search samples: `margin` [rad] beyond the range between start and goals, within the joint limits.
+
+    It begins after `after` states of all searches, and checks `states` whenever it is its turn. `narrow`: with half of
+    the STEP and a reserve for narrow gaps.
+    """
+
+    margin: float
+    states: int
+    after: int = 0
+    narrow: bool = False
+
+
+# Narrow bounds give short paths, wide ones find a way out of a cage; no margin lets a path turn a joint by a needless
+# full turn. The last searches are for gaps that the reserve or the step closes
+REGIONS = (Region(0.7, 400), Region(2.2, 1_600), Region(2.2, 800, 20_000, narrow=True), Region(3.5, 800, 20_000))
+
+
+Checkers = tuple[StateValidityChecker, StateValidityChecker, StateValidityChecker]
+
+
+class PlanningEnd(Enum):
+    """Why a planning ended: with a path, after its states, at the deadline, or because no end is valid."""
+
+    FOUND = "found"
+    EXHAUSTED = "exhausted"
+    CUT_SHORT = "cut short"
+    INVALID_END = "invalid end"
+
+
+@dataclass(frozen=True)
+class PlannedPaths:
+    """Collision-free joint paths, each (k, nq) [rad], the shortest first; why the planning ended, and its effort."""
+
+    end: PlanningEnd
+    paths: list[Array] = field(default_factory=list)
+    checked_states: int = 0
+
+    def leading_to(self, q_goal: Array) -> list[Array]:
+        """The paths that end at q_goal (nq,) [rad]."""
+        return [path for path in self.paths if (path[-1] == q_goal).all()]
+
+    @property
+    def message(self) -> str:
+        """What is to be said of a planning without a path."""
+        match self.end:
+            case PlanningEnd.FOUND:
+                return "the path planner found a path"
+            case PlanningEnd.EXHAUSTED:
+                return f"the path planner found no path in {self.checked_states} checked configurations"
+            case PlanningEnd.CUT_SHORT:
+                return f"the deadline ended the path planner after {self.checked_states} checked configurations"
+            case PlanningEnd.INVALID_END:
+                return "the path planner has no valid start and goal"
+
+
 def plan_paths(
     arm: Arm,
     q_start: Array,
-    q_goal: Array,
+    q_goals: Array,
     deadline: Deadline,
     most: int = 2,
     seed: int = 1,
     model: CollisionModel | None = None,
-) -> list[Array]:
-    """Up to `most` collision-free joint paths (k, nq) [rad] from q_start to q_goal (nq,), the shortest first.
+    most_states: int = MOST_STATES,
+) -> PlannedPaths:
+    """Up to `most` collision-free joint paths from q_start (nq,) to any of q_goals, (nq,) or (m, nq) [rad].
 
-    A path is piecewise linear, within the joint limits and the tool cone of the arm. It is checked every STEP, which is
-    no proof. The list is empty if start or goal is not valid, or if nothing is found before `deadline`. Unless the
-    deadline passes, `seed` determines the result. `model` is the collision model of the arm, if at hand.
+    A path is piecewise linear, within the joint limits and the tool cone of the arm. It is checked at short steps,
+    which is no proof. The planning ends after about `most_states` checked states, or at `deadline`. Unless the deadline
+    passes, `seed` determines the result. `model` is the collision model of the arm, if at hand.
     """
     model = collision_model(arm) if model is None else model
-    checkers = (StateValidityChecker(arm, model, reserve) for reserve in RESERVES)
-    checker = next((each for each in checkers if each.is_valid(q_start) and each.is_valid(q_goal)), None)
-    if checker is None:
-        return []
-    paths: list[Array] = []
+    found = _checkers(arm, model, q_start, np.atleast_2d(q_goals))
+    if found is None:
+        return PlannedPaths(PlanningEnd.INVALID_END)
     with _seeded(seed, deadline):
-        for run in range(RUNS * most):
-            if len(paths) == most or deadline.passed:
-                break
-            bounds = _bounds(arm.active_limits, q_start, q_goal, BOUND_MARGINS[run % len(BOUND_MARGINS)])
-            path = _plan(checker, bounds, q_start, q_goal, deadline)
-            if path is not None and not any(_is_same(path, other) for other in paths):
+        planning = _Planning(arm, model, q_start, *found, deadline)
+        paths = planning.run(most, most_states)
+    end = PlanningEnd.FOUND if paths else PlanningEnd.CUT_SHORT if deadline.passed else PlanningEnd.EXHAUSTED
+    v_max = arm.active_limits.v_max
+    return PlannedPaths(end, sorted(paths, key=lambda path: length(path, v_max)), planning.checked_states)
+
+
+def _checkers(arm: Arm, model: CollisionModel, q_start: Array, q_goals: Array) -> tuple[Checkers, Array] | None:
+    """The checkers with the first possible reserve, with a smaller one, and with the least; and the goals valid for the
+    first one. None if no reserve leaves the start and a goal."""
+    checkers = [StateValidityChecker(arm, model, reserve) for reserve in RESERVES]
+    for number, checker in enumerate(checkers):
+        valid = np.array([checker.is_valid(q_goal) for q_goal in q_goals])
+        if checker.is_valid(q_start) and valid.any():
+            return (checker, checkers[max(number, len(checkers) - 2)], checkers[-1]), q_goals[valid]
+    return None
+
+
+class _Planning:
+    """The searches of one planning, which take turns."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        model: CollisionModel,
+        q_start: Array,
+        checkers: Checkers,
+        q_goals: Array,
+        deadline: Deadline,
+    ) -> None:
+        self._limits, self._weights = arm.active_limits, joint_weights(arm, model)
+        self._checkers, self._ends, self._deadline = checkers, (q_start, q_goals), deadline
+        self._searches: dict[Region, PathSearch] = {}
+        self._steps = {region: STEP / 2 if region.narrow else STEP for region in REGIONS}
+        self.checked_states = 0
+
+    def run(self, most: int, most_states: int) -> list[Array]:
+        """Up to `most` different paths, in about `most_states` checked states."""
+        paths: list[Array] = []
+        while True:
+            for region in REGIONS:
+                if len(paths) == most or self._deadline.passed or self.checked_states >= most_states:
+                    return paths
+                if self.checked_states < region.after:
+                    continue
+                path = self._slice(region, most_states - self.checked_states)
+                if path is None or any(_is_same(path, other) for other in paths):
+                    continue
                 paths.append(path)
-            straight_line_is_free = bool(paths) and len(paths[0]) == 2
-            all_bounds_failed = not paths and run + 1 == len(BOUND_MARGINS)
-            if straight_line_is_free or all_bounds_failed:
-                break
-    return sorted(paths, key=lambda path: length(path, arm.active_limits.v_max))
+                if len(path) == 2:
+                    # the straight line
+                    return paths
+                if len(paths) == 1:
+                    most_states = min(most_states, self.checked_states + MORE_STATES)
+
+    def _slice(self, region: Region, left: int) -> Array | None:
+        """The path that a region's search finds in its turn, if any; then the region begins a new search.
+
+        `left` states may be checked, but for those that shorten a path.
+        """
+        search = self._searches.get(region)
+        if search is None:
+            search = self._searches[region] = self._search(region)
+        before = search.checked_states
+        path = search.path() if search.advance(min(region.states, left)) else None
+        if search.is_solved and path is None:
+            self._steps[region] /= 2
+        # a search that cannot even begin must not go on for ever
+        self.checked_states += max(search.checked_states - before, 1)
+        if search.is_solved:
+            del self._searches[region]
+        return path
+
+    def _search(self, region: Region) -> PathSearch:
+        """A new search in a region."""
+        q_start, q_goals = self._ends
+        return PathSearch(
+            self._checkers[region.narrow],
+            self._checkers[-1],
+            self._weights,
+            _box(self._limits, np.vstack([q_start, q_goals]), region.margin, self._steps[region]),
+            q_start,
+            q_goals,
+            self._deadline,
+        )
+
+
+def _box(limits: Limits, ends: Array, margin: float, step: float) -> Box:
+    """The range of the ends (k, nq) extended by a margin [rad], within the joint limits."""
+    lower, upper = ends.min(axis=0) - margin, ends.max(axis=0) + margin
+    return Box(np.maximum(lower, limits.q_min), np.minimum(upper, limits.q_max), step)
 
 
 @contextmanager
@@ -137,78 +269,6 @@ def interpolation_is_free(model: CollisionModel, path: Array, other: Array) -> b
     steps = np.linspace(0.0, 1.0, INTERPOLATION_STEPS + 2)[1:-1, None, None]
     q = (1 - steps) * path[chosen] + steps * other[chosen]
     return model.least_distance(q.reshape(-1, path.shape[1]), 0.0) >= -ALLOWED_PENETRATION
-
-
-def _bounds(limits: Limits, q_start: Array, q_goal: Array, margin: float) -> ob.RealVectorBounds:
-    """Sampling bounds: the range between start and goal extended by `margin` [rad], within the joint limits."""
-    lower = np.maximum(np.minimum(q_start, q_goal) - margin, limits.q_min)
-    upper = np.minimum(np.maximum(q_start, q_goal) + margin, limits.q_max)
-    bounds = ob.RealVectorBounds(len(q_start))
-    for joint in range(len(q_start)):
-        bounds.setLow(joint, float(lower[joint]))
-        bounds.setHigh(joint, float(upper[joint]))
-    return bounds
-
-
-class _Effort:
-    """State validity checks of one run of the planner, which ends at MOST_STATES of them or at the deadline.
-
-    It holds no reference to OMPL's objects, which hold one to it: a cycle through them would never be freed.
-    """
-
-    def __init__(self, checker: StateValidityChecker, nq: int, deadline: Deadline) -> None:
-        self._checker, self._deadline = checker, deadline
-        self._joints, self._q = range(nq), np.empty(nq)
-        self._checked_states = 0
-
-    def is_valid(self, state: ob.RealVectorStateType) -> bool:
-        """Whether a state of OMPL is valid."""
-        self._checked_states += 1
-        for joint in self._joints:
-            self._q[joint] = state[joint]
-        return self._checker.is_valid(self._q)
-
-    def is_spent(self) -> bool:
-        """Whether the run must end."""
-        return self._checked_states > MOST_STATES or self._deadline.passed
-
-
-def _plan(
-    checker: StateValidityChecker, bounds: ob.RealVectorBounds, q_start: Array, q_goal: Array, deadline: Deadline
-) -> Array | None:
-    """One run: a shortened collision-free path (k, nq) [rad]; None if none is found."""
-    effort = _Effort(checker, len(q_start), deadline)
-    space = ob.RealVectorStateSpace(len(q_start))
-    space.setBounds(bounds)
-    information = ob.SpaceInformation(space)
-    information.setStateValidityChecker(effort.is_valid)
-    information.setStateValidityCheckingResolution(STEP / space.getMaximumExtent())
-    information.setup()
-    problem = ob.ProblemDefinition(information)
-    problem.setStartAndGoalStates(_state(space, q_start), _state(space, q_goal), 1e-9)
-    planner = og.RRTConnect(information)
-    planner.setRange(RANGE)
-    planner.setProblemDefinition(problem)
-    planner.setup()
-    planner.solve(ob.PlannerTerminationCondition(effort.is_spent))
-    if not problem.hasExactSolution():
-        return None
-    path = problem.getSolutionPath()
-    # limited by counts, not by the clock, so that the same seed gives the same path
-    simplifier = og.PathSimplifier(information)
-    simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
-    simplifier.partialShortcutPath(path, SHORTCUTS, SHORTCUTS)
-    simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
-    points = np.array([[state[joint] for joint in range(len(q_start))] for state in path.getStates()])
-    is_distinct = np.append(True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0)
-    return np.asarray(points[is_distinct])
-
-
-def _state(space: ob.RealVectorStateSpace, q: Array) -> ob.RealVectorStateType:
-    state = space.allocState()
-    for joint, value in enumerate(q.tolist()):
-        state[joint] = value
-    return state
 
 
 def lengths(path: Array, v_max: Array) -> Array:

@@ -43,10 +43,15 @@ class StateValidityChecker:
             growth = [model.bodies[k].core.radius + model.bodies[k].margin - skins[k] for k in pair]
             request.security_margin = sum(growth) + reserve
             request.enable_contact = False
+        # of hundreds of pairs a few are near: a tree of the bodies' bounding boxes leaves out the others. It takes the
+        # security margins as they are when it is made
+        self._manager = pin.BroadPhaseManager_DynamicAABBTreeCollisionManager(
+            self._robot, self._geometry, self._geometry_data
+        )
 
     def is_valid(self, q: Array) -> bool:
         """Whether q (nq,) [rad] is collision-free with its margins, and within the tool cone."""
-        if pin.computeCollisions(self._robot, self._data, self._geometry, self._geometry_data, q, True):
+        if pin.computeCollisions(self._robot, self._data, self._manager, q, True):
             return False
         if len(self._clouds) and self._hits_cloud(q):
             return False

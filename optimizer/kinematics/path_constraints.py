@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from models.robot import Array
 from optimizer.kinematics.forward import joint_placements, link_frames
@@ -18,6 +19,8 @@ from optimizer.kinematics.jacobians import direction_jacobian, point_jacobian, v
 from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
 from optimizer.problem.tool_cone import ToolCone
+
+Mask = npt.NDArray[np.bool_]
 
 # angle [rad] or speed [m/s] below which the gradient is replaced by a finite one: both have a kink at zero
 AT_REST = 1e-9
@@ -43,8 +46,8 @@ class PathConstraint(Protocol):
         """Ratios (n, c) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         ...
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
-        """Ratios and gradients at the same states."""
+    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
+        """Ratios and gradients at the same states. Those that are not `wanted` (n, c) may be left out: zero."""
         ...
 
 
@@ -70,7 +73,7 @@ class ToolConeConstraint:
         """Ratios (n, 1) for frames (n, nq + 1, 4, 4), q [rad] and v [rad/s] (n, nq)."""
         return (self._angle(frames[:, -1, :3, :3] @ self.axis) / self.half_angle)[:, None]
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
+    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
         """Ratios and gradients at the same states; the angle's differential is -d(cos) / sin."""
         pointing = frames[:, -1, :3, :3] @ self.axis
         angle = self._angle(pointing)
@@ -105,7 +108,7 @@ class PointSpeedConstraint:
         velocities = [point_jacobian(frames, self.link, x) @ v[..., None] for x in self._positions(frames)]
         return np.stack([np.linalg.norm(velocity[..., 0], axis=1) for velocity in velocities], axis=1) / self.limit
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
+    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
         """Ratios and gradients at the same states."""
         value, by_q, by_v = [], [], []
         for x in self._positions(frames):
@@ -139,10 +142,16 @@ class PathConstraints:
         frames = link_frames(self.placements, q)
         return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
-    def linearised(self, q: Array, v: Array) -> ConstraintRatios:
-        """Ratios and gradients at q [rad] and v [rad/s] (n, nq)."""
+    def linearised(self, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
+        """Ratios and gradients at q [rad] and v [rad/s] (n, nq); those not `wanted` (n, c) may be zero."""
         frames = link_frames(self.placements, q)
-        parts = [limit.linearised(frames, q, v) for limit in self.limits]
+        if wanted is None:
+            parts = [limit.linearised(frames, q, v) for limit in self.limits]
+        else:
+            columns = np.split(wanted, np.cumsum([len(limit.names) for limit in self.limits])[:-1], axis=1)
+            parts = [limit.linearised(frames, q, v, each) for limit, each in zip(self.limits, columns, strict=True)]
+        if len(parts) == 1:
+            return parts[0]
         return ConstraintRatios(*(np.concatenate(each, axis=1) for each in zip(*parts, strict=True)))
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, PATIENCE, planned_paths, smooth_path
+from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, PATIENCE, plan, smooth_path, to_goal, without_path
 from optimizer.methods.sqp_method import NO_BETTER, with_effort
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.solution import Clearance
@@ -29,8 +29,12 @@ def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -
     if np.isfinite(method.best_known) and _energy_without_obstacles(method) >= method.best_known:
         return SolveResult(SolveStatus.PRUNED, NO_BETTER, collision=collision)
     patience = method.deadline.within(PATIENCE * max(method.deadline.left, 0.0))
-    found: list[SolveResult] = []
-    for path in planned_paths(method.prepared, method.q_start, method.q_goal, method.deadline):
+    planned, found = plan(method), list[SolveResult]()
+    failed = SolveResult(SolveStatus.FAILED, f"on {own}, {collision.message}", collision=collision)
+    paths = to_goal(method, planned)
+    if not paths:
+        return without_path(failed, planned)
+    for path in paths:
         if found and patience.passed:
             break
         found.append(along_path(method, path, law))
@@ -39,9 +43,7 @@ def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -
         return with_effort(min(solved, key=lambda result: _energy(method.prepared, result)), found)
     if method.deadline.passed:
         return with_effort(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED), found)
-    reason = found[0].reason if found else "no collision-free path was planned around it"
-    failed = SolveResult(SolveStatus.FAILED, f"on {own}, {collision.message}; {reason}", collision=collision)
-    return with_effort(failed, found)
+    return with_effort(replace(failed, reason=f"{failed.reason}; {found[0].reason}"), found)
 
 
 def along_path(method: Method, path: Array, law: Law) -> SolveResult:

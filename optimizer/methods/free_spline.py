@@ -10,7 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar
 
+import numpy as np
+
 from models.robot import Array
+from optimizer.collision.path_planner import SAMPLES
 from optimizer.energy.plant import ROUGH_PROGRESS, has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
@@ -20,7 +23,7 @@ from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
 from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
-from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.spline import Spline, spline_of
 
 # control points of the first attempt, with evenly spaced knots
 COARSE = 13
@@ -28,6 +31,9 @@ COARSE = 13
 TIGHT = 1.12
 # multiplicity of knots at the switches of jerk: with 2 the slope of jerk may jump there, with 3 jerk itself
 REFINED, EXACT = 2, 3
+# control points of the attempts from a planned path, and penetration [m] of a spline fitted to it beyond which more are
+# taken
+ALONG_PATH, ALLOWED_CUT = (COARSE, 20, 30), 0.02
 
 
 class FreeSpline(SqpMethod):
@@ -55,11 +61,46 @@ class FreeSpline(SqpMethod):
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
-            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0)))
+            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0, rough=True)))
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
-            tried.append(self.from_planned_paths(bspline.uniform(COARSE), tried[-1]))
+            tried.append(self.from_planned_paths(tried[-1]))
+        return with_effort(tried[-1], tried)
+
+    def from_planned_paths(self, failed: SolveResult) -> SolveResult:
+        """The motion of least energy from planned paths, solved to the end; `failed` if there is none."""
+        best = super().from_planned_paths(failed)
+        if best.spline is None or self.may_refine(best.spline):
+            return best
+        polished = self._polished(best.spline)
+        if polished.spline is None or self._energy(polished.spline) >= self._energy(best.spline):
+            return with_effort(best, [best, polished])
+        reason = f"{polished.reason}{FROM_PLANNED_PATH}"
+        return with_effort(replace(polished, reason=reason), [best, polished])
+
+    def _polished(self, spline: Spline) -> SolveResult:
+        """The end of a rough solve of more control points than `may_refine` takes."""
+        space, t = bspline.uniform(len(spline.control_points)), np.linspace(0.0, 1.0, SAMPLES)
+        points = space.fit(self.coordinates.from_joints(spline.curve(t * spline.duration)), t)
+        return self.improve(Guess(space, points, spline.duration, collision_free=True))
+
+    def along_path(self, q: Array, t: Array) -> SolveResult:
+        """From samples q (k, nq) of a collision-free path at times t (k,), which end at 1.
+
+        A spline of few control points cuts the corners of a winding path: more of them are taken at once if it collides
+        by more than ALLOWED_CUT, and after a solve that fails.
+        """
+        tried: list[SolveResult] = []
+        for count in ALONG_PATH:
+            space = bspline.uniform(count)
+            points = space.fit(self.coordinates.from_joints(q), t)
+            fitted = spline_of(space, self.coordinates.to_joints(points), 1.0).curve(t)
+            if count < ALONG_PATH[-1] and self.prepared.surroundings.model.least_distance(fitted, 0.0) < -ALLOWED_CUT:
+                continue
+            tried.append(self.improve(Guess(space, points, 0.0, collision_free=True, rough=True)))
+            if tried[-1].status is not SolveStatus.FAILED:
+                break
         return with_effort(tried[-1], tried)
 
     @staticmethod

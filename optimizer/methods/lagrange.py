@@ -67,7 +67,12 @@ class Lagrange(SqpMethod):
         space = polynomials(NODES)
         message = failed.collision.message
         reason = f"no polynomial of degree {space.degree} was found around the obstacles: {message}"
-        return self.from_planned_paths(space, replace(failed, reason=reason))
+        return self.from_planned_paths(replace(failed, reason=reason))
+
+    def along_path(self, q: Array, t: Array) -> SolveResult:
+        """From samples q (k, nq) of a collision-free path at times t (k,), which end at 1."""
+        space = polynomials(NODES)
+        return self.improve(Guess(space, space.fit(q, t), 0.0, collision_free=True))
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """From samples q (k, nq) at times t (k,)."""

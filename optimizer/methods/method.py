@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
@@ -25,13 +26,15 @@ class SolveStatus(StrEnum):
 
     SOLVED: there is a motion within the limits. INFEASIBLE: the method has none for this candidate. FAILED: the method
     found none. PRUNED: the motion collides and, even so, needs at least as much energy as the best motion known.
-    OUT_OF_TIME: the deadline passed.
+    POSTPONED: the planner found a path to another
+    candidate's goal first. OUT_OF_TIME: the deadline passed.
     """
 
     SOLVED = "solved"
     INFEASIBLE = "infeasible"
     FAILED = "failed"
     PRUNED = "pruned"
+    POSTPONED = "postponed"
     OUT_OF_TIME = "out of time"
 
 
@@ -40,7 +43,8 @@ class SolveResult:
     """Result of solving one candidate: status, reason for the report, the motion if solved, and the effort.
 
     `iterations` are those of the method: SQP iterations, generations, or energies evaluated. `solves` counts the NLPs.
-    `collision` is the clearance that the best motion found violates, None if it violates none.
+    `collision` is the clearance that the best motion found violates, None if it violates none. `cut_short`: the
+    deadline ended the optimisation of the motion, or the planning of a path.
     """
 
     status: SolveStatus
@@ -50,6 +54,7 @@ class SolveResult:
     spline: Spline | None = None
     stationarity: float | None = None
     collision: Clearance | None = None
+    cut_short: bool = False
 
 
 class Method(ABC):
@@ -69,6 +74,8 @@ class Method(ABC):
     converges: ClassVar[bool] = True
     # energy of the best motion known [J], in the objective: motions that collide and need more are not solved further
     best_known: float = np.inf
+    # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any will do
+    other_goals: Sequence[Array] = ()
 
     def __init__(
         self,

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.path_planner import length, lengths
-from optimizer.deadline import Deadline
+from optimizer.collision.path_planner import MOST_STATES, PlannedPaths, PlanningEnd, length, lengths
+from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline
 
-# fractions of the time left for path planning, and for planning and the solves from planned paths together
-PLANNING, PATIENCE = 0.1, 0.3
+# while no motion is known, a planning may take this fraction of the time left: the rest is for the solves. Once one is
+# known, it may check so many states
+PLANNING, FEW_STATES = 0.75, 5_000
+# fraction of the time left that a method which follows paths gives to the second one
+PATIENCE = 0.3
 # planned paths longer than this multiple of the shortest one are skipped
 DETOUR = 1.3
 # appended to the reason of a motion with a planned path as initial guess, and of one that follows a planned path
@@ -24,15 +29,29 @@ CONTROL_POINTS = (9, 13, 19, 28, 42, 64, 96)
 CONE_POINTS = 401
 
 
-def planned_paths(prepared: PreparedProblem, q_start: Array, q_goal: Array, left: Deadline) -> list[Array]:
-    """Planned joint paths (k, nq) [rad] from q_start to q_goal (nq,), the shortest first, without long detours.
+def plan(method: Method) -> PlannedPaths:
+    """Planned paths of a method's candidate; while no motion is known, also to the goals of other candidates."""
+    left = method.deadline.left
+    return method.prepared.surroundings.planned_paths(
+        method.q_start,
+        method.q_goal,
+        method.deadline.within(PLANNING * left) if np.isfinite(left) else method.deadline,
+        method.other_goals,
+        MOST_STATES if np.isinf(method.best_known) else FEW_STATES,
+    )
 
-    Planning takes at most the fraction PLANNING of the time until the deadline `left`.
-    """
-    v_max = prepared.problem.arm.active_limits.v_max
-    planning = left.within(PLANNING * max(left.left, 0.0))
-    paths = prepared.surroundings.planned_paths(q_start, q_goal, planning)
+
+def to_goal(method: Method, planned: PlannedPaths) -> list[Array]:
+    """The paths (k, nq) [rad] that lead to the method's goal, the shortest first, without long detours."""
+    v_max, paths = method.prepared.problem.arm.active_limits.v_max, planned.leading_to(method.q_goal)
     return [path for path in paths if length(path, v_max) <= DETOUR * length(paths[0], v_max)]
+
+
+def without_path(failed: SolveResult, planned: PlannedPaths) -> SolveResult:
+    """The result where no path leads to the goal: postponed if one leads to another candidate's, else failed."""
+    status = SolveStatus.POSTPONED if planned.paths else SolveStatus.FAILED
+    late = planned.end is PlanningEnd.CUT_SHORT
+    return replace(failed, status=status, reason=f"{failed.reason}; {planned.message}", cut_short=late)
 
 
 def smooth_path(prepared: PreparedProblem, path: Array) -> Spline | None:

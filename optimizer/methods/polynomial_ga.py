@@ -20,7 +20,7 @@ from optimizer.collision.path_planner import along
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH, planned_paths
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH, plan, to_goal, without_path
 from optimizer.trajectories import quintic
 from optimizer.trajectories.polynomial import PolynomialBasis, polynomials
 from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
@@ -81,9 +81,10 @@ class PolynomialGA(Method):
         first = self._evolved()
         if first.collision is None or self.deadline.passed:
             return first
-        paths = planned_paths(self.prepared, self.q_start, self.q_goal, self.deadline)
+        planned = plan(self)
+        paths = to_goal(self, planned)
         if not paths:
-            return first
+            return without_path(first, planned)
         self._planned = self.space.fit(*along(paths[0], 1.0, self.prepared.problem.arm.active_limits.v_max))[1:-1]
         second = self._evolved()
         if second.spline is not None:

@@ -22,7 +22,7 @@ from optimizer.methods.limit_repair import (
     with_repaired_path,
 )
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH, PATIENCE, planned_paths
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH, plan, to_goal, without_path
 from optimizer.nlp.coordinates import Coordinates
 from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.sqp import PROGRESS, Result, SqpStatus, solve
@@ -33,8 +33,13 @@ from optimizer.trajectories.spline import Spline, sample, spline_of, time_scale
 
 # times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 8
+# relative decrease of the cost that a further step must promise in a rough solve
+ROUGH_PROGRESS = 1e-3
 # initial durations tried, in multiples of the shortest one of the guess
 TIME_SCALES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
+# time [s] before the deadline at which an optimisation among obstacles stops, to check its motion
+CHECKING = 0.15
+STOPPED = "the deadline ended its optimisation"
 NO_BETTER = (
     "not solved further: its motion collides, and even so needs at least as much energy as the best motion found"
 )
@@ -45,12 +50,14 @@ class Guess:
     """An initial guess: spline space, all control points (n, r) in the candidate's coordinates, duration [s].
 
     `collision_free`: the NLP has clearance constraints from the start. Other guesses get them after a collision.
+    `rough`: with clearance constraints, the solve ends at ROUGH_PROGRESS, since another one refines its motion.
     """
 
     space: Basis
     points: Array
     duration: float
     collision_free: bool = False
+    rough: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,9 +102,14 @@ class SqpMethod(Method):
         stage = self._first_stage(guess)
         iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):
-            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, deadline, self.progress)
+            # while no motion is known, one that is not yet optimal is better than none
+            needed = len(stage.pairs) > 0 and np.isinf(self.best_known)
+            until = deadline.earlier_by(CHECKING) if needed else deadline
+            progress = max(self.progress, ROUGH_PROGRESS) if guess.rough and len(stage.pairs) else self.progress
+            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, until, progress)
             iterations += result.iterations
-            if result.status is SqpStatus.OUT_OF_TIME:
+            late = result.status is SqpStatus.OUT_OF_TIME
+            if late and not (needed and result.feasible):
                 return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED, iterations, solves)
             if not result.feasible:
                 reason = f"found no motion of {guess.space.n} control points within the limits"
@@ -105,33 +117,41 @@ class SqpMethod(Method):
             check = self._checked(stage.program, result)
             collision = check.collision
             if check.passed:
-                return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, check.spline, result.stationarity)
+                reason = STOPPED if late else CONVERGED
+                return SolveResult(
+                    SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity, cut_short=late
+                )
             if collision is not None and not len(stage.pairs) and self._energy(check.spline) >= self.best_known:
                 return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
             stage = self._repaired(stage, result, check)
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
 
-    def from_planned_paths(self, space: Basis, failed: SolveResult) -> SolveResult:
-        """The motion of `space` of least energy from planned paths as initial guesses; `failed` if there is none.
+    def from_planned_paths(self, failed: SolveResult) -> SolveResult:
+        """The motion of least energy from planned paths as initial guesses; `failed` if there is none.
 
         A path is skipped if linear interpolation between it and a motion already found is almost collision-free: the
         NLP would find the same motion again.
         """
         prepared, v_max = self.prepared, self.prepared.problem.arm.active_limits.v_max
-        patience = self.deadline.within(PATIENCE * max(self.deadline.left, 0.0))
-        found: list[SolveResult] = []
-        for path in planned_paths(prepared, self.q_start, self.q_goal, self.deadline):
-            if patience.passed:
+        planned = plan(self)
+        paths, found = to_goal(self, planned), list[SolveResult]()
+        if not paths:
+            return without_path(failed, planned)
+        for path in paths:
+            if self.deadline.passed:
                 break
             q, t = along(path, 1.0, v_max)
             motions = [sample(a.spline, t * a.spline.duration)[0] for a in found if a.spline is not None]
             if any(interpolation_is_free(prepared.surroundings.model, q, motion) for motion in motions):
                 continue
-            points = space.fit(self.coordinates.from_joints(q), t)
-            result = self.improve(Guess(space, points, 0.0, collision_free=True), deadline=patience)
+            result = self.along_path(q, t)
             found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
         energies = [(self._energy(a.spline), k) for k, a in enumerate(found) if a.spline is not None]
         return with_effort(found[min(energies)[1]] if energies else failed, found)
+
+    def along_path(self, q: Array, t: Array) -> SolveResult:
+        """Solve from samples q (k, nq) [rad] of a collision-free path at times t (k,), which end at 1."""
+        return SolveResult(SolveStatus.FAILED, "the method has no motion along a path")
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
         """Excess (nq,) [rad] of a motion below and above the position limits.
@@ -154,9 +174,7 @@ class SqpMethod(Method):
         pairs: Indices = np.zeros(0, dtype=np.intp)
         path = prepared.path
         if guess.collision_free:
-            pairs = prepared.surroundings.active_pairs(
-                spline_of(guess.space, self.coordinates.to_joints(guess.points), 1.0)
-            )
+            pairs = np.arange(len(prepared.surroundings.model.pairs))
             path = prepared.surroundings.with_clearance(pairs)
         program = NonlinearProgram(
             prepared.kernel,

@@ -95,7 +95,8 @@ class PathConstraintRows:
         nq, v = self.nq, values.v[k]
         y = np.hstack([values.q[k], v])
         stepped = np.concatenate([y[None], y + DIFFERENCE * np.eye(2 * nq)[:, None]]).reshape(-1, 2 * nq)
-        ratios = self.constraints.linearised(stepped[:, :nq], stepped[:, nq:])
+        wanted = np.tile(weights[k] != 0, (2 * nq + 1, 1))
+        ratios = self.constraints.linearised(stepped[:, :nq], stepped[:, nq:], wanted)
         w = np.tile(weights[k], (2 * nq + 1, 1))[..., None]
         slopes = np.hstack([(w * ratios.by_q).sum(axis=1), (w * ratios.by_v).sum(axis=1)]).reshape(-1, len(k), 2 * nq)
         bent = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE

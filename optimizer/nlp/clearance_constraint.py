@@ -10,7 +10,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.collision.model import CollisionModel, PairDistances
-from optimizer.kinematics.path_constraints import ConstraintRatios
+from optimizer.kinematics.path_constraints import ConstraintRatios, Mask
 
 CLEARANCE = "clearance"
 # distance kept beyond the margins [m]: twice the difference that the proof allows between proven and sampled clearance
@@ -18,6 +18,26 @@ RESERVE = 2e-4
 # distance [m] over which a ratio falls from 1 to 0, and the distance above which only a bound of it is computed: the QP
 # leaves out ratios below a half
 SCALE, COUNTED = 0.1, 0.06
+# earlier distances are used as long as they leave open no more than this share of the distances
+FEW = 0.15
+
+
+@dataclass
+class _Reference:
+    """Lower bounds on distances (n, p) [m] at configurations q (n, nq) [rad], from which those nearby are bounded.
+
+    When a joint turns by dq, a distance changes by at most `levers` (p, nq) times |dq|.
+    """
+
+    levers: Array
+    q: Array | None = None
+    distance: Array | None = None
+
+    def bounds(self, q: Array) -> Array | None:
+        """Lower bounds (n, p) [m] at other configurations; None before there is a reference."""
+        if self.q is None or self.distance is None or self.q.shape != q.shape:
+            return None
+        return self.distance - np.abs(q - self.q) @ self.levers.T
 
 
 @dataclass(frozen=True)
@@ -37,18 +57,32 @@ class ClearanceConstraint:
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
         """Ratios (n, k)."""
-        return _ratio(self._pair_distances(frames).distance)
+        return _ratio(self.model.pair_distances(frames, self.pairs, COUNTED).distance)
 
-    def linearised(self, frames: Array, q: Array, v: Array) -> ConstraintRatios:
-        """Ratios with gradients, which are zero for pairs above the distance COUNTED."""
-        found = self._pair_distances(frames)
+    def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
+        """Ratios with gradients, which are zero for pairs above the distance COUNTED, and for those not `wanted`."""
+        found = (
+            self._pair_distances(frames, q)
+            if wanted is None
+            else self.model.chosen_distances(frames, self.pairs, wanted)
+        )
         by_q = np.zeros((*found.distance.shape, q.shape[1]))
         gradients = self.model.gradients(frames, found.configuration, self.pairs[found.column], found.nearest)
         by_q[found.configuration, found.column] = gradients / -SCALE
         return ConstraintRatios(_ratio(found.distance), by_q, np.zeros_like(by_q))
 
-    def _pair_distances(self, frames: Array) -> PairDistances:
-        return self.model.pair_distances(frames, self.pairs, COUNTED)
+    def _pair_distances(self, frames: Array, q: Array) -> PairDistances:
+        """Distances at q (n, nq), of which those bounded away from COUNTED by earlier ones are not computed."""
+        known = self._reference.bounds(q)
+        if known is not None and np.count_nonzero(known <= COUNTED) <= FEW * known.size:
+            return self.model.pair_distances(frames, self.pairs, COUNTED, known)
+        found = self.model.pair_distances(frames, self.pairs, COUNTED)
+        self._reference.q, self._reference.distance = q, found.distance
+        return found
+
+    @cached_property
+    def _reference(self) -> _Reference:
+        return _Reference(self.model.levers_between[self.pairs])
 
 
 def _ratio(distance: Array) -> Array:

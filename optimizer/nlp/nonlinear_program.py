@@ -21,6 +21,7 @@ from models.robot import Array, Limits
 from optimizer.energy.kernel import Kernel
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.active_path_constraints import Index, PathConstraintRows
+from optimizer.nlp.clearance_constraint import CLEARANCE
 from optimizer.nlp.coordinates import Coordinates, GoalConstraints
 from optimizer.trajectories.bspline import Basis
 
@@ -83,6 +84,11 @@ class NonlinearProgram:
     @cached_property
     def _full_space(self) -> bool:
         return self.r == self.kernel.nq
+
+    @cached_property
+    def has_clearance(self) -> bool:
+        """Whether some of the path constraints are clearances."""
+        return self.path is not None and CLEARANCE in self.path.names
 
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""

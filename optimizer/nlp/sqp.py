@@ -22,12 +22,16 @@ from optimizer.nlp.working_set_qp import QPInputs, QPStep, WorkingSetQP
 PROGRESS = 5e-5
 MAX_ITERATIONS = 60
 BACKTRACKS = 14
+# steps of a relaxed QP after which a solve with clearance constraints is given up: the way out of an obstacle is short
+MOST_RELAXED = 4
 # part of the decrease promised by the gradient that a step of the line search must reach (Armijo), and its rounding
 ARMIJO, ROUNDING = 1e-4, 1e-12
 # smallest eigenvalue that the QP's Hessian may have, relative to the largest or to 1, the scale of the cost
 EIGENVALUE_FLOOR = 1e-7
 # the penalty of a violation before any multiplier is known, and its least multiple of the multipliers
 FIRST_PENALTY, PENALTY_FACTOR = 0.1, 2.0
+# the first penalty of path constraints among which are clearances
+CLEARANCE_PENALTY = 3.0
 
 
 class SqpStatus(Enum):
@@ -129,10 +133,13 @@ class _Solver:
         self.at = self._point(free, T, kinematics, self.line.tau)
         path = np.zeros_like(self.at.path_values.ratios.value)
         self.multipliers = _Multipliers(multiplier, path, len(self.at.violation))
+        if program.has_clearance:
+            # what is gained behind an obstacle must not pay for the way through it
+            self.multipliers.penalty[-path.shape[1] :] = CLEARANCE_PENALTY
 
     def solve(self) -> Result:
         """Iterate until no step promises a further decrease, no step is found, or the deadline passes."""
-        status, stationarity, iterations = SqpStatus.STALLED, np.inf, 0
+        status, stationarity, iterations, relaxed = SqpStatus.STALLED, np.inf, 0, 0
         for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
             if self.deadline.passed:
                 status = SqpStatus.OUT_OF_TIME
@@ -142,6 +149,11 @@ class _Solver:
             if step is None:
                 status = SqpStatus.INFEASIBLE
                 break
+            if step.relaxed:
+                relaxed += 1
+                if relaxed > MOST_RELAXED and self.p.has_clearance:
+                    status = SqpStatus.INFEASIBLE
+                    break
             self.multipliers.update(step, self.p, self.at.T, self.cost_scale)
             Hdx, slope = qp.hessian @ step.x, float(qp.gradient @ step.x)
             stationarity = float(np.abs(Hdx).max())

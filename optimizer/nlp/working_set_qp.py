@@ -30,6 +30,8 @@ NEAR_PATH = 0.5
 STEP = 1.5
 # times that the QP is solved again with the constraints that its step would break
 QP_ROUNDS = 10
+# the same for a relaxed QP with clearance constraints: it has many rows, and none of them was active before
+RELAXED_ROUNDS = 2
 # least time [s] that a QP gets: most take a millisecond
 LEAST_TIME = 0.05
 
@@ -195,7 +197,8 @@ class WorkingSetQP:
         rows, bounds = self._rows(at, goal, torque, path), np.array(self._bounds(at.free, at.T))
         rows.add_bounds(bounds, self._bounded)
         gradient, relaxed = at.gradient @ at.whitening, False
-        for attempt in range(QP_ROUNDS):
+        last = QP_ROUNDS
+        for attempt in range(1, QP_ROUNDS + 1):
             checkpoint()
             y, multipliers, found = rows.solve(gradient, relaxed)
             if not found:
@@ -205,10 +208,12 @@ class WorkingSetQP:
             if not found:
                 # a relaxed QP without bounds may have a step of any length
                 relaxed = True
+                if self.p.has_clearance:
+                    last = min(attempt + RELAXED_ROUNDS, QP_ROUNDS)
                 rows.add_bounds(bounds, np.ones_like(rows.bounded))
                 continue
             x = at.whitening @ y
-            if attempt == QP_ROUNDS - 1 or not self._add_broken(rows, at, bounds, x):
+            if attempt == last or not self._add_broken(rows, at, bounds, x):
                 break
         mu = np.maximum(multipliers, 0.0)
         kinds = np.cumsum([len(goal.least), len(path.slack), len(torque.slack)])

@@ -17,6 +17,9 @@ from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.solution import CandidateStatus
 
+# goals of other candidates that a path may lead to as long as no motion is known
+MOST_OTHER_GOALS = 7
+
 
 def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
     """The solver of the problem's method for a candidate, in one interval of durations."""
@@ -44,13 +47,26 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
         solver = solver_of(incumbent, candidate, interval)
         if best is not None and best.energy is not None:
             solver.best_known = best.energy
+        elif candidate.attempt is None:
+            solver.other_goals = _other_goals(incumbent, candidate)
         results.append(in_time(incumbent, solver.solve))
     solved = [result for result in results if result.spline is not None]
     if len(solved) > 1:
         solved.sort(key=lambda result: _objective(incumbent, result))
     late = [result for result in results if result.status is SolveStatus.OUT_OF_TIME]
-    incumbent.cut_short |= bool(late)
-    return (solved + late + results)[0]
+    postponed = [result for result in results if result.status is SolveStatus.POSTPONED]
+    incumbent.cut_short |= bool(late) or any(result.cut_short for result in solved)
+    return (solved + late + postponed + results)[0]
+
+
+def _other_goals(incumbent: Incumbent, candidate: Candidate) -> list[Array]:
+    """Goals (nq,) [rad] of open candidates from the same start, of each branch the nearest, MOST_OTHER_GOALS of all."""
+    nearest: dict[int, Candidate] = {}
+    for other in sorted(incumbent.candidates, key=lambda each: (each.shortest, each.lower_bound)):
+        is_open = other.status is CandidateStatus.UNVISITED and other.holdable and not other.deferred
+        if is_open and other.goal is not candidate.goal and (other.q_start == candidate.q_start).all():
+            nearest.setdefault(id(other.goal), other)
+    return [other.q_goal for other in list(nearest.values())[:MOST_OTHER_GOALS]]
 
 
 def _objective(incumbent: Incumbent, result: SolveResult) -> float:

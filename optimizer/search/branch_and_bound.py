@@ -20,10 +20,13 @@ def explore(
 ) -> Candidate | None:
     """Solve candidates in order of lower bound until none is below the incumbent; returns it, None if there is none.
 
-    After `most_solved` solved candidates the others are not solved.
+    After `most_solved` solved candidates the others are not solved. A candidate that is postponed comes again after the
+    one whose path was found instead.
     """
     best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
-    for candidate in sorted(candidates, key=lambda e: (e.lower_bound, e.shortest)):
+    queue = sorted(candidates, key=lambda e: (e.lower_bound, e.shortest))
+    while queue:
+        candidate = queue.pop(0)
         if candidate.status is not CandidateStatus.UNVISITED or candidate.deferred:
             continue
         if best is not None and best.energy is not None and candidate.lower_bound >= best.energy:
@@ -38,6 +41,10 @@ def explore(
         candidate.attempt = result = attempt(candidate)
         if result.status is SolveStatus.OUT_OF_TIME:
             break
+        if result.status is SolveStatus.POSTPONED:
+            queue.insert(0, candidate)
+            queue.sort(key=lambda e: not prepared.surroundings.has_planned_paths(e.q_start, e.q_goal))
+            continue
         candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
         if result.spline is not None:
             candidate.energy = prepared.objective_of(prepared.energy(result.spline))

@@ -12,6 +12,9 @@ from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import activate_deferred
 from optimizer.trajectories.spline import Spline, sampled
 
+# motions that obstacles stop are not too slow if so many times the shortest duration is allowed
+AMPLE = 20.0
+
 
 def find_fastest(incumbent: Incumbent) -> None:
     """Called when no candidate has a motion within `duration_max`: optimise from the fastest motion if it is in time.
@@ -19,11 +22,11 @@ def find_fastest(incumbent: Incumbent) -> None:
     Raises DurationTooShort if even the fastest motion found takes longer.
     """
     longest = incumbent.problem.duration_max
-    if longest is None:
+    if longest is None or (_are_stopped_by_obstacles(incumbent) and longest > AMPLE * _least_duration(incumbent)):
         return
     found = fastest(incumbent)
     if found is None:
-        least = min(candidate.shortest for candidate in incumbent.candidates)
+        least = _least_duration(incumbent)
         if least > longest:
             raise DurationTooShort(least)
         return
@@ -31,6 +34,17 @@ def find_fastest(incumbent: Incumbent) -> None:
     if spline.duration > longest:
         raise DurationTooShort(spline.duration)
     solve_from(incumbent, candidate, sampled(spline), fine=True)
+
+
+def _least_duration(incumbent: Incumbent) -> float:
+    """The least lower bound on the duration [s] of any candidate."""
+    return min(candidate.shortest for candidate in incumbent.candidates)
+
+
+def _are_stopped_by_obstacles(incumbent: Incumbent) -> bool:
+    """Whether all candidates that failed did so because of a collision."""
+    failed = [each.attempt for each in incumbent.candidates if each.attempt is not None]
+    return bool(failed) and all(result.collision is not None for result in failed)
 
 
 def fastest(incumbent: Incumbent) -> tuple[Candidate, Spline] | None:

@@ -112,7 +112,8 @@ class Run:
         if not hits:
             return NoTrajectory(reports)
         candidate, hit = max(hits, key=lambda each: each[1].min_clearance)
-        return NoCollisionFreeTrajectory(reports, hit, candidate.start.label, candidate.goal.label)
+        cut_short = any(each.attempt is not None and each.attempt.cut_short for each in candidates)
+        return NoCollisionFreeTrajectory(reports, hit, candidate.start.label, candidate.goal.label, cut_short)
 
     def explore(self) -> None:
         """Solve candidates until no lower bound is below the incumbent; deferred ones too while nothing is solved."""

@@ -9,6 +9,7 @@ import pytest
 
 from models.robot import Array
 from optimizer.collision.clearance_proof import GAP, proven_clearance
+from optimizer.collision.path_planner import PlanningEnd
 from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
 from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
@@ -86,13 +87,42 @@ def test_active_pairs_are_those_that_come_near() -> None:
     assert len(constraints.names) == len(active)
 
 
+def behind_a_wall() -> Surroundings:
+    """A wall across MOTION."""
+    wall = Obstacle("wall", Box(np.array([0.4, 0.02, 1.0])), at([-0.6, 0.0, 0.3]))
+    return Surroundings(Arm(robot=ROBOT, scene=Scene([wall])))
+
+
 def test_paths_are_planned_once() -> None:
-    wall = Obstacle("wall", Box(np.array([0.4, 0.02, 1.0])), at([0.6, 0.0, 0.3]))
-    surroundings = Surroundings(Arm(robot=ROBOT, scene=Scene([wall])))
+    surroundings = behind_a_wall()
     assert not surroundings.has_planned_paths(START, GOAL)
-    paths = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
-    assert paths and surroundings.has_planned_paths(START, GOAL)
+    planned = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
+    assert planned.paths and surroundings.has_planned_paths(START, GOAL)
     assert not surroundings.has_planned_paths(GOAL, START)
     # a deadline that has passed leaves no time to plan
-    assert surroundings.planned_paths(START, GOAL, Deadline.after(-1.0)) is paths
-    assert surroundings.planned_paths(GOAL, START, Deadline.after(-1.0)) == []
+    again = surroundings.planned_paths(START, GOAL, Deadline.after(-1.0))
+    assert [path.tolist() for path in again.paths] == [path.tolist() for path in planned.paths]
+
+
+def test_a_planning_that_the_deadline_ended_is_not_kept() -> None:
+    surroundings = behind_a_wall()
+    assert surroundings.planned_paths(START, GOAL, Deadline.after(-1.0)).end is PlanningEnd.CUT_SHORT
+    assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE)).paths
+
+
+def test_a_planning_that_ran_out_of_states_is_kept_until_more_are_allowed() -> None:
+    surroundings, few = behind_a_wall(), 1
+    first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), most_states=few)
+    assert first.end is PlanningEnd.EXHAUSTED and not first.paths
+    assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), most_states=few) is first
+    assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE)).paths
+
+
+def test_a_path_to_another_goal_is_kept_for_that_goal() -> None:
+    """The first goal is within the wall."""
+    surroundings = behind_a_wall()
+    within = next(q for q in np.linspace(START, GOAL, 50) if not surroundings.is_collision_free(q[None]))
+    planned = surroundings.planned_paths(START, within, Deadline.after(AMPLE), [GOAL])
+    assert planned.paths and not planned.leading_to(within)
+    assert all((path[-1] == GOAL).all() for path in planned.paths)
+    assert surroundings.has_planned_paths(START, GOAL) and not surroundings.has_planned_paths(START, within)

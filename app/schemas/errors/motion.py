@@ -196,6 +196,9 @@ class NoCollisionFreeTrajectory(_SearchError):
     time: float = described("Time of the collision, from the start of this attempt.", "s", 0.62)
     start: str = described("Branch at the start of this attempt.", None, LABEL)
     goal: str = described("Branch at the goal of this attempt.", None, LABEL)
+    cut_short: bool = described(
+        "Whether the deadline ended the search for a collision-free path. If so, allow a longer deadline.", None, False
+    )
 
 
 class DeadlineExceeded(_SearchError):

@@ -12,13 +12,22 @@ from scipy.spatial.transform import Rotation
 from models.robot import Array
 from optimizer import optimize
 from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import BOUND_MARGINS, STEP, along, interpolation_is_free, plan_paths
+from optimizer.collision.path_planner import (
+    REGIONS,
+    STEP,
+    PlannedPaths,
+    PlanningEnd,
+    along,
+    interpolation_is_free,
+    plan_paths,
+)
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.deadline import Deadline
-from optimizer.exceptions import NoTrajectory
+from optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
+from optimizer.methods import planned_paths
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
@@ -26,16 +35,16 @@ from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, caps
 from optimizer.problem.tool_cone import ToolCone
 from optimizer.trajectories.spline import sample
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
-from tests.optimizer.clocks import LAST_READINGS, CountingClock
+from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import ROBOT, problem_with
 
 # s: ample, so that a seed and not the machine's load decides what is found
 AMPLE = 60.0
+# rad: no path leaves the range between start and goal by more
+WIDEST = max(region.margin for region in REGIONS)
 DENSE = 0.003  # rad between the configurations at which a path is checked
 DOWN = Rotation.from_euler("x", np.pi).as_matrix()
 REPLAY = 1e-4  # s
-# tasks that the optimiser solves only from a planned path
-STUCK = ("post", "trap")
 FORWARD = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
@@ -72,11 +81,27 @@ TRAP = walls(
     left=((0.30, 0.02, 0.5), (0.60, 0.2, 0.25)),
     right=((0.30, 0.02, 0.5), (0.60, -0.2, 0.25)),
 )
+
+
+def cage() -> Scene:
+    """Twelve bars along the edges of a cube of 0.4 m: the arm reaches in from the other side of itself."""
+    size, thick, middle = 0.4, 0.04, np.array([0.55, 0.0, 0.45])
+    bars = {}
+    for axis in range(3):
+        for k, (first, second) in enumerate(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+            edges, offset = np.full(3, thick), np.zeros(3)
+            edges[axis] = size
+            offset[[other for other in range(3) if other != axis]] = first, second
+            bars[f"bar {axis} {k}"] = (tuple(edges), tuple(middle + size / 2 * offset))
+    return walls(**bars)
+
+
 TASKS = {
     "post": (POST, at(0.5, -0.3, 0.15, DOWN), at(0.5, 0.3, 0.15, DOWN)),
     "shelf": (SHELF, at(0.45, -0.3, 0.12, DOWN), at(0.68, 0.0, 0.42, FORWARD)),
     "bin": (BIN, at(0.55, -0.3, 0.1, DOWN), at(0.575, 0.3, 0.12, DOWN)),
     "trap": (TRAP, at(0.6, 0.0, 0.2, DOWN), at(0.55, 0.4, 0.2, DOWN)),
+    "cage": (cage(), at(-0.5, 0.2, 0.3, DOWN), at(0.6, 0.0, 0.45, FORWARD)),
 }
 
 
@@ -133,14 +158,14 @@ def test_planned_paths_are_collision_free(name: str) -> None:
     limits = arm.active_limits
     # the straight line collides
     assert least(arm, between(np.stack([q_start, q_goal]))) < 0
-    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
+    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     assert paths
     for path in paths:
         np.testing.assert_array_equal(path[0], q_start)
         np.testing.assert_array_equal(path[-1], q_goal)
         assert (path >= limits.q_min).all() and (path <= limits.q_max).all()
-        assert (path >= np.minimum(q_start, q_goal) - BOUND_MARGINS[-1]).all()
-        assert (path <= np.maximum(q_start, q_goal) + BOUND_MARGINS[-1]).all()
+        assert (path >= np.minimum(q_start, q_goal) - WIDEST).all()
+        assert (path <= np.maximum(q_start, q_goal) + WIDEST).all()
         assert least(arm, between(path)) > 0
     lengths = [np.linalg.norm(np.diff(path, axis=0) / limits.v_max, axis=1).sum() for path in paths]
     assert lengths == sorted(lengths)
@@ -148,14 +173,14 @@ def test_planned_paths_are_collision_free(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_paths() -> None:
     arm, q_start, q_goal = task("post")
-    first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2, s) for s in (3, 3, 4))
+    first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2, s).paths for s in (3, 3, 4))
     assert [path.tolist() for path in first] == [path.tolist() for path in again]
     assert [path.tolist() for path in first] != [path.tolist() for path in other]
 
 
 def test_two_paths_are_distinct() -> None:
     arm, q_start, q_goal = task("post")
-    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2)
+    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2).paths
     assert len(paths) == 2
     v_max = arm.active_limits.v_max
     assert np.abs(along(paths[0], 1.0, v_max)[0] - along(paths[1], 1.0, v_max)[0]).max() > 0.3
@@ -163,7 +188,7 @@ def test_two_paths_are_distinct() -> None:
 
 def test_a_free_straight_line_is_the_only_path() -> None:
     _, q_start, q_goal = task("post")
-    (path,) = plan_paths(Arm(robot=ROBOT), q_start, q_goal, Deadline.after(AMPLE))
+    (path,) = plan_paths(Arm(robot=ROBOT), q_start, q_goal, Deadline.after(AMPLE)).paths
     np.testing.assert_array_equal(path, np.stack([q_start, q_goal]))
 
 
@@ -171,28 +196,35 @@ def test_no_path_to_a_goal_in_collision() -> None:
     arm, q_start, q_goal = task("post")
     through = Scene([*arm.scene.obstacles, Obstacle("plate", Box(np.array([0.2, 0.2, 0.02])), at(0.5, 0.3, 0.2))])
     blocked = Arm(robot=ROBOT, scene=through, tool=arm.tool, T_flange_tcp=arm.T_flange_tcp)
-    assert plan_paths(blocked, q_start, q_goal, Deadline.after(AMPLE)) == []
+    assert plan_paths(blocked, q_start, q_goal, Deadline.after(AMPLE)) == PlannedPaths(PlanningEnd.INVALID_END)
 
 
 def walled_in() -> tuple[Arm, Array, Array]:
-    """The task of the post with walls across all that the arm reaches, but for where it stands."""
+    """The task of the post with walls across all that the arm reaches, but for where it stands.
+
+    Within the tight limits it cannot fold back so far that it passes there.
+    """
     arm, q_start, q_goal = task("post")
     wall = Obstacle("wall", Box(np.array([3.0, 0.02, 3.0])), at(1.77, 0.0, 1.0))
     behind = Obstacle("behind", Box(np.array([3.0, 0.02, 3.0])), at(-1.58, 0.0, 1.0))
     over = Obstacle("over", Box(np.array([0.6, 0.02, 2.0])), at(0.0, 0.0, 1.7))
-    return replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over])), q_start, q_goal
+    limits, margin = arm.active_limits, 0.3
+    tight = replace(limits, q_min=np.minimum(q_start, q_goal) - margin, q_max=np.maximum(q_start, q_goal) + margin)
+    closed = replace(arm, scene=Scene([*arm.scene.obstacles, wall, behind, over]), limits=tight)
+    return closed, q_start, q_goal
 
 
 def test_no_path_to_a_walled_in_goal_and_an_answer_by_the_deadline() -> None:
     closed, q_start, q_goal = walled_in()
     assert least(closed, q_start[None]) > 0 and least(closed, q_goal[None]) > 0
     clock, readings = CountingClock(), 30
-    assert plan_paths(closed, q_start, q_goal, Deadline.after(readings, clock)) == []
+    found = plan_paths(closed, q_start, q_goal, Deadline.after(readings, clock))
+    assert found.end is PlanningEnd.CUT_SHORT and not found.paths
     assert readings < clock.now < readings + LAST_READINGS
 
 
 def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
-    given = {"scene": arm.scene, "tool": arm.tool, "T_flange_tcp": arm.T_flange_tcp}
+    given = {"scene": arm.scene, "tool": arm.tool, "T_flange_tcp": arm.T_flange_tcp, "limits": arm.limits}
     return problem_with(q_start, q_goal, windings=False, **given)  # type: ignore[arg-type]
 
 
@@ -202,7 +234,37 @@ def test_motions_avoid_the_obstacles(name: str) -> None:
     found = optimize(problem(arm, q_start, q_goal))
     q = sample(found.trajectory.spline, np.arange(0.0, found.duration, REPLAY))[0]
     assert least(arm, q) >= 0
-    assert (found.candidates[0].reason == f"converged{FROM_PLANNED_PATH}") == (name in STUCK)
+
+
+def test_a_motion_into_a_cage_starts_from_a_planned_path() -> None:
+    """The optimiser alone finds no way between the bars."""
+    found = optimize(problem(*task("cage")))
+    assert found.candidates[0].reason == f"converged{FROM_PLANNED_PATH}"
+
+
+def test_a_request_among_obstacles_has_the_same_answer_whatever_time_it_takes() -> None:
+    """The clock stands still, or ticks at each reading as on a busy machine: the deadline is far either way."""
+    asked = problem(*task("cage"))
+    calm, busy = optimize(asked, clock=still), optimize(asked, clock=CountingClock(tick=1e-4))
+    np.testing.assert_array_equal(calm.trajectory.spline.control_points, busy.trajectory.spline.control_points)
+
+
+def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = problem(*walled_in())
+    monkeypatch.setattr(planned_paths, "MOST_STATES", 2_000)
+    with pytest.raises(NoTrajectory) as exhausted:
+        optimize(asked, clock=still)
+    (candidate,) = exhausted.value.candidates
+    assert candidate.status == "failed" and "found no path in" in candidate.reason
+    assert isinstance(exhausted.value, NoCollisionFreeTrajectory) and not exhausted.value.cut_short
+    monkeypatch.undo()
+    # some thousand readings, too few for all states
+    with pytest.raises(NoTrajectory) as cut_short:
+        optimize(replace(asked, deadline=10.0), clock=CountingClock(tick=2e-3))
+    (candidate,) = cut_short.value.candidates
+    assert candidate.status == "failed" and "the deadline ended the path planner" in candidate.reason
+    assert isinstance(cut_short.value, NoCollisionFreeTrajectory) and cut_short.value.cut_short
+    assert "allow a longer deadline" in str(cut_short.value)
 
 
 def test_a_failed_candidate_names_the_colliding_bodies() -> None:
@@ -216,7 +278,7 @@ def test_a_failed_candidate_names_the_colliding_bodies() -> None:
 def test_interpolation_between_paths_on_two_sides_of_an_obstacle_collides() -> None:
     arm, q_start, q_goal = task("post")
     model, ones = CollisionModel(arm), np.ones(6)
-    (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE))
+    (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     around = along(path, 1.0, ones)[0]
     through = along(np.stack([q_start, q_goal]), 1.0, ones)[0]
     assert interpolation_is_free(model, around, around)
@@ -232,7 +294,7 @@ def test_limits_tightened_are_kept() -> None:
         q_min=np.maximum(limits.q_min, np.minimum(q_start, q_goal) - margin),
         q_max=np.minimum(limits.q_max, np.maximum(q_start, q_goal) + margin),
     )
-    for path in plan_paths(replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)):
+    for path in plan_paths(replace(arm, limits=tight), q_start, q_goal, Deadline.after(AMPLE)).paths:
         assert (path >= tight.q_min).all() and (path <= tight.q_max).all()
 
 
@@ -245,7 +307,7 @@ def test_planned_paths_keep_the_tool_within_its_cone() -> None:
     def widest(paths: list[Array]) -> float:
         return max(float(tilt.ratios(q := between(path), np.zeros_like(q)).max()) for path in paths)
 
-    free, within = (plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)) for a in (arm, held))
+    free, within = (plan_paths(a, q_start, q_goal, Deadline.after(AMPLE)).paths for a in (arm, held))
     assert within
     assert widest(within) <= 1 + STEP / cone.half_angle
     assert widest(free) > 1.2

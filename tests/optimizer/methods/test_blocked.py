@@ -14,7 +14,7 @@ from optimizer.methods import METHODS, solver_for
 from optimizer.methods.duration_intervals import duration_intervals
 from optimizer.methods.method import SolveStatus
 from optimizer.methods.path_retiming import PathRetiming, RetimingProgram
-from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH, planned_paths, smooth_path
+from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH, plan, smooth_path, to_goal
 from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import MethodName, Problem
@@ -59,6 +59,12 @@ def _compiled() -> None:
     compile_kernel(ROBOT)
 
 
+def planned_path(prepared: PreparedProblem) -> Array:
+    """The shortest planned path (k, nq) [rad] from START to GOAL."""
+    method = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE))
+    return to_goal(method, plan(method))[0]
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_the_error_names_the_colliding_pair(method: MethodName) -> None:
     problem = blocked(method, WALL)
@@ -87,7 +93,7 @@ def test_a_followed_path_is_the_smooth_one(method: MethodName) -> None:
     prepared = PreparedProblem.of(blocked(method, POST))
     result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
     assert result.spline is not None
-    smooth = smooth_path(prepared, planned_paths(prepared, START, GOAL, Deadline.after(DEADLINE))[0])
+    smooth = smooth_path(prepared, planned_path(prepared))
     assert smooth is not None and prepared.surroundings.worst_violation(smooth) is None
     nearby = KDTree(smooth.curve(np.linspace(0.0, 1.0, 20_001)))
     assert nearby.query(result.spline.curve(np.linspace(0.0, result.spline.duration, 400)))[0].max() < FIT
@@ -97,7 +103,7 @@ def test_time_scaling_along_a_path_needs_no_more_energy_than_the_quintic_law() -
     """The exact energy, against the quintic law along the same path in any duration within its limits."""
     prepared = PreparedProblem.of(blocked("time_scaling", POST))
     result = solver_for(prepared, START, GOAL, Deadline.after(DEADLINE)).solve()
-    smooth = smooth_path(prepared, planned_paths(prepared, START, GOAL, Deadline.after(DEADLINE))[0])
+    smooth = smooth_path(prepared, planned_path(prepared))
     assert result.spline is not None and smooth is not None
     space = bspline.uniform(60)
     tau = np.linspace(0.0, 1.0, 400)
@@ -114,7 +120,7 @@ def test_gradients_of_the_retiming() -> None:
     prepared = PreparedProblem.of(
         problem_with(START, GOAL, scene=Scene((POST,)), method="time_scaling", tool_cone=cone, tcp_speed=1.0)
     )
-    smooth = smooth_path(prepared, planned_paths(prepared, START, GOAL, Deadline.after(DEADLINE))[0])
+    smooth = smooth_path(prepared, planned_path(prepared))
     assert smooth is not None
     retiming = PathRetiming(prepared, smooth, duration_intervals(prepared, GOAL)[0])
     limits = prepared.problem.arm.active_limits

@@ -1,0 +1,221 @@
+"""Planning problems of others, from a file: how many are answered, how fast, with how much energy.
+
+    python -m benchmarks.foreign FILE
+    python -m benchmarks.foreign FILE --count 10 --seed 1 --families cage box --kinds joint
+
+FILE is JSON in the format of docs/foreign_scenes.md, which says where such sets come from. Every problem is asked with
+its goal as joint positions and as a pose, as a worker runs it: from the validated request, with a deadline. Pinocchio
+and Coal replay every answer at a period of 1 ms. The exit code is 1 if an answer collides.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import orjson
+
+from app.convert.request import to_problem
+from app.http.problem_details import problem_content
+from app.schemas.request import OptimizeRequest
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread
+from optimizer import optimize
+from optimizer.collision.model import CollisionModel
+from optimizer.collision.state_validity import StateValidityChecker
+from optimizer.exceptions import JoulepathError
+from optimizer.optimize import warm_up
+from optimizer.problem.arm import Arm
+from optimizer.trajectories.spline import Spline, sample
+
+Kind = Literal["joint", "pose"]
+KINDS: tuple[Kind, ...] = ("joint", "pose")
+# deadline of a request, and period of the replay [s]
+DEADLINE, REPLAY = 10.0, 1e-3
+# the robot of all problems
+ROBOT = "ur5e"
+# a gripper modelled for another arm reaches into the capsules of the links next to it
+TOUCHED = ["wrist_2", "wrist_3"]
+
+
+@dataclass(frozen=True)
+class ForeignProblem:
+    """One problem of a file: its name, its family, and the bodies of its requests by the kind of goal."""
+
+    name: str
+    family: str
+    requests: dict[Kind, dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One request: times [s] by the wall and of the processor, energy [J] of the answer or the type of the problem."""
+
+    name: str
+    family: str
+    kind: Kind
+    wall: float
+    cpu: float
+    energy: float | None = None
+    duration: float | None = None
+    problem: str | None = None
+    detail: str = ""
+    reason: str = ""
+    collisions: int = 0
+
+
+def problems_of(path: Path) -> list[ForeignProblem]:
+    """The problems of a file, in its order."""
+    given = orjson.loads(path.read_bytes())
+    capsules = [{"touches": TOUCHED, **capsule} for capsule in given["tool"]["capsules"]]
+    shared = {"robot": ROBOT, "tool": {"capsules": capsules}, "tcp": given["tcp"]}
+    return [
+        ForeignProblem(
+            each["name"],
+            each["family"],
+            {
+                kind: {
+                    **shared,
+                    "start": {"q": each["start"]},
+                    "goal": {"q": each["goal"]} if kind == "joint" else {"pose": each["goal_pose"]},
+                    "scene": {"obstacles": [_renamed(obstacle) for obstacle in each["obstacles"]]},
+                }
+                for kind in KINDS
+            },
+        )
+        for each in given["problems"]
+    ]
+
+
+def _renamed(obstacle: dict[str, Any]) -> dict[str, Any]:
+    """The obstacle with a name that no body of the arm has; without a margin unless the file gives one."""
+    return {"margin": 0.0} | obstacle | {"name": f"scene {obstacle['name']}"}
+
+
+def chosen(problems: Iterable[ForeignProblem], families: Sequence[str], count: int, seed: int) -> list[ForeignProblem]:
+    """`count` problems of each family, drawn by `seed`; all of them if `count` is 0 or more than there are."""
+    found: list[ForeignProblem] = []
+    problems = list(problems)
+    for family in families:
+        of = [each for each in problems if each.family == family]
+        taken = np.sort(np.random.default_rng(seed).permutation(len(of))[: count or len(of)])
+        found += [of[k] for k in taken]
+    return found
+
+
+def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
+    """Solves and replays one request."""
+    began, used = time.perf_counter(), time.process_time()
+
+    def outcome(**found: Any) -> Outcome:
+        return Outcome(problem.name, problem.family, kind, **found)
+
+    asked = to_problem(OptimizeRequest.model_validate(problem.requests[kind]), deadline)
+    try:
+        solution = optimize(asked)
+    except JoulepathError as error:
+        took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
+        type_ = str(problem_content(error, "benchmark")["type"]).rsplit("/", 1)[-1]
+        return outcome(**took, problem=type_, detail=str(error))
+    took = {"wall": time.perf_counter() - began, "cpu": time.process_time() - used}
+    best = min((c for c in solution.candidates if c.energy is not None), key=lambda c: c.energy or 0.0)
+    return outcome(
+        **took,
+        energy=solution.energy.of(asked.objective),
+        duration=solution.duration,
+        reason=best.reason,
+        collisions=_collisions(asked.arm, solution.trajectory.spline),
+    )
+
+
+def _collisions(arm: Arm, spline: Spline) -> int:
+    """Samples of a motion in collision."""
+    checker = StateValidityChecker(arm, CollisionModel(arm))
+    t = np.append(np.arange(0.0, spline.duration, REPLAY), spline.duration)
+    return sum(not checker.is_valid(q) for q in sample(spline, t)[0])
+
+
+def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """Statistics by kind of goal and family; the family `all` has all of them."""
+    rows = []
+    for kind in dict.fromkeys(each.kind for each in outcomes):
+        of_kind = [each for each in outcomes if each.kind == kind]
+        for family in [*dict.fromkeys(each.family for each in of_kind), "all"]:
+            of = of_kind if family == "all" else [each for each in of_kind if each.family == family]
+            rows += [_row(kind, family, of)]
+    return {"rows": rows, "outcomes": [asdict(each) for each in outcomes]}
+
+
+def _row(kind: Kind, family: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    answered = [each for each in outcomes if each.problem is None]
+    return {
+        "kind": kind,
+        "family": family,
+        "count": len(outcomes),
+        "answered": len(answered),
+        "wall": Spread.of([each.wall for each in outcomes]),
+        "cpu": Spread.of([each.cpu for each in outcomes]),
+        "energy": Spread.of([each.energy for each in answered if each.energy is not None]),
+        "problems": dict(Counter(each.problem for each in outcomes if each.problem)),
+        "collisions": sum(each.collisions > 0 for each in answered),
+    }
+
+
+def print_summary(results: dict[str, Any]) -> None:
+    """Prints the table."""
+    print(
+        f"{'goal':6}{'family':20}{'answered':>12}  {'wall p50':>9}{'p95':>7}{'max':>7} s  {'cpu p50':>8}{'p95':>7} s  "
+        f"{'energy p25':>10}{'p50':>7}{'p75':>7} J  {'collide':>7}  problems"
+    )
+    for row in results["rows"]:
+        wall, cpu, energy = row["wall"], row["cpu"], row["energy"]
+        problems = ", ".join(f"{count} {name}" for name, count in row["problems"].items())
+        print(
+            f"{row['kind']:6}{row['family']:20}{row['answered']:5} of {row['count']:3}  "
+            f"{wall.p50:9.2f}{wall.p95:7.2f}{wall.maximum:7.2f} s  {cpu.p50:8.2f}{cpu.p95:7.2f} s  "
+            f"{energy.p25:10.1f}{energy.p50:7.1f}{energy.p75:7.1f} J  {row['collisions']:7}  {problems or 'none'}"
+        )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command; returns the exit code."""
+    command = parser(__doc__)
+    command.add_argument("file", type=Path, help="file of problems")
+    command.add_argument("--count", type=int, default=0, help="problems of each family, drawn by --seed (0: all)")
+    command.add_argument("--families", nargs="+", help="families (all)")
+    command.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), help="kinds of goal (both)")
+    command.add_argument("--deadline", type=float, default=DEADLINE, help="deadline of a request [s] (%(default)s)")
+    command.add_argument("--verbose", action="store_true", help="a line for each request")
+    given = command.parse_args(arguments)
+    problems = problems_of(given.file)
+    families = list(dict.fromkeys(each.family for each in problems))
+    unknown = sorted(set(given.families or ()) - set(families))
+    if unknown:
+        command.error(f"no family {', '.join(unknown)} in {given.file}: it has {', '.join(families)}")
+    on_one_core()
+    warm_up(ROBOT)
+    outcomes: list[Outcome] = []
+    for problem in chosen(problems, given.families or families, given.count, given.seed):
+        for kind in given.kinds:
+            found = run(problem, kind, given.deadline)
+            outcomes.append(found)
+            if given.verbose:
+                result = found.problem or f"{found.energy:.2f} J"
+                print(
+                    f"{found.name:26} {kind:6} {found.wall:6.2f} s  {result}  {found.detail or found.reason}",
+                    flush=True,
+                )
+    results = summary(outcomes)
+    print_summary(results)
+    write_json(given.json, results)
+    return int(any(each.collisions for each in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
