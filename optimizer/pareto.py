@@ -121,6 +121,7 @@ class _Search:
         self.least: _Node
         self.fastest_run = self.run([])
         self.tried: set[bytes] = set()
+        self.cut_short = False
 
     def front(self) -> Front:
         """The front. Raises the errors of `pareto`."""
@@ -141,7 +142,7 @@ class _Search:
                 continue
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
-        return self.result(min(spline.duration, self.nodes[0].duration), complete=self.left() > 0)
+        return self.result(min(spline.duration, self.nodes[0].duration), complete=self.left() > 0 and not self.cut_short)
 
     def fastest(self) -> tuple[Spline, Solution | None]:
         """The fastest motion, and the answer of least energy if it had to be found first. Raises what `optimize` does.
@@ -194,6 +195,8 @@ class _Search:
         try:
             return self.keep(run.solution())
         except (DeadlineExceeded, DurationTooShort, NoTrajectory) as error:
+            # a search has but a share of the time: the front may have time left and still lack this answer
+            self.cut_short |= isinstance(error, DeadlineExceeded)
             return self.insert(_Node(duration, None, reason=str(error)))
         finally:
             self.solves += run.incumbent.solves

@@ -56,7 +56,7 @@ class FreeSpline(SqpMethod):
         If the result collides, from planned collision-free paths.
         """
         shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        if has_corners(self.prepared.problem.objective, self.prepared.arm):
+        if has_corners(self.prepared.problem.objective, self.prepared.arm) and not self.interval.minimum_time:
             self.progress = ROUGH_PROGRESS  # the best are followed to sharper corners anyway
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:

@@ -15,6 +15,7 @@ from benchmarks.tasks import move
 from models.registry import load_robot
 from optimizer.trajectories.bspline import DEGREE, uniform
 from tests.optimizer.moves import problem_with
+from tests.selection import long_but
 
 OPTIONAL = {"drake": "pydrake", "copp": "copp_py"}
 ENDS = 1e-6  # rad
@@ -36,7 +37,7 @@ def planned(name: str) -> Replay:
     return replay(problem_with(task.q_start, task.q_goal), motion, task.q_start, task.q_goal)
 
 
-@pytest.mark.parametrize("name", PLANNERS)
+@pytest.mark.parametrize("name", long_but([name for name in PLANNERS if name != "drake"], PLANNERS))
 def test_planners_reach_start_and_goal(name: str) -> None:
     found = planned(name)
     electrical = found.energy.electrical

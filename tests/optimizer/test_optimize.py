@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import cycle, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -124,8 +124,13 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
-@pytest.mark.parametrize("name", list(CONDITIONS))
+@pytest.mark.parametrize(
+    ("name", "method"),
+    long_but(
+        list(zip(CONDITIONS, cycle(("bspline", "time_scaling")), strict=False)),
+        product(CONDITIONS, ("bspline", "time_scaling")),
+    ),
+)
 def test_answers_are_true(name: str, method: str) -> None:
     """Electrical energy with free duration, over conditions, of three moves of which one is short."""
     for k, (start, goal) in enumerate(random_moves(41, 4)):
@@ -441,7 +446,11 @@ def test_a_tool_moves_the_goal_but_not_the_motion() -> None:
 # --- physics ---
 
 
-@pytest.mark.parametrize("given", [{}, {"payload": PAYLOAD, "friction": "coulomb_viscous"}], ids=["alone", "loaded"])
+@pytest.mark.parametrize(
+    "given",
+    [{}, pytest.param({"payload": PAYLOAD, "friction": "coulomb_viscous"}, marks=pytest.mark.long)],
+    ids=["alone", "loaded"],
+)
 def test_without_gravity_the_way_back_costs_the_same(given: dict[str, Any]) -> None:
     """Run backwards, speeds change sign, torques too as friction is odd: but braking and driving change places.
 

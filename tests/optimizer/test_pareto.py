@@ -19,9 +19,11 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
+from optimizer.search.run import Run
 from optimizer.solution import Solution
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import PAYLOAD, START, changed, fixed, limits, problem, tcp_pose
+from tests.selection import long_but
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 
@@ -63,7 +65,7 @@ def objective(asked: Problem, answer: Solution) -> float:
 
 @pytest.fixture(
     scope="module",
-    params=[joints, straight_line, jumping, pytest.param(mechanical, marks=pytest.mark.long)],
+    params=long_but([joints, jumping], [joints, straight_line, jumping, mechanical]),
     ids=lambda make: make.__name__,
 )
 def asked_and_found(request: pytest.FixtureRequest) -> tuple[Problem, Front]:
@@ -264,3 +266,17 @@ def test_a_deadline_gives_what_was_found(readings: int) -> None:
     assert front.points and all(point.certificate.valid for point in front.points)
     assert len(front.points) + len(front.dropped) < 50 and front.status == "feasible"
     assert front.wall_time < readings + LAST_READINGS
+
+
+def test_a_front_without_its_end_of_least_energy_is_not_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That search ends at its share of the deadline while the front has time left."""
+    solution = Run.solution
+
+    def late(run: Run) -> Solution:
+        if run.problem.duration_min is None:
+            raise DeadlineExceeded([])
+        return solution(run)
+
+    monkeypatch.setattr(Run, "solution", late)
+    front = pareto(problem(), 4, still)
+    assert front.points and front.status == "feasible"

@@ -12,12 +12,17 @@ from app.schemas.response import OptimizeResponse
 from optimizer.solution import Certificate
 from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from tests.app.requests import EXAMPLES, long_search, move
+from tests.selection import long_but
 
 # of numbers that are computed in one place and only passed on
 EXACT = 1e-12
 
 
-@pytest.fixture(scope="module", params=list(EXAMPLES))
+# each in every run; the others are answered by the test of the OpenAPI document
+QUICK = ("joint_to_pose", "pose_to_pose", "storage_on_the_bus", "over_a_post")
+
+
+@pytest.fixture(scope="module", params=long_but(QUICK, EXAMPLES))
 def asked_and_answered(request: pytest.FixtureRequest, client: TestClient) -> tuple[dict[str, Any], dict[str, Any]]:
     """Every example of the documentation with its answer, checked against the schema."""
     asked = EXAMPLES[request.param]

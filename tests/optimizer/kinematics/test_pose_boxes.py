@@ -71,7 +71,7 @@ def wrist_boxes(arm: Arm, pose: ConeOrientedPose) -> WristBoxes:
 @pytest.mark.parametrize("name", ARMS)
 def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, kind: Any) -> None:
     rng = np.random.default_rng(7)
-    for _ in range(60):
+    for _ in range(30):
         q, pose = reached(rng, ARMS[name], half_angle)
         centre, half = boxes_around(rng, q, 64)
         if kind is wrist_boxes:

@@ -10,7 +10,7 @@ from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import NoCollisionFreeTrajectory
-from optimizer.methods import METHODS, solver_for
+from optimizer.methods import METHODS, planned_paths, solver_for
 from optimizer.methods.duration_intervals import duration_intervals
 from optimizer.methods.method import SolveStatus
 from optimizer.methods.path_retiming import PathRetiming, RetimingProgram
@@ -27,6 +27,8 @@ from tests.optimizer.moves import ROBOT, problem_with
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([-1.8, -1.57, 1.57, -1.57, -1.57, 0.0])
 DEADLINE = 60.0
+# states that a planning checks where there is no way: more take time alone
+FEW_STATES = 2_000
 # distance [rad] between a motion and the path it follows: the error of the fit of a spline, and of sampling the path
 FIT = 2e-3
 # step of central differences of the retiming's variables, and their relative error; friction bends over some mrad/s
@@ -66,7 +68,8 @@ def planned_path(prepared: PreparedProblem) -> Array:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_error_names_the_colliding_pair(method: MethodName) -> None:
+def test_the_error_names_the_colliding_pair(method: MethodName, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planned_paths, "MOST_STATES", FEW_STATES)
     problem = blocked(method, WALL)
     with pytest.raises(NoCollisionFreeTrajectory) as caught:
         optimize(problem)

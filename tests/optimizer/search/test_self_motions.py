@@ -98,9 +98,9 @@ def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None
     "given",
     [
         {},
-        {"cycle": Cycle(time=4.0, hold="motors")},
+        pytest.param({"cycle": Cycle(time=4.0, hold="motors")}, marks=pytest.mark.long),
         {"objective": "mechanical", "duration_max": 2.0},
-        {"bus": Bus(mode="isolated")},
+        pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],
     ids=["electrical", "cycle", "mechanical", "isolated"],
 )
