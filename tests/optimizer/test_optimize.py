@@ -298,7 +298,7 @@ def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
 
 def test_more_time_is_never_dearer_without_a_price_of_time() -> None:
     """The mechanical objective, which a longer duration can only help: up to 2 s is no worse than up to 1 s."""
-    totals = [solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total for T in (0.8, 1.2, 2.0)]
+    totals = [solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total for T in (0.8, 2.0)]
     assert all(slow <= fast * (1 + CONVERGED) for fast, slow in pairwise(totals))
 
 

@@ -65,7 +65,7 @@ def objective(asked: Problem, answer: Solution) -> float:
 
 @pytest.fixture(
     scope="module",
-    params=long_but([joints, jumping], [joints, straight_line, jumping, mechanical]),
+    params=long_but([joints], [joints, straight_line, jumping, mechanical]),
     ids=lambda make: make.__name__,
 )
 def asked_and_found(request: pytest.FixtureRequest) -> tuple[Problem, Front]:

@@ -29,6 +29,7 @@ from optimizer.solution import Solution
 from optimizer.whatif import whatif
 from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain
+from tests.selection import long_but
 
 JOINTS = (2, 3, 5, 7)
 OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"duration_max": 1.5}}
@@ -77,7 +78,7 @@ def replayed(asked: Problem, solution: Solution) -> tuple[float, dict[str, Array
     return float(np.trapezoid(np.maximum(net, 0) - electronics.regeneration * np.maximum(-net, 0), t)), peaks
 
 
-@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("objective", long_but(["electrical"], OBJECTIVES))
 def test_joints_to_joints(robot: Robot, objective: str) -> None:
     """Certified, above its bound, no worse than any baseline, and worth as much by Pinocchio."""
     asked = problem(robot, objective)

@@ -131,12 +131,12 @@ def test_no_way(client: TestClient) -> None:
 
 
 def test_a_scan_voxels_and_a_mesh_file_are_obstacles(client: TestClient) -> None:
-    """All three at once, by every method that takes no seconds; Pinocchio's replay keeps off every point."""
+    """All three at once, by a free and by a fixed path; Pinocchio's replay keeps off every point."""
     request = EXAMPLES["past_a_scan"]
-    methods = ["bspline", "time_scaling", "lagrange", "uniform_scaling"]
+    methods = ["bspline", "uniform_scaling"]
     rows = answered(client, request | {"methods": methods, "answers": True, "deadline": 60.0}, "/compare")["methods"]
     free = answered(client, request | {"collisions": False})
-    assert [row["valid"] for row in rows] == [True] * 4
+    assert [row["valid"] for row in rows] == [True] * 2
     scan = request["scene"]["obstacles"][0]
     for answer in (*(row["answer"] for row in rows), free):
         spline = answer["trajectory"]["spline"]

@@ -15,6 +15,7 @@ from optimizer.problem.scene import HalfSpace, Obstacle, Scene, Sphere
 from optimizer.trajectories.spline import Spline
 from tests.optimizer.cells import at, cell, positions, wander
 from tests.optimizer.moves import ROBOT
+from tests.selection import long_but
 
 ROUNDING = 1e-9  # m
 REPLAY = 1e-4  # s
@@ -32,7 +33,7 @@ def smooth_cell(seed: int) -> Scene:
     return Scene([o for o in cell(seed).obstacles if not o.name.endswith(("2", "4"))])
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", long_but(range(3), range(6)))
 @pytest.mark.parametrize("crowded", [False, True])
 def test_proven_clearance_is_just_below_the_replay(seed: int, crowded: bool) -> None:
     arm = Arm(robot=ROBOT, scene=smooth_cell(seed)) if crowded else Arm(robot=ROBOT)
