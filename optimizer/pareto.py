@@ -142,7 +142,8 @@ class _Search:
                 continue
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
-        return self.result(min(spline.duration, self.nodes[0].duration), complete=self.left() > 0 and not self.cut_short)
+        complete = self.left() > 0 and not self.cut_short
+        return self.result(min(spline.duration, self.nodes[0].duration), complete)
 
     def fastest(self) -> tuple[Spline, Solution | None]:
         """The fastest motion, and the answer of least energy if it had to be found first. Raises what `optimize` does.
