@@ -24,15 +24,12 @@ import orjson
 from app.convert.request import to_problem
 from app.http.problem_details import problem_content
 from app.schemas.request import OptimizeRequest
+from benchmarks.collision_replay import collisions
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from optimizer import optimize
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.exceptions import JoulepathError
 from optimizer.optimize import warm_up
-from optimizer.problem.arm import Arm
-from optimizer.trajectories.spline import Spline, sample
 
 Kind = Literal["joint", "pose"]
 KINDS: tuple[Kind, ...] = ("joint", "pose")
@@ -130,15 +127,8 @@ def run(problem: ForeignProblem, kind: Kind, deadline: float) -> Outcome:
         energy=solution.energy.of(asked.objective),
         duration=solution.duration,
         reason=best.reason,
-        collisions=_collisions(asked.arm, solution.trajectory.spline),
+        collisions=collisions(asked.arm, solution.trajectory.spline, REPLAY),
     )
-
-
-def _collisions(arm: Arm, spline: Spline) -> int:
-    """Samples of a motion in collision."""
-    checker = StateValidityChecker(arm, CollisionModel(arm))
-    t = np.append(np.arange(0.0, spline.duration, REPLAY), spline.duration)
-    return sum(not checker.is_valid(q) for q in sample(spline, t)[0])
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:

@@ -20,20 +20,18 @@ from typing import Any
 import numpy as np
 
 from benchmarks.cells import CELLS, CellTask, cell_tasks
+from benchmarks.collision_replay import collisions
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.statistics import Spread
 from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
-from optimizer.collision.model import CollisionModel
-from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.methods import METHODS
 from optimizer.methods.planned_paths import ALONG_PLANNED_PATH, FROM_PLANNED_PATH
 from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import MethodName, Problem
-from optimizer.trajectories.spline import sample
 
 REPLAY = 1e-4  # s
 SOLVED = 0.99  # least fraction of solved tasks, of either kind
@@ -90,9 +88,7 @@ def run(task: CellTask, kind: str, method: MethodName = "bspline") -> Outcome:
     outcome.tried = dict(Counter(c.status for c in solution.candidates))
     found = solution.certificate.clearance
     outcome.proven = np.nan if found is None else found.min_clearance
-    checker = StateValidityChecker(arm, CollisionModel(arm))
-    t = np.append(np.arange(0.0, solution.duration, REPLAY), solution.duration)
-    outcome.collisions = sum(not checker.is_valid(q) for q in sample(solution.trajectory.spline, t)[0])
+    outcome.collisions = collisions(arm, solution.trajectory.spline, REPLAY)
     return outcome
 
 

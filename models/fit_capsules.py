@@ -24,7 +24,7 @@ from scipy.optimize import Bounds, minimize
 from models.capsule_cover import not_held, outside
 from models.meshes import link_surfaces, sampled
 from models.registry import load_robot
-from models.robot import Array, LinkCapsule, Robot
+from models.robot import Array, LinkCapsule, Mask, Robot
 
 # edge of a grid cell, and how far [m] from the link overhang is weighed
 CELL, REACH = 0.003, 0.08
@@ -39,7 +39,6 @@ LEAST_RADIUS, GREATEST_RADIUS = 0.015, 0.09
 SURFACE_SAMPLES, CHECKED_SAMPLES, CELLS, TURNS = 1500, 100_000, 6000, 36
 # the last digit of the figures [m]
 DIGIT = 1e-4
-Rows = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -47,10 +46,10 @@ class _Solid:
     """A link on a grid: lowest corner [m], cells inside of its surfaces, distance [m] of every cell from the link."""
 
     corner: Array
-    is_inside: Rows
+    is_inside: Mask
     distance: Array
 
-    def contains(self, points: Array) -> Rows:
+    def contains(self, points: Array) -> Mask:
         """Whether points (k, 3) [m] are in a cell inside."""
         index = np.floor((points - self.corner) / CELL).astype(int)
         in_grid = ((index >= 0) & (index < self.is_inside.shape)).all(axis=1)

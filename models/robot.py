@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

@@ -76,3 +76,7 @@ class PreparedProblem(Plant):
     def objective_of(self, energy: Energy) -> float:
         """The part of an energy that is minimised [J]."""
         return energy.of(self.problem.objective)
+
+    def cost_of(self, spline: Spline | None) -> float:
+        """The part of a motion's energy that is minimised [J]; infinite if there is no motion."""
+        return np.inf if spline is None else self.objective_of(self.energy(spline))

@@ -7,18 +7,17 @@ repeat: both are refused before trimesh sees it. Files in these formats hold no 
 
 from __future__ import annotations
 
-import base64
-import binascii
 import hashlib
 import json
 import struct
 import threading
-from collections import OrderedDict
 from io import BytesIO
 from typing import Any, Literal
 
 import numpy as np
+from cachetools import LRUCache, cached
 
+from app.convert.base64_data import decoded
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.clouds import MOST_TRIANGLES, TriangleMesh
 
@@ -33,14 +32,15 @@ Format = Literal["stl", "obj", "glb"]
 
 def mesh_from_file(file_format: Format, data: str, scale: float) -> TriangleMesh:
     """The mesh of a file in base64, whose unit of length is `scale` [m]. Raises InvalidProblem at the field `data`."""
-    try:
-        content = base64.b64decode(data, validate=True)
-    except binascii.Error:
-        raise InvalidProblem("data", "data is not valid base64: fill it to a multiple of 4 characters.") from None
-    return _KEPT.get(file_format, content, scale)
+    return _mesh(file_format, decoded(data, "data"), scale)
 
 
-def _read(file_format: Format, content: bytes, scale: float) -> TriangleMesh:
+def _digest(file_format: Format, content: bytes, scale: float) -> bytes:
+    return hashlib.blake2b(content, person=file_format.encode()).digest() + struct.pack("<d", scale)
+
+
+@cached(LRUCache(MOST_KEPT_TRIANGLES, getsizeof=lambda mesh: len(mesh.corners)), key=_digest, lock=threading.Lock())
+def _mesh(file_format: Format, content: bytes, scale: float) -> TriangleMesh:
     if file_format == "glb":
         _check_glb(content)
     if file_format == "stl":
@@ -94,27 +94,3 @@ def _check_glb(content: bytes) -> None:
             "data is no plain glb file (accessors without data, repeated nodes, too many entries): export the mesh "
             "alone, without compression, animation or materials.",
         )
-
-
-class _Kept:
-    """Meshes by a digest of their file, the least recently used first, of MOST_KEPT_TRIANGLES in all."""
-
-    def __init__(self) -> None:
-        self._meshes: OrderedDict[bytes, TriangleMesh] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, file_format: Format, content: bytes, scale: float) -> TriangleMesh:
-        key = hashlib.blake2b(content, person=f"{file_format}".encode()).digest() + struct.pack("<d", scale)
-        with self._lock:
-            if key in self._meshes:
-                self._meshes.move_to_end(key)
-                return self._meshes[key]
-        mesh = _read(file_format, content, scale)
-        with self._lock:
-            mesh = self._meshes.setdefault(key, mesh)
-            while sum(len(each.corners) for each in self._meshes.values()) > MOST_KEPT_TRIANGLES:
-                self._meshes.popitem(last=False)
-        return mesh
-
-
-_KEPT = _Kept()

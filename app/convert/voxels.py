@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
-
 import numpy as np
 import numpy.typing as npt
 
+from app.convert.base64_data import decoded
 from app.schemas.scene import MOST_CELLS, VoxelBits, Voxels
 from optimizer.exceptions import InvalidProblem
 
@@ -25,12 +23,7 @@ def _from_bits(bits: VoxelBits) -> npt.NDArray[np.int64]:
         raise InvalidProblem(
             "bits.dimensions", f"bits.dimensions must make at most {MOST_CELLS} cells: use larger ones."
         )
-    try:
-        data = base64.b64decode(bits.data, validate=True)
-    except binascii.Error:
-        raise InvalidProblem(
-            "bits.data", "bits.data is not valid base64: fill it to a multiple of 4 characters."
-        ) from None
+    data = decoded(bits.data, "bits.data")
     if len(data) != -(-count // 8):
         raise InvalidProblem(
             "bits.data",

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from collections import OrderedDict
 from collections.abc import Sequence
 from typing import overload
 
 import numpy as np
+from cachetools import LRUCache, cached
 
 from models.robot import Array
 from optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
 from optimizer.collision.closed_form_distance import box_segment, segment_segment, triangle_segment
 from optimizer.collision.coal_distance import ConvexPairs
-from optimizer.collision.cores import Core, Indices, box_corners, least_height
+from optimizer.collision.cores import Core, Indices, LeastHeight, box_corners
 from optimizer.problem.clouds import Cloud as Shape
 from optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
 
@@ -141,6 +141,7 @@ class ConvexAgainstCloud:
 
     def __init__(self, cloud: Cloud, core: Core) -> None:
         self._cloud, self._core = cloud, core
+        self._height = LeastHeight(core)
         # a ball around the core, whose centre is in it
         self._centre = core.points.mean(axis=0)
         self._radius = float(np.linalg.norm(core.points - self._centre, axis=1).max()) + core.disc_radius
@@ -155,7 +156,7 @@ class ConvexAgainstCloud:
         query, part = cloud.tree.near(balls, reach, within, root, nearest=True)
         R, origin = T[query, :3, :3], T[query, :3, 3]
         in_core = np.einsum("kij,ki->kj", R, cloud.tree.centres[part] - origin)
-        least = least_height(self._core, in_core) - cloud.tree.radii[part]
+        least = self._height(in_core) - cloud.tree.radii[part]
         order = np.lexsort((least, query))
         distance, normal, point = np.full(len(T), np.inf), np.tile([0.0, 0.0, 1.0], (len(T), 1)), balls[:, 0].copy()
         for k in order.tolist():
@@ -229,36 +230,6 @@ def divided(triangles: Array) -> Array:
         triangles = np.concatenate([triangles[~long], *halves])
 
 
-def cloud_of(shape: Shape) -> Cloud:
-    """The parts of an obstacle and their tree. Those of the last requests are kept, by content."""
-    return _KEPT.get(shape)
-
-
-class _Kept:
-    """Clouds by a digest of their content, the least recently used first, of MOST_KEPT_PARTS in all."""
-
-    def __init__(self) -> None:
-        self._clouds: OrderedDict[bytes, Cloud] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def get(self, shape: Shape) -> Cloud:
-        key = _digest(shape)
-        with self._lock:
-            if key in self._clouds:
-                self._clouds.move_to_end(key)
-                return self._clouds[key]
-        cloud = Cloud(shape)
-        with self._lock:
-            # two threads may both make it; all go on with the first
-            cloud = self._clouds.setdefault(key, cloud)
-            while sum(each.count for each in self._clouds.values()) > MOST_KEPT_PARTS:
-                self._clouds.popitem(last=False)
-        return cloud
-
-
-_KEPT = _Kept()
-
-
 def _digest(shape: Shape) -> bytes:
     """A digest of the parts; the radius of points is none of them."""
     match shape:
@@ -269,6 +240,12 @@ def _digest(shape: Shape) -> bytes:
         case TriangleMesh():
             content = [b"triangles", shape.corners.tobytes()]
     return hashlib.blake2b(b"".join(content)).digest()
+
+
+@cached(LRUCache(MOST_KEPT_PARTS, getsizeof=lambda cloud: cloud.count), key=_digest, lock=threading.Lock())
+def cloud_of(shape: Shape) -> Cloud:
+    """The parts of an obstacle and their tree. Those of the last requests are kept, by content."""
+    return Cloud(shape)
 
 
 def _least(found: Witness, query: Indices, count: int, within: Array) -> Witness:

@@ -12,11 +12,10 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from models.robot import Array, Robot
+from models.robot import Array, Mask, Robot
 from optimizer.collision.bodies import Body, Indices, bodies_of
 from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.path_constraints import Mask
 from optimizer.problem.arm import Arm
 
 

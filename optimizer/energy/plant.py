@@ -23,8 +23,6 @@ KNEE = 0.02
 WIDTH = 0.5
 # widths [W] of the solves that follow, one from the other, where every joint has a corner of its own
 SHARPER_WIDTHS = (0.1, 0.02)
-# of the first solves there: relative decrease of the cost that a further step must promise
-ROUGH_PROGRESS = 5e-2
 # quadrature points per panel for reported energies
 REPORT_NODES = 8
 # a last sample nearer to the one before than this fraction of a period is rounding

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
@@ -83,7 +82,7 @@ class PoseBoxes:
         return np.asarray(np.cumsum(steps[::-1])[::-1])
 
     @cached_property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Mask:
         """Joints (nq,) that move neither the TCP nor the tool's axis: the last one, if both lie on its axis."""
         free = np.zeros(len(self.levers), dtype=bool)
         across = np.hypot(*self._T_last_tcp[:2, 3])
@@ -98,7 +97,7 @@ class PoseBoxes:
         centres = np.einsum("bjxy,jy->bjx", frames[..., :3, :3], self._bodies[1]) + frames[..., :3, 3]
         return Placed(frames[..., :3, 2], frames[..., :3, 3], tcp[:, :3, 3], tcp[:, :3, :3] @ self.pose.axis, centres)
 
-    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
         """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose; which (b,) are not
         empty.
 

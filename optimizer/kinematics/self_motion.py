@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from models.robot import Array
-from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.angles import nearest_turn, wrapped
 from optimizer.problem.branches import Label
 
 # distance [m] beyond the reach at which the fourth axis may lie by rounding alone
@@ -129,7 +129,7 @@ class StretchedWrist:
         """The nearest parameter [rad] on an arc."""
         found = []
         for lower, upper in self.arcs:
-            near = parameter + 2 * np.pi * round(((lower + upper) / 2 - parameter) / (2 * np.pi))
+            near = float(nearest_turn(np.asarray(parameter), np.asarray((lower + upper) / 2)))
             on_arc = float(np.clip(near, lower, upper))
             found.append((abs(near - on_arc), on_arc))
         return min(found)[1]

@@ -22,9 +22,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.forward import link_frames
 from optimizer.kinematics.tcp import T_last_tcp
@@ -126,7 +125,7 @@ class WristBoxes:
         half = self.pose.half_angle
         return float(np.cos(min(angle + half, np.pi))), float(np.cos(max(angle - half, 0.0)))
 
-    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
         """Middles and half sides (b, nq) [rad] of boxes that hold all that can reach the pose; which (b,) may hold
         any."""
         w = self.geometry.inner
@@ -173,7 +172,7 @@ class WristBoxes:
         return moved
 
 
-def _nearby(at: _Places) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _nearby(at: _Places) -> tuple[Array, Array, Mask]:
     """The middle and half length of the interval of q_w that brings two vectors within e, and whether any may."""
     possible = np.hypot(at.rho_goal - at.rho_tool, at.z_goal - at.z_tool) <= at.e
     longest = np.maximum(np.maximum(at.rho_goal, at.rho_tool), ROUNDING)
@@ -181,7 +180,7 @@ def _nearby(at: _Places) -> tuple[Array, Array, NDArray[np.bool_]]:
     return at.azimuth, np.where(spread < np.pi / 2, spread + ROUNDING, np.pi), possible
 
 
-def _at_angle(at: _Places, lowest: float, highest: float) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+def _at_angle(at: _Places, lowest: float, highest: float) -> tuple[Array, Array, Array, Mask]:
     """Azimuth, and least and greatest difference of q_w from it, at which two unit vectors have a cosine between two
     values, but for e; and whether any may have."""
     across, along = at.rho_goal * at.rho_tool, at.z_goal * at.z_tool
@@ -192,7 +191,7 @@ def _at_angle(at: _Places, lowest: float, highest: float) -> tuple[Array, Array,
     return at.azimuth, least, np.arccos(np.clip(low / across, -1.0, 1.0)), possible
 
 
-def _met(low: Array, high: Array, middle: Array, least: Array, most: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _met(low: Array, high: Array, middle: Array, least: Array, most: Array) -> tuple[Array, Array, Mask]:
     """The hull of what [low, high] within [-π, π] has in common with middle ± [least, most], on the circle; whether
     that is anything."""
     first, last = np.full_like(low, np.inf), np.full_like(high, -np.inf)
@@ -208,8 +207,8 @@ def _met(low: Array, high: Array, middle: Array, least: Array, most: Array) -> t
 
 def _hull(
     centre: Array, half: Array, w: int, reference: Array, low: Array, high: Array, eta: Array,
-    possible: NDArray[np.bool_],
-) -> tuple[Array, Array, NDArray[np.bool_]]:  # fmt: skip
+    possible: Mask,
+) -> tuple[Array, Array, Mask]:  # fmt: skip
     """The boxes with joints w and w + 1 narrowed to the hull of the possible cells, whose q_w are within low ... high
     (b, CELLS) of `reference`."""
     centre, half = centre.copy(), half.copy()
@@ -225,7 +224,7 @@ def _hull(
     first = np.where(around, -np.pi, away - wide)
     last = np.where(around, np.pi, away + wide)
     possible = possible & (first <= half[:, w, None]) & (last >= -half[:, w, None])
-    held: NDArray[np.bool_] = np.asarray(possible.any(axis=1))
+    held: Mask = np.asarray(possible.any(axis=1))
     least = np.where(possible, first, np.inf).min(axis=1)
     most = np.where(possible, last, -np.inf).max(axis=1)
     steps = 2 * np.arange(CELLS) + 1 - CELLS

@@ -40,7 +40,7 @@ def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -
         found.append(along_path(method, path, law))
     solved = [result for result in found if result.spline is not None]
     if solved:
-        return with_effort(min(solved, key=lambda result: _energy(method.prepared, result)), found)
+        return with_effort(min(solved, key=lambda result: method.prepared.cost_of(result.spline)), found)
     if method.deadline.passed:
         return with_effort(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED), found)
     return with_effort(replace(failed, reason=f"{failed.reason}; {found[0].reason}"), found)
@@ -71,8 +71,4 @@ def _energy_without_obstacles(method: Method) -> float:
     problem = method.prepared.problem
     free = PreparedProblem.of(replace(problem, arm=replace(problem.arm, collisions=False)))
     result = type(method)(free, method.q_start, method.q_goal, method.deadline, method.interval).solve()
-    return _energy(free, result)
-
-
-def _energy(prepared: PreparedProblem, result: SolveResult) -> float:
-    return np.inf if result.spline is None else prepared.objective_of(prepared.energy(result.spline))
+    return free.cost_of(result.spline)

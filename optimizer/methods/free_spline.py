@@ -14,10 +14,11 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.path_planner import SAMPLES
-from optimizer.energy.plant import ROUGH_PROGRESS, has_corners
+from optimizer.energy.plant import has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
+from optimizer.nlp.sqp import PROGRESS
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline, seven_segment
@@ -34,6 +35,8 @@ REFINED, EXACT = 2, 3
 # control points of the attempts from a planned path, and penetration [m] of a spline fitted to it beyond which more are
 # taken
 ALONG_PATH, ALLOWED_CUT = (COARSE, 20, 30), 0.02
+# relative decrease of the cost that a further step must promise in a solve whose motion is followed to sharper corners
+CORNERED_PROGRESS = 5e-2
 
 
 class FreeSpline(SqpMethod):
@@ -56,17 +59,21 @@ class FreeSpline(SqpMethod):
         If the result collides, from planned collision-free paths.
         """
         shortest = float(seven_segment.shortest_duration(self.q_goal - self.q_start, self.coordinates.limits))
-        if has_corners(self.prepared.problem.objective, self.prepared.arm) and not self.interval.minimum_time:
-            self.progress = ROUGH_PROGRESS  # the best are followed to sharper corners anyway
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
-            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0, rough=True)))
+            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)))
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
             tried.append(self.from_planned_paths(tried[-1]))
         return with_effort(tried[-1], tried)
+
+    @property
+    def _progress(self) -> float:
+        """The relative decrease of the cost that a further step must promise in a solve without a known motion."""
+        sharpened = has_corners(self.prepared.problem.objective, self.prepared.arm) and not self.interval.minimum_time
+        return CORNERED_PROGRESS if sharpened else PROGRESS
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths, solved to the end; `failed` if there is none."""
@@ -74,7 +81,7 @@ class FreeSpline(SqpMethod):
         if best.spline is None or self.may_refine(best.spline):
             return best
         polished = self._polished(best.spline)
-        if polished.spline is None or self._energy(polished.spline) >= self._energy(best.spline):
+        if polished.spline is None or self.prepared.cost_of(polished.spline) >= self.prepared.cost_of(best.spline):
             return with_effort(best, [best, polished])
         reason = f"{polished.reason}{FROM_PLANNED_PATH}"
         return with_effort(replace(polished, reason=reason), [best, polished])
@@ -83,7 +90,7 @@ class FreeSpline(SqpMethod):
         """The end of a rough solve of more control points than `may_refine` takes."""
         space, t = bspline.uniform(len(spline.control_points)), np.linspace(0.0, 1.0, SAMPLES)
         points = space.fit(self.coordinates.from_joints(spline.curve(t * spline.duration)), t)
-        return self.improve(Guess(space, points, spline.duration, collision_free=True))
+        return self.improve(Guess(space, points, spline.duration, collision_free=True, progress=self._progress))
 
     def along_path(self, q: Array, t: Array) -> SolveResult:
         """From samples q (k, nq) of a collision-free path at times t (k,), which end at 1.
@@ -98,7 +105,8 @@ class FreeSpline(SqpMethod):
             fitted = spline_of(space, self.coordinates.to_joints(points), 1.0).curve(t)
             if count < ALONG_PATH[-1] and self.prepared.surroundings.model.least_distance(fitted, 0.0) < -ALLOWED_CUT:
                 continue
-            tried.append(self.improve(Guess(space, points, 0.0, collision_free=True, rough=True)))
+            guess = Guess(space, points, 0.0, collision_free=True, rough=True, progress=self._progress)
+            tried.append(self.improve(guess))
             if tried[-1].status is not SolveStatus.FAILED:
                 break
         return with_effort(tried[-1], tried)
@@ -114,17 +122,15 @@ class FreeSpline(SqpMethod):
 
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
         """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots."""
-        self.progress = progress
-        return self._solve_in(bspline.uniform(count), q, t)
+        return self._solve_in(bspline.uniform(count), q, t, progress)
 
-    def _solve_in(self, space: Basis, q: Array, t: Array) -> SolveResult:
+    def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
         """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])
         points = space.fit(self.coordinates.from_joints(q), t / duration)
         # without clearance constraints, a motion from a planned path would return to the obstacle
-        result = self.improve(
-            Guess(space, points, duration, collision_free=self.prepared.surroundings.is_near_contact(q))
-        )
+        near = self.prepared.surroundings.is_near_contact(q)
+        result = self.improve(Guess(space, points, duration, collision_free=near, progress=progress))
         planned = result.spline is not None and self.prepared.surroundings.has_planned_paths(self.q_start, self.q_goal)
         return replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}") if planned else result
 
@@ -134,7 +140,7 @@ class FreeSpline(SqpMethod):
         fastest = time_optimal(line.limits, line.start, line.goal)
         duration = max(fastest.duration, LEAST_DURATION)
         space = self.graded(duration, EXACT)
-        return Guess(space, space.fit(fastest.q, fastest.t / duration), duration)
+        return Guess(space, space.fit(fastest.q, fastest.t / duration), duration, progress=self._progress)
 
     def graded(self, duration: float, repeat: int) -> Basis:
         """A space with knots at the switches of the leading coordinate's jerk in a motion of `duration` [s]."""

@@ -7,13 +7,13 @@ interpolation at Chebyshev nodes. The SQP with exact derivatives is this project
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from models.robot import Array
 from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.methods.planned_paths import no_polynomial_around
 from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
 from optimizer.solution import BaselineName
 from optimizer.trajectories.polynomial import polynomials
@@ -58,16 +58,9 @@ class Lagrange(SqpMethod):
         # of two failures, the one with a collision came further
         collided = [result for result in tried if result.status is SolveStatus.FAILED and result.collision is not None]
         if tried[-1].status is SolveStatus.FAILED and collided:
-            tried.append(self._around(collided[-1]))
+            failed = no_polynomial_around(collided[-1], polynomials(NODES).degree)
+            tried.append(self.from_planned_paths(failed))
         return with_effort(tried[-1], tried)
-
-    def _around(self, failed: SolveResult) -> SolveResult:
-        """The polynomial of least energy from planned paths; if there is none, the result says so of the method."""
-        assert failed.collision is not None
-        space = polynomials(NODES)
-        message = failed.collision.message
-        reason = f"no polynomial of degree {space.degree} was found around the obstacles: {message}"
-        return self.from_planned_paths(replace(failed, reason=reason))
 
     def along_path(self, q: Array, t: Array) -> SolveResult:
         """From samples q (k, nq) of a collision-free path at times t (k,), which end at 1."""

@@ -54,6 +54,13 @@ def without_path(failed: SolveResult, planned: PlannedPaths) -> SolveResult:
     return replace(failed, status=status, reason=f"{failed.reason}; {planned.message}", cut_short=late)
 
 
+def no_polynomial_around(failed: SolveResult, degree: int) -> SolveResult:
+    """A failed result of a method whose one polynomial per joint collides, with a reason that says so."""
+    assert failed.collision is not None
+    reason = f"no polynomial of degree {degree} was found around the obstacles: {failed.collision.message}"
+    return replace(failed, reason=reason)
+
+
 def smooth_path(prepared: PreparedProblem, path: Array) -> Spline | None:
     """The smoothest spline along a joint path (k, nq) [rad] that is proven to be collision-free, as a motion of 1 s.
 

@@ -20,7 +20,7 @@ from optimizer.collision.path_planner import along
 from optimizer.collision.state_validity import StateValidityChecker
 from optimizer.methods.limit_repair import torque_peaks
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
-from optimizer.methods.planned_paths import FROM_PLANNED_PATH, plan, to_goal, without_path
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH, no_polynomial_around, plan, to_goal, without_path
 from optimizer.trajectories import quintic
 from optimizer.trajectories.polynomial import PolynomialBasis, polynomials
 from optimizer.trajectories.spline import least_time_scale, retimed, spline_of, time_scales
@@ -89,9 +89,7 @@ class PolynomialGA(Method):
         second = self._evolved()
         if second.spline is not None:
             return replace(second, reason=f"{second.reason}{FROM_PLANNED_PATH}", solves=2)
-        degree, message = self.space.degree, first.collision.message
-        reason = f"no polynomial of degree {degree} was found around the obstacles: {message}"
-        return replace(first, reason=reason, iterations=self.generations, solves=2)
+        return replace(no_polynomial_around(first, self.space.degree), iterations=self.generations, solves=2)
 
     def _evolved(self) -> SolveResult:
         """Run all generations, or until the deadline, and bring the best motion within the limits."""

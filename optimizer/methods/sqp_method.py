@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,7 +34,7 @@ from optimizer.trajectories.spline import Spline, sample, spline_of, time_scale
 
 # times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 8
-# relative decrease of the cost that a further step must promise in a rough solve
+# relative decrease of the cost that a further step must promise in a rough solve among obstacles
 ROUGH_PROGRESS = 1e-3
 # initial durations tried, in multiples of the shortest one of the guess
 TIME_SCALES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
@@ -51,6 +52,7 @@ class Guess:
 
     `collision_free`: the NLP has clearance constraints from the start. Other guesses get them after a collision.
     `rough`: with clearance constraints, the solve ends at ROUGH_PROGRESS, since another one refines its motion.
+    `progress` is the relative decrease of the cost that a further step of the SQP must promise.
     """
 
     space: Basis
@@ -58,6 +60,7 @@ class Guess:
     duration: float
     collision_free: bool = False
     rough: bool = False
+    progress: float = PROGRESS
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,6 @@ class _Stage:
 
 class SqpMethod(Method):
     """A method whose motions form a linear space; the SQP optimises them."""
-
-    # relative decrease of the cost that a further step of the SQP must promise
-    progress: float = PROGRESS
 
     @cached_property
     def coordinates(self) -> Coordinates:
@@ -105,7 +105,7 @@ class SqpMethod(Method):
             # while no motion is known, one that is not yet optimal is better than none
             needed = len(stage.pairs) > 0 and np.isinf(self.best_known)
             until = deadline.earlier_by(CHECKING) if needed else deadline
-            progress = max(self.progress, ROUGH_PROGRESS) if guess.rough and len(stage.pairs) else self.progress
+            progress = max(guess.progress, ROUGH_PROGRESS) if guess.rough and len(stage.pairs) else guess.progress
             result = solve(stage.program, stage.free, stage.duration, stage.multiplier, until, progress)
             iterations += result.iterations
             late = result.status is SqpStatus.OUT_OF_TIME
@@ -121,7 +121,8 @@ class SqpMethod(Method):
                 return SolveResult(
                     SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity, cut_short=late
                 )
-            if collision is not None and not len(stage.pairs) and self._energy(check.spline) >= self.best_known:
+            unconstrained = collision is not None and not len(stage.pairs)
+            if unconstrained and self.prepared.cost_of(check.spline) >= self.best_known:
                 return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
             stage = self._repaired(stage, result, check)
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
@@ -146,12 +147,12 @@ class SqpMethod(Method):
                 continue
             result = self.along_path(q, t)
             found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
-        energies = [(self._energy(a.spline), k) for k, a in enumerate(found) if a.spline is not None]
-        return with_effort(found[min(energies)[1]] if energies else failed, found)
+        best = min(found, key=lambda result: prepared.cost_of(result.spline), default=failed)
+        return with_effort(failed if best.spline is None else best, found)
 
+    @abstractmethod
     def along_path(self, q: Array, t: Array) -> SolveResult:
         """Solve from samples q (k, nq) [rad] of a collision-free path at times t (k,), which end at 1."""
-        return SolveResult(SolveStatus.FAILED, "the method has no motion along a path")
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
         """Excess (nq,) [rad] of a motion below and above the position limits.
@@ -164,10 +165,6 @@ class SqpMethod(Method):
     def _coordinates(self, limits: Limits) -> Coordinates:
         """The coordinates of the spline: here every joint by itself."""
         return Coordinates.joints(self.q_start, self.q_goal, limits)
-
-    def _energy(self, spline: Spline) -> float:
-        """Energy of a motion [J], in the objective."""
-        return self.prepared.objective_of(self.prepared.energy(spline))
 
     def _first_stage(self, guess: Guess) -> _Stage:
         prepared, interval = self.prepared, self.interval

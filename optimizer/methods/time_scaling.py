@@ -17,6 +17,7 @@ from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import Guess
 from optimizer.methods.time_optimal_scaling import time_optimal_on_line
 from optimizer.nlp.coordinates import Coordinates
+from optimizer.nlp.sqp import PROGRESS
 from optimizer.solution import BaselineName, Clearance
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
@@ -55,10 +56,10 @@ class TimeScaling(FreeSpline):
         points = bspline.refit(scaling.fractions(coarse)[:, None], coarse, space.knots)
         return self.improve(Guess(space, points, self.t_min))
 
-    def _solve_in(self, space: Basis, q: Array, t: Array) -> SolveResult:
+    def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
         """From samples q (k, nq) at times t (k,): on the straight line, or along the samples if the line collides."""
         if self._collision is None:
-            return super()._solve_in(space, q, t)
+            return super()._solve_in(space, q, t, progress)
         if not self.prepared.surroundings.is_collision_free(q):
             return SolveResult(SolveStatus.FAILED, f"on the straight line, {self._collision.message}")
         return along_path(self, q, self._retimed)

@@ -115,6 +115,4 @@ class _UniformScale:
         if self.prepared.path is not None and (self.prepared.path.ratios(given.q, v) > TORQUE_USED).any():
             return np.inf
         spline = self._retimed(factor)
-        return (
-            spline.duration if self.interval.minimum_time else self.prepared.objective_of(self.prepared.energy(spline))
-        )
+        return spline.duration if self.interval.minimum_time else self.prepared.cost_of(spline)

@@ -15,9 +15,8 @@ from typing import Any
 
 import daqp
 import numpy as np
-import numpy.typing as npt
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.deadline import checkpoint, watched_time_left
 from optimizer.nlp.active_path_constraints import ActivePathConstraints, Index, PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
@@ -36,7 +35,6 @@ RELAXED_ROUNDS = 2
 LEAST_TIME = 0.05
 
 Places = tuple[Index, Index, Index]  # derivative, grid point, coordinate
-Marks = npt.NDArray[np.bool_]
 
 # excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
 BOUND_TOLERANCE = 1e-9
@@ -137,7 +135,7 @@ class _Rows:
         self.places = _joined(self.places, places)
         self.chosen[places] = True
 
-    def add_bounds(self, bounds: Array, wanted: Marks) -> None:
+    def add_bounds(self, bounds: Array, wanted: Mask) -> None:
         """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""
         sides = np.nonzero(wanted & ~self.bounded)
         side, variable = sides
@@ -333,7 +331,7 @@ def _shortened(x: Array, bounds: Array) -> Array:
     return np.asarray(x * np.min(np.abs(most[beyond] / x[beyond]), initial=1.0))
 
 
-def _peaks(size: Array) -> Marks:
+def _peaks(size: Array) -> Mask:
     """Marks the local maxima of size (d, M, r) ≥ 0 along the grid."""
     high = np.ones(size.shape, dtype=bool)
     rising = size[:, 1:] >= size[:, :-1]

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.kinematics.path_constraints import path_constraints_of
 from optimizer.problem.arm import Arm
 from optimizer.replay.piecewise_motion import Indices, PiecewiseMotion
@@ -102,7 +101,7 @@ class LimitMonitor:
         """The worst ratio of every limit."""
         return list(self._worst.values())
 
-    def _note_step(self, name: LimitName, steps: npt.NDArray[np.bool_], t: Array, bounds: Array) -> None:
+    def _note_step(self, name: LimitName, steps: Mask, t: Array, bounds: Array) -> None:
         steps = steps & np.isfinite(bounds)  # a step violates no limit that is infinite
         if steps.any():
             k, j = np.argwhere(steps)[0].tolist()

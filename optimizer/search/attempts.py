@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods import solver_for
@@ -52,7 +50,7 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
         results.append(in_time(incumbent, solver.solve))
     solved = [result for result in results if result.spline is not None]
     if len(solved) > 1:
-        solved.sort(key=lambda result: _objective(incumbent, result))
+        solved.sort(key=lambda result: incumbent.prepared.cost_of(result.spline))
     late = [result for result in results if result.status is SolveStatus.OUT_OF_TIME]
     postponed = [result for result in results if result.status is SolveStatus.POSTPONED]
     incumbent.cut_short |= bool(late) or any(result.cut_short for result in solved)
@@ -69,18 +67,13 @@ def _other_goals(incumbent: Incumbent, candidate: Candidate) -> list[Array]:
     return [other.q_goal for other in list(nearest.values())[:MOST_OTHER_GOALS]]
 
 
-def _objective(incumbent: Incumbent, result: SolveResult) -> float:
-    prepared = incumbent.prepared
-    return np.inf if result.spline is None else prepared.objective_of(prepared.energy(result.spline))
-
-
 def settled(incumbent: Incumbent, candidate: Candidate, result: SolveResult, message: str) -> Candidate | None:
     """A new candidate with the motion of a result as its own; None if there is no motion."""
     if result.spline is None:
         return None
     candidate.attempt = result
     candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, message)
-    candidate.energy = _objective(incumbent, result)
+    candidate.energy = incumbent.prepared.cost_of(result.spline)
     return candidate
 
 

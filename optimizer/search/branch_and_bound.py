@@ -47,7 +47,7 @@ def explore(
             continue
         candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
         if result.spline is not None:
-            candidate.energy = prepared.objective_of(prepared.energy(result.spline))
+            candidate.energy = prepared.cost_of(result.spline)
             if best is None or best.energy is None or candidate.energy < best.energy:
                 best = candidate
     return best

@@ -17,9 +17,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import NEVER, Deadline
 from optimizer.kinematics.angles import wrapped
@@ -217,7 +216,7 @@ class _Family:
         """Whether a box of half sides (nq,) [rad] is not worth splitting."""
         return bool(half[~self._boxes.free].max(initial=0.0) < SMALLEST)
 
-    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def narrowed(self, centre: Array, half: Array) -> tuple[Array, Array, Mask]:
         """Boxes (b, nq) that hold what of the given ones reaches the pose, and which of them (b,) may hold anything."""
         held = np.ones(len(centre), dtype=bool)
         if self._geometry is not None:

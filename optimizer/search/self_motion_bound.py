@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.deadline import NEVER, Deadline
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.self_motion import SelfMotion
@@ -53,7 +53,7 @@ class Cells:
     def __getitem__(self, chosen: NDArray[np.intp]) -> Cells:
         return Cells(self.curve[chosen], self.parameter[chosen], self.half[chosen])
 
-    def halved(self, which: NDArray[np.bool]) -> tuple[Cells, Cells]:
+    def halved(self, which: Mask) -> tuple[Cells, Cells]:
         """Both halves of the cells where `which` (n,) is true; the others twice."""
         half = np.where(which, self.half / 2, self.half)
         step = np.where(which, half, 0.0)

@@ -88,10 +88,10 @@ class _Follower:
 
     def follow(self, restarts: int) -> None:
         """Solve with sharper and sharper corners, from the candidate's motion or from the best of random ones."""
-        coarse = sorted(self._restarted(restarts), key=self._energy)[:FOLLOWED]
+        coarse = sorted(self._restarted(restarts), key=self.incumbent.prepared.cost_of)[:FOLLOWED]
         middle = [self.solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in coarse]
         motions = [self.candidate.spline, *(motion for motion in middle if motion is not None)]
-        best: Spline | None = min(motions, key=self._energy)
+        best: Spline | None = min(motions, key=self.incumbent.prepared.cost_of)
         for width in SHARPER_WIDTHS:
             progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
             best = None if best is None else self.solved(best, width, DENSE, progress)
@@ -145,7 +145,3 @@ class _Follower:
         intervals = duration_intervals(self.incumbent.prepared, self.candidate.q_goal, width=width)
         interval = min(intervals, key=lambda each: max(each.t_min - duration, duration - each.t_max))
         return replace(interval, t_min=interval.t_max) if self.incumbent.problem.objective == "mechanical" else interval
-
-    def _energy(self, spline: Spline) -> float:
-        prepared = self.incumbent.prepared
-        return prepared.objective_of(prepared.energy(spline))

@@ -9,10 +9,9 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import BSpline
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.trajectories import quintic
 from optimizer.trajectories.quadrature import quadrature
 
@@ -79,7 +78,7 @@ class Basis:
     weights: Array
     at_nodes: Array
     at_grid: Array
-    anchors: npt.NDArray[np.bool_]
+    anchors: Mask
 
     degree: ClassVar[int] = DEGREE
     # number of control points that rest fixes at either end

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from models.robot import Array
-from optimizer.collision import clouds
 from optimizer.collision.bounding_tree import BoundingTree, point_segment
 from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
 from optimizer.collision.closed_form_distance import triangle_segment
-from optimizer.collision.clouds import Cloud, cloud_of, divided
+from optimizer.collision.clouds import LONGEST_EDGE, MOST_DIVIDED, MOST_KEPT_PARTS, Cloud, cloud_of, divided
 from optimizer.collision.coal_distance import SKIN, coal_shape
 from optimizer.collision.cores import Core
 from optimizer.collision.model import CollisionModel
@@ -205,7 +204,7 @@ def test_divided_triangles_cover_the_same_surface() -> None:
     def doubled(t: Array) -> Array:
         return np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
 
-    assert np.linalg.norm(pieces - np.roll(pieces, 1, axis=1), axis=2).max() <= clouds.LONGEST_EDGE
+    assert np.linalg.norm(pieces - np.roll(pieces, 1, axis=1), axis=2).max() <= LONGEST_EDGE
     areas = [np.linalg.norm(doubled(t), axis=1).sum() for t in (pieces, triangles)]
     assert areas[0] == pytest.approx(areas[1])
     # distances do not change
@@ -274,16 +273,15 @@ def test_the_planner_rejects_what_collides(kind: str) -> None:
     assert (strict == (distance > 5e-3))[np.abs(distance - 5e-3) > COAL].all()
 
 
-def test_a_repeated_obstacle_is_built_once_and_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_repeated_obstacle_is_built_once_and_memory_is_bounded() -> None:
     points = around(500, 21)
     first = cloud_of(Points(points, 0.01))
     assert cloud_of(Points(points.copy(), 0.02)) is first  # the radius is none of the tree's
+    kept = cloud_of.cache
+    before = kept.currsize
     assert cloud_of(Points(points[:-1], 0.01)) is not first
-    kept = clouds._Kept()
-    monkeypatch.setattr(clouds, "MOST_KEPT_PARTS", 1200)
-    made = [kept.get(Points(points + shift, 0.01)) for shift in range(4)]
-    assert kept.get(Points(points + 3, 0.01)) is made[3] and kept.get(Points(points + 2, 0.01)) is made[2]
-    assert kept.get(Points(points, 0.01)) is not made[0]
+    # the cache counts parts, not obstacles
+    assert kept.currsize == before + 499 and kept.maxsize == MOST_KEPT_PARTS >= MOST_DIVIDED
 
 
 def test_two_obstacles_of_one_content_at_two_places() -> None:

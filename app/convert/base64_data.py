@@ -1,0 +1,16 @@
+"""Bytes that a request gives in base64."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+
+from optimizer.exceptions import InvalidProblem
+
+
+def decoded(data: str, field: str) -> bytes:
+    """The bytes of a field in base64. Raises InvalidProblem at that field."""
+    try:
+        return base64.b64decode(data, validate=True)
+    except binascii.Error:
+        raise InvalidProblem(field, f"{field} is not valid base64: fill it to a multiple of 4 characters.") from None

@@ -1,0 +1,17 @@
+"""A motion replayed by Pinocchio and Coal: how many of its samples are in collision."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from optimizer.collision.model import CollisionModel
+from optimizer.collision.state_validity import StateValidityChecker
+from optimizer.problem.arm import Arm
+from optimizer.trajectories.spline import Spline, sample
+
+
+def collisions(arm: Arm, spline: Spline, period: float) -> int:
+    """Samples of a motion in collision, one every `period` [s] and the last."""
+    checker = StateValidityChecker(arm, CollisionModel(arm))
+    t = np.append(np.arange(0.0, spline.duration, period), spline.duration)
+    return sum(not checker.is_valid(q) for q in sample(spline, t)[0])
