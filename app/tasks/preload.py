@@ -9,9 +9,8 @@ from app.tasks import compare, evaluate, ik_path, optimize, pareto, whatif
 
 __all__ = ["compare", "evaluate", "ik_path", "optimize", "pareto", "whatif"]
 
-# imported where they are called, because the process that answers HTTP does not need them
-for name in ("scipy.stats.qmc", "toppra"):
-    import_module(name)
+# imported where it is called, because the process that answers HTTP does not need it
+import_module("toppra")
 
 # SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
 # end the workers, which must last until the requests in flight are answered.

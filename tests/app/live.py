@@ -28,6 +28,8 @@ GRACE = 60.0
 """`deadline_grace` [s]: on a busy machine, no worker that is about to answer is killed."""
 ANSWER = 120.0
 """Most that an answer may take on a busy machine [s]."""
+CLIENT = httpx2.Client(timeout=ANSWER, limits=httpx2.Limits(max_keepalive_connections=0))
+"""For any thread, with a connection of its own for every request. To make one loads the certificates of all issuers."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +63,10 @@ class Server:
     log: Path
 
     def get(self, path: str) -> httpx2.Response:
-        return httpx2.get(self.url + path, timeout=ANSWER)
+        return CLIENT.get(self.url + path)
 
     def post(self, path: str, body: Any, **options: Any) -> httpx2.Response:
-        return httpx2.post(self.url + path, json=body, timeout=ANSWER, **options)
+        return CLIENT.post(self.url + path, json=body, **options)
 
     def open(self, path: str, body: Any, **headers: str) -> OpenRequest:
         """A POST whose answer nobody waits for, over a connection of its own."""

@@ -16,7 +16,7 @@ import pytest
 
 from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
 from app.schemas.response import OptimizeResponse
-from tests.app.live import ANSWER, EXIT, WARM_UP, Server, alive, processor_time, serving
+from tests.app.live import CLIENT, EXIT, WARM_UP, Server, alive, processor_time, serving
 from tests.app.requests import EXAMPLES, long_search, move
 
 T = TypeVar("T")
@@ -144,7 +144,7 @@ def test_hanging_up_frees_the_worker(server: Server) -> None:
 
 
 def test_a_large_body_is_answered_before_it_is_sent(server: Server) -> None:
-    answer = httpx2.post(server.url + "/optimize", content=b" " * 20_000_000, timeout=ANSWER)
+    answer = CLIENT.post(server.url + "/optimize", content=b" " * 20_000_000)
     assert answer.status_code == 413
     BodyTooLarge.model_validate_json(answer.content)
 

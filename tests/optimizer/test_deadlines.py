@@ -26,6 +26,7 @@ from optimizer.search.reserve import reserve
 from optimizer.whatif import whatif
 from tests.optimizer.cells import at
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
+from tests.selection import long_but
 
 # what the work of a call takes on one core [s]: per node of the kernel, instant of Pinocchio's recursion, forward
 # kinematics, distance by Coal, row of a quadratic program
@@ -90,7 +91,7 @@ HARD: dict[str, Problem] = {
 }
 
 
-@pytest.mark.parametrize("deadline", [0.02, 0.3, 1.0, 2.0])
+@pytest.mark.parametrize("deadline", long_but((0.02, 1.0), (0.02, 0.3, 1.0, 2.0)))
 @pytest.mark.parametrize("kind", HARD)
 def test_nothing_overruns(clock: WorkClock, kind: str, deadline: float) -> None:
     asked = due(HARD[kind], deadline)

@@ -24,14 +24,10 @@ QUICK = (
     "move 2 by time_scaling",
     "move 4 by uniform_scaling",
     "move 5 by bspline",
-    "move 8 by lagrange",
-    "uniformly scaled pose",
     "out of reach",
-    "replay linear",
     "replay with storage",
     "replayed log",
     "inverse kinematics 1",
-    "circle",
     "certificate 1",
 )
 SLOW = (

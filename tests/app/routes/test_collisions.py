@@ -247,9 +247,10 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
 
 def test_compare_and_pareto_keep_clear_too(client: TestClient) -> None:
     request = EXAMPLES["over_a_post"]
-    # all methods; the straight line hits the post
-    compared = answered(client, request | {"deadline": 60.0}, "/compare")["methods"]
-    assert len(compared) == 5 and all(row["valid"] and row["problem"] is None for row in compared)
+    # the straight line hits the post
+    methods = ["bspline", "time_scaling", "lagrange"]
+    compared = answered(client, request | {"methods": methods, "deadline": 60.0}, "/compare")["methods"]
+    assert len(compared) == 3 and all(row["valid"] and row["problem"] is None for row in compared)
     front = answered(client, request | {"points": 2, "duration": {"max": 1.5}}, "/pareto")
     kept = client.get(front["points"][0]["answer"]).json()["answer"]
     assert kept["certificate"]["clearance"]["min_clearance"] >= 0

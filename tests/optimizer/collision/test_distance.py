@@ -56,7 +56,7 @@ def by_coal(model: CollisionModel, q: Array) -> Array:
 @pytest.mark.parametrize("load", LOADS, ids=lambda shape: type(shape).__name__)
 def test_distances_are_coals(load: Shape) -> None:
     model = CollisionModel(arm_in_cell(load))
-    q = configurations(25)
+    q = configurations(12)
     ours, theirs = model.signed_distances(q)[0], by_coal(model, q)
     closed = model.geometry.is_closed_form
     assert closed.sum() > 100 and (~closed).sum() > 20

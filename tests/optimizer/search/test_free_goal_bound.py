@@ -104,9 +104,9 @@ def test_many_starts_are_bounded_together(most: int, monkeypatch: pytest.MonkeyP
     rng = np.random.default_rng(6)
     made, pose = PreparedProblem.of(problem(HOME, GOAL)), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
     starts = HOME + rng.normal(scale=0.05, size=(4, 6))
-    together = family_bound(made, pose, starts, 30)
-    assert 0 < together <= min(family_bound(made, pose, start[None], 60) for start in starts[:2])
-    assert family_bound(made, pose, np.concatenate([starts, GOAL[None]]), 30) == 0
+    together = family_bound(made, pose, starts, 20)
+    assert 0 < together <= min(family_bound(made, pose, start[None], 40) for start in starts[:2])
+    assert family_bound(made, pose, np.concatenate([starts, GOAL[None]]), 10) == 0
 
 
 def test_the_rim_of_the_tools_cone_is_covered() -> None:

@@ -213,11 +213,11 @@ def test_standing_still_costs_idling() -> None:
 
 def test_the_bound_is_the_least_over_the_duration() -> None:
     """Against bounds at two thousand fixed durations: none is lower, and the least of them is as low."""
-    for name in ("as it comes", "hardly idle", "wide reversal"):
+    for name in ("as it comes", "wide reversal"):
         torques = Torques(problem(**CONDITIONS[name]))
-        start, goal = ends(7, 4)
+        start, goal = ends(7, 2)
         free, shortest = bound(torques, start, goal)
-        for k in range(4):
+        for k in range(2):
             times = np.geomspace(shortest[k], LONGEST_DURATION, 2000)
             each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[::20]]
             assert free[k] <= min(each) * (1 + EXACT)
