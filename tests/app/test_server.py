@@ -175,7 +175,7 @@ def test_survives_garbage_on_the_socket(server: Server) -> None:
 def test_sigterm_answers_or_refuses_all_in_flight() -> None:
     # the grace is ample for the short ones on a busy machine, and too short for those that wait
     with serving(workers=2, queue_size=4, shutdown_grace=10) as server, ThreadPoolExecutor(5) as pool:
-        short = start_work(server, lambda: in_background(pool, server, long_search(deadline=3), 2), workers=2)
+        short = start_work(server, lambda: in_background(pool, server, long_search(deadline=2), 2), workers=2)
         waiting = in_background(pool, server, long_search(deadline=60), 3)
         everyone = server.descendants()
         # a service manager signals every process
@@ -204,7 +204,7 @@ def test_sigterm_while_the_workers_warm_up() -> None:
 def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
-        (future,) = in_background(pool, server, long_search(deadline=4))
+        (future,) = in_background(pool, server, long_search(deadline=2))
         # a terminal signals the whole foreground group
         for pid in (*everyone, server.process.pid):
             os.kill(pid, signal.SIGINT)

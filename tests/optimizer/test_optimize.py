@@ -166,7 +166,7 @@ SHORT: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", long_but(("electrical", "mechanical"), SHORT))
+@pytest.mark.parametrize("name", long_but(("electrical",), SHORT))
 def test_short_moves_are_not_beaten(name: str) -> None:
     """Of a milliradian to some hundredths: so slow that friction's reversal, which is smoothed, is all of the way."""
     rng = np.random.default_rng(44)

@@ -170,7 +170,7 @@ HARD = problem(np.array([0, -1.57, 1.57, -1.57, -1.57, 0]), np.array([1.2, -0.9,
     "given",
     [
         {"limits": limits(tau_max=[45, 45, 45, 20, 20, 20])},
-        {"payload": Payload(mass=5.0, com=np.array([0.0, 0.0, 2.8]))},
+        pytest.param({"payload": Payload(mass=5.0, com=np.array([0.0, 0.0, 2.8]))}, marks=pytest.mark.long),
     ],
     ids=["weak", "far"],
 )
@@ -218,7 +218,7 @@ def seeded(seed: int) -> dict[str, Problem]:
 
 
 # fronts that take many seconds
-SLOW = {"storage", "free goal", "isolated", "payload", "mechanical", "weak motors", "bounded"}
+SLOW = {"storage", "cycle", "free goal", "isolated", "payload", "mechanical", "weak motors", "bounded"}
 SEEDED = [
     pytest.param(seed, kind, marks=pytest.mark.long if seed or kind in SLOW else ())
     for seed in range(6)

@@ -134,7 +134,7 @@ def test_a_pose_needs_inverse_kinematics(robot: Robot, end: str, target: Any, se
     assert refusal.value.field == end
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", long_but([each for each in METHODS if each != "polynomial_ga"], METHODS))
 def test_every_method(method: MethodName) -> None:
     solution = optimize(problem(serial_chain(3), method=method))
     assert solution.certificate.valid and solution.lower_bound <= solution.energy.electrical.total

@@ -259,7 +259,7 @@ def test_the_proof_is_that_of_the_parts(kind: str, seed: int) -> None:
         assert ours.min_clearance == pytest.approx(theirs.min_clearance, abs=slack + THICKNESS + COAL)
 
 
-@pytest.mark.parametrize("kind", ["points", "voxels", "triangles"])
+@pytest.mark.parametrize("kind", long_but(("points",), ("points", "voxels", "triangles")))
 def test_the_planner_rejects_what_collides(kind: str) -> None:
     arm = arm_in_cell(scene=Scene([Obstacle("cloud", shapes()[kind][0], POSE, MARGIN)]))
     model = CollisionModel(arm)

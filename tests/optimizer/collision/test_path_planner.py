@@ -37,6 +37,7 @@ from optimizer.trajectories.spline import sample
 from tests.optimizer.cells import LOADS, arm_in_cell, cell
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import ROBOT, problem_with
+from tests.selection import long_but
 
 # s: ample, so that a seed and not the machine's load decides what is found
 AMPLE = 60.0
@@ -228,7 +229,7 @@ def problem(arm: Arm, q_start: Array, q_goal: Array) -> Problem:
     return problem_with(q_start, q_goal, windings=False, **given)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("name", long_but(("post", "shelf", "trap"), TASKS))
 def test_motions_avoid_the_obstacles(name: str) -> None:
     arm, q_start, q_goal = task(name)
     found = optimize(problem(arm, q_start, q_goal))

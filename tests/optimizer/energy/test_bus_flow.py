@@ -249,7 +249,8 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
 @pytest.mark.parametrize("bus", BUSES, ids=lambda bus: f"{bus.mode} {bus.efficiency} {bus.initial}")
 def test_bounds_hold_on_every_bus(bus: Bus) -> None:
     """The energies of optimised motions over other buses, too: every motion is one that each bus allows."""
-    for name, move in MOVES.items():
+    for name in ("down", "up"):
+        move = MOVES[name]
         task = PreparedProblem.of(problem(**move, payload=HEAVY, bus=bus))
         start, goal = np.array(move["start"], dtype=float), np.array(move["goal"], dtype=float)
         potential_gain = task.potential(goal) - task.potential(start)

@@ -23,6 +23,7 @@ from optimizer.problem.tool_cone import ToolCone
 from optimizer.trajectories import bspline, quintic
 from optimizer.trajectories.spline import least_time_scale, retimed, spline_of
 from tests.optimizer.moves import ROBOT, problem_with
+from tests.selection import long_but
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 GOAL = np.array([-1.8, -1.57, 1.57, -1.57, -1.57, 0.0])
@@ -67,7 +68,7 @@ def planned_path(prepared: PreparedProblem) -> Array:
     return to_goal(method, plan(method))[0]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", long_but(("bspline", "time_scaling", "polynomial_ga"), METHODS))
 def test_the_error_names_the_colliding_pair(method: MethodName, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(planned_paths, "MOST_STATES", FEW_STATES)
     problem = blocked(method, WALL)

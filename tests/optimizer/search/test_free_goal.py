@@ -196,7 +196,8 @@ def test_what_is_freer_costs_no_more(number: int) -> None:
     assert energy(free) <= energy(five) * (1 + FOUND)
 
 
-@pytest.mark.parametrize("number", long_but([0], range(2)))
+@pytest.mark.long
+@pytest.mark.parametrize("number", range(2))
 def test_free_is_no_worse_than_any_orientation_sampled(number: int) -> None:
     """Twelve orientations that the search has not seen, each solved as a request of its own."""
     pose = ConeOrientedPose(POSITIONS[number].T[:3, 3])

@@ -151,6 +151,7 @@ def test_a_branch_may_be_asked_for_on_its_singularity() -> None:
     assert min(both) == pytest.approx(energy(solved(START, tcp_pose(STRAIGHT), windings=False)), rel=REFINED)
 
 
+@pytest.mark.long
 def test_one_of_several_targets_and_a_store() -> None:
     """A store's answer is found again among the candidates, whose samples do not hold it."""
     targets = AnyOf((tcp_pose(STRETCHED), tcp_pose(STRAIGHT)))
