@@ -1,4 +1,4 @@
-"""Robots by name: reads a robot's URDF and figures from this package."""
+"""Robots by name: a robot is a folder of this package with a file of figures."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ import yaml
 
 from models.arrays import read_only
 from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, LinkCapsule, Robot, link_names
+from models.urdf import urdf_of
 
-ROBOTS = ("ur5e",)
+FIGURES = "figures.yaml"
 # Pinocchio's name of a revolute joint about z
 REVOLUTE = "JointModelRZ"
 
 
+@cache
 def robot_names() -> tuple[str, ...]:
-    """Names that `load_robot` knows."""
-    return ROBOTS
+    """Names that `load_robot` knows: the folders beside this module that hold figures."""
+    return tuple(sorted(folder.name for folder in files("models").iterdir() if (folder / FIGURES).is_file()))
 
 
 _LOADING = threading.Lock()
@@ -39,7 +41,7 @@ def load_robot(name: str) -> Robot:
 @cache
 def _load_robot(name: str) -> Robot:
     figures = load_figures(name)
-    model = _load_model(name)
+    model = _model(name, figures)
     drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
     model.armature = drives.rotor_inertia
     limits, electronics, motion = figures["limits"], figures["electronics"], figures["default_motion"]
@@ -75,24 +77,19 @@ def load_figures(name: str) -> dict[str, Any]:
 
     Raises LookupError for a name that is not in `robot_names()`.
     """
-    figures: dict[str, Any] = yaml.safe_load(_read(name, "figures.yaml"))
+    if name not in robot_names():
+        raise LookupError(f"There is no robot named {name!r}: use one of {', '.join(robot_names())}.")
+    figures: dict[str, Any] = yaml.safe_load((files("models") / name / FIGURES).read_text(encoding="utf-8"))
     return figures
 
 
-def _load_model(name: str) -> pin.Model:
-    """The URDF as a Pinocchio model. Raises ValueError if it is not a chain of revolute joints about z to `flange`."""
-    model = pin.buildModelFromXML(_read(name, f"{name}.urdf"))
-    # the kinematics are those of axes along z, and of an angle for each joint
-    chain = list(model.parents)[1:] == list(range(model.njoints - 1))
-    if not (chain and all(j.shortname() == REVOLUTE for j in list(model.joints)[1:]) and model.existFrame("flange")):
-        raise ValueError(f"{name}.urdf must be a chain of revolute joints about z with a link named `flange`.")
+def _model(name: str, figures: dict[str, Any]) -> pin.Model:
+    """The Pinocchio model of a robot's figures. Raises ValueError if a joint is no revolute joint about z."""
+    model = pin.buildModelFromXML(urdf_of(name, figures))
+    # Pinocchio takes a joint without bounds, or about another axis, for one of another kind
+    if any(joint.shortname() != REVOLUTE for joint in list(model.joints)[1:]):
+        raise ValueError(f"{name}: every joint must be a revolute joint about z.")
     return model
-
-
-def _read(name: str, file: str) -> str:
-    if name not in ROBOTS:
-        raise LookupError(f"There is no robot named {name!r}: use one of {', '.join(ROBOTS)}.")
-    return (files("models") / name / file).read_text(encoding="utf-8")
 
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:

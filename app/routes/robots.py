@@ -13,22 +13,16 @@ from app.schemas import errors as problems
 from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from models.registry import load_robot, robot_names
 from models.robot import Robot
+from models.trust import TRUST, energy_trust
 
 router = APIRouter(prefix="/robots", tags=["robots"])
 
-TRUST = {
-    "A": "maker's own file or data packet",
-    "B": "fitted to measured data",
-    "C": "value from a paper, quoted second-hand",
-    "T": "transferred from a sister robot",
-    "E": "engineering default, no source",
-}
 _SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion")
 
 
 @router.get("", summary="All robots", response_model=RobotList, responses=problem_responses())
 def list_robots() -> RobotList:
-    """Names, titles and joints of all robots."""
+    """Names, titles and joints of all robots, and what their energies rest on."""
     return RobotList(robots=[RobotSummary(**_summary(load_robot(name))) for name in robot_names()])
 
 
@@ -65,4 +59,9 @@ def _friction(robot: Robot) -> Friction:
 
 
 def _summary(robot: Robot) -> dict[str, Any]:
-    return {"name": robot.name, "title": robot.title, "joints": list(robot.joint_names)}
+    return {
+        "name": robot.name,
+        "title": robot.title,
+        "joints": list(robot.joint_names),
+        "energy_trust": energy_trust(robot.figures),
+    }

@@ -52,6 +52,11 @@ class RobotSummary(Response):
     joints: list[str] = described(
         "Names of the joints, from base to flange.", None, ["shoulder_pan_joint", "shoulder_lift_joint"]
     )
+    energy_trust: str = described(
+        "What the energies of this robot rest on, from the trust letters of its parameters.",
+        None,
+        "Energies rest on the maker's own figures (link masses) and figures fitted to measured data (friction).",
+    )
 
 
 class RobotList(Response):

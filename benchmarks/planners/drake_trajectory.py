@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from pydrake.trajectories import BsplineTrajectory
 from benchmarks.motion import SplineMotion
 from benchmarks.planners.planner import CONTROL_POINTS, NODES
 from models.robot import Array, Robot
+from models.urdf import urdf_of
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.seven_segment import shortest_duration
 
@@ -152,8 +152,7 @@ class _Energy:
 def _plant(robot: Robot) -> MultibodyPlant:
     """The robot's URDF with rotor inertia and effort limits on its joints."""
     plant = MultibodyPlant(0.0)
-    urdf = (files("models") / robot.name / f"{robot.name}.urdf").read_text(encoding="utf-8")
-    Parser(plant).AddModelsFromString(urdf, "urdf")
+    Parser(plant).AddModelsFromString(urdf_of(robot.name, robot.figures), "urdf")
     plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base"))
     limits = robot.limits
     effort = limits.tau_max - robot.friction.torque(limits.v_max)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pickle
+import shutil
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ import pytest
 from models import registry
 from models.registry import load_figures, load_robot, robot_names
 from models.robot import Array, Robot
+from models.trust import energy_trust
+from models.urdf import urdf_of
 
 # double precision over a product of seven matrices of entries about 1
 ROUNDING = 1e-14
@@ -167,23 +171,49 @@ def test_the_elbow_is_a_figure(robot: Robot, monkeypatch: pytest.MonkeyPatch) ->
     assert registry._load_robot.__wrapped__("ur5e").elbow is None
 
 
-@pytest.mark.parametrize(
-    ("sound", "broken"),
-    [
-        ('<axis xyz="0 0 1"/>', '<axis xyz="0 1 0"/>'),
-        ('type="revolute"', 'type="prismatic"'),
-        ('type="revolute"', 'type="continuous"'),
-        ('"flange"', '"tool0"'),
-    ],
-)
-def test_another_kind_of_chain_is_refused(sound: str, broken: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("part", ["joint_names", "joint_origin", "link_names"])
+def test_figures_of_another_number_of_joints_are_refused(part: str) -> None:
+    figures = load_figures("ur5e")
+    figures["kinematics"][part]["value"] = figures["kinematics"][part]["value"][:-1]
+    with pytest.raises(ValueError, match=r"shorter|longer"):
+        urdf_of("ur5e", figures)
+
+
+def test_the_model_is_that_of_another_reader_of_the_urdf(robot: Robot) -> None:
+    """The text is plain URDF: what Pinocchio reads from a file of it is the robot's model."""
+    model = pin.buildModelFromXML(urdf_of("ur5e", robot.figures))
+    model.armature = robot.drives.rotor_inertia
+    assert model == robot.model
+
+
+def test_a_joint_that_is_not_a_plain_revolute_one_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Kinematics here are of angles about z, one a joint: any other axis would give wrong poses without a word."""
-    texts = {file: registry._read("ur5e", file) for file in ("ur5e.urdf", "figures.yaml")}
-    assert sound in texts["ur5e.urdf"]
-    texts["ur5e.urdf"] = texts["ur5e.urdf"].replace(sound, broken)
-    monkeypatch.setattr(registry, "_read", lambda _, file: texts[file])
-    with pytest.raises(ValueError, match="revolute joints about z"):
+    sound = registry.urdf_of
+    monkeypatch.setattr(registry, "urdf_of", lambda *given: sound(*given).replace("0 0 1", "0 1 0", 1))
+    with pytest.raises(ValueError, match="revolute joint about z"):
         registry._load_robot.__wrapped__("ur5e")
+
+
+def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """No code names a robot: a second folder beside the first is found and loaded."""
+    for name in ("ur5e", "other"):
+        shutil.copytree(Path(registry.__file__).parent / "ur5e", tmp_path / name)
+    (tmp_path / "no_robot").mkdir()
+    monkeypatch.setattr(registry, "files", lambda _: tmp_path)
+    assert registry.robot_names.__wrapped__() == ("other", "ur5e")
+    monkeypatch.setattr(registry, "robot_names", registry.robot_names.__wrapped__)
+    assert registry._load_robot.__wrapped__("other").model.name == "other"
+
+
+def test_the_sentence_on_energies_is_made_from_the_letters(robot: Robot) -> None:
+    told = energy_trust(robot.figures)
+    assert "transferred from a sister robot (copper loss, idle power" in told and told.count(".") == 1
+    figures = load_figures("ur5e")
+    figures["drives"]["copper"]["trust"] = "A"
+    assert "torque constants, copper loss)" in energy_trust(figures)
+    for _, figure in leaves(figures):
+        figure["trust"] = "E"
+    assert energy_trust(figures).startswith("Energies rest on engineering defaults without a source (link masses")
 
 
 def test_every_link_has_capsules(robot: Robot) -> None:

@@ -1,0 +1,62 @@
+"""The URDF of a robot, made from its figures: a chain of revolute joints about z, from `base` to `flange`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+BASE, FLANGE = "base", "flange"
+
+
+def urdf_of(name: str, figures: dict[str, Any]) -> str:
+    """The URDF text. Raises ValueError if a figure has not one entry for each joint.
+
+    A joint turns about the z axis of the frame that its origin gives in the frame of the link before. The root link is
+    `base`, the last one `flange`.
+    """
+    kinematics, inertials, limits = figures["kinematics"], figures["inertials"], figures["limits"]
+    links = kinematics["link_names"]["value"]
+    robot = Element("robot", name=name)
+    SubElement(robot, "link", name=BASE)
+    columns = (
+        [BASE, *links[:-1]],
+        links,
+        *(kinematics[part]["value"] for part in ("joint_names", "joint_origin")),
+        *(inertials[part]["value"] for part in ("mass", "center_of_mass", "inertia_frame_rpy", "inertia")),
+        *(limits[part]["value"] for part in ("position_min", "position_max", "velocity", "torque")),
+    )
+    for parent, child, joint, origin, mass, com, rpy, inertia, lower, upper, velocity, torque in zip(
+        *columns, strict=True
+    ):
+        element = _joint(robot, joint, "revolute", parent, child, origin)
+        SubElement(element, "axis", xyz="0 0 1")
+        bounds = {"lower": lower, "upper": upper, "velocity": velocity, "effort": torque}
+        SubElement(element, "limit", {key: repr(float(value)) for key, value in bounds.items()})
+        _link(robot, child, mass, [*com, *rpy], inertia)
+    _joint(robot, "flange_joint", "fixed", links[-1], FLANGE, kinematics["flange_origin"]["value"])
+    SubElement(robot, "link", name=FLANGE)
+    return ElementTree.tostring(robot, encoding="unicode", xml_declaration=True)
+
+
+def _joint(robot: Element, name: str, kind: str, parent: str, child: str, origin: Sequence[float]) -> Element:
+    element = SubElement(robot, "joint", name=name, type=kind)
+    SubElement(element, "parent", link=parent)
+    SubElement(element, "child", link=child)
+    _origin(element, origin)
+    return element
+
+
+def _link(robot: Element, name: str, mass: float, origin: Sequence[float], inertia: Sequence[float]) -> None:
+    body = SubElement(SubElement(robot, "link", name=name), "inertial")
+    _origin(body, origin)
+    SubElement(body, "mass", value=repr(float(mass)))
+    entries = zip(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), inertia, strict=True)
+    SubElement(body, "inertia", {key: repr(float(value)) for key, value in entries})
+
+
+def _origin(element: Element, origin: Sequence[float]) -> None:
+    """An origin: x, y, z [m], then roll, pitch, yaw [rad] about fixed axes."""
+    x, y, z, roll, pitch, yaw = (repr(float(value)) for value in origin)
+    SubElement(element, "origin", xyz=f"{x} {y} {z}", rpy=f"{roll} {pitch} {yaw}")
