@@ -30,8 +30,9 @@ STRETCHED = 5e-10
 # distance [m] from an edge of the reach within which the two branches that meet there count as one: a pose on the edge,
 # rounded to double precision, lies that near
 EDGE = 1e-13
-# angle [rad] that a pose rounded to double precision leaves open in q2 + q3 + q4, times the wrist's sine
-HEADING = 1e-14
+# angle [rad] that a pose rounded to double precision leaves open in q2 + q3 + q4, times the wrist's sine. Next to a
+# singular shoulder the first angle is open, too: by this over `ahead` [m], as far as LEAST_AHEAD
+HEADING, LEAST_AHEAD = 1e-14, 1e-5
 # the excess is small against the circle that the fourth axis moves on: the second step meets the last digit
 NEWTON_STEPS = 4
 # a part of the label is singular where its sine, or the shoulder's distance [m], is below this: nearer to it, a pose
@@ -168,7 +169,8 @@ class URClosedForm:
             along = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             above = -(s6 * r31 + c6 * r32)
             height = pz - self.d6 * r33 - self.d1
-            turn, x, z = self._turned_into_reach(ahead, height, along, above, HEADING / sine)
+            slack = HEADING / (sine * min(1.0, max(abs(ahead), LEAST_AHEAD)))
+            turn, x, z = self._turned_into_reach(ahead, height, along, above, slack)
             found.append((q5, q6 - turn if w > 0 else q6 + turn, sin_q5, x, z, atan2(along, -above) + turn))
         return found
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from models.robot import Array
 from optimizer.kinematics.inverse import MEMBERS, IKSolution
 from optimizer.kinematics.self_motion import SelfMotion
+from optimizer.kinematics.ur_closed_form import URClosedForm
 from optimizer.problem.branches import BranchFilter
 from tests.optimizer.kinematics.flange import (
     ACCURACY,
@@ -23,6 +25,7 @@ from tests.optimizer.kinematics.flange import (
     joints,
     pose,
 )
+from tests.optimizer.moves import ROBOT
 
 # next to an edge of the reach, a rounding of the pose by 1e-16 m moves elbow and shoulder by its square root [rad]
 FOUND_ON_AN_EDGE = 2e-6
@@ -50,11 +53,36 @@ def test_a_singular_elbow_is_a_solution_like_any_other(q: Array, elbow: float) -
     nearest = min(solutions, key=lambda each: float(apart(each.q, q)))
     if abs(np.sin(q[4])) < 1e-4:
         return  # wrist and elbow at once: the tests of self-motions
-    assert apart(nearest.q, q) < FOUND_ON_AN_EDGE
-    assert "elbow" in nearest.singular
+    # next to a stretched wrist the same rounding moves the fifth axis by its inverse sine
+    assert apart(nearest.q, q) < FOUND_ON_AN_EDGE * max(1.0, 0.1 / np.sqrt(abs(np.sin(q[4]))))
+    assert "elbow" in nearest.singular or abs(np.sin(q[4])) < 1e-2
     assert nearest.self_motion is None
     for part in ("up", "down"):
         assert BranchFilter(elbow=part).allows(nearest.label, nearest.singular)
+
+
+def test_next_to_three_singularities_at_once_a_pose_is_answered() -> None:
+    """A stretched elbow, and shoulder and wrist next to their singularities: rounding carries the arm out of reach."""
+    rng, form = np.random.default_rng(0), URClosedForm.of(ROBOT.model)
+    assert form is not None
+    answered = 0
+    while answered < 150:
+        q = rng.uniform(-2 * np.pi, 2 * np.pi, 6)
+        q[2], q[4] = rng.choice([0, np.pi, -np.pi]), 10 ** rng.uniform(-4, -1) * rng.choice([-1, 1])
+        # lift angles at which the last axis meets the first one, to within a micrometre and a decimetre
+        lifts = np.linspace(-3, 3, 41)
+        ahead = [form._ahead(np.array([q[0], lift, *q[2:]])) for lift in lifts]
+        crossings = [k for k in range(40) if ahead[k] * ahead[k + 1] < 0]
+        if not crossings:
+            continue
+        k = crossings[0]
+        root = brentq(lambda lift, q=q: form._ahead(np.array([q[0], lift, *q[2:]])), lifts[k], lifts[k + 1])
+        q[1] = root + 10 ** rng.uniform(-6, -1) * rng.choice([-1, 1])
+        T = forward(q)
+        solutions = IK.solve(T, windings=False)
+        assert solutions
+        assert max(max(errors(T, each.q)) for each in solutions) < ACCURACY
+        answered += 1
 
 
 def test_an_edge_of_the_elbow_next_to_a_stretched_wrist_is_in_reach() -> None:
