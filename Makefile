@@ -9,6 +9,9 @@
 PYTHON ?= python3
 HOST ?= 127.0.0.1
 PORT ?= 8000
+# robots whose kernels are compiled before the service starts, separated by commas; others at their first request
+JOULEPATH_ROBOTS ?= ur5e
+export JOULEPATH_ROBOTS
 VENV := .venv
 PY := $(VENV)/bin/python
 INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps
@@ -21,6 +24,7 @@ export CC := $(abspath $(COMPILER))
 endif
 
 export PYTHONUNBUFFERED := 1
+comma := ,
 
 .PHONY: serve test test-long bench lock clean lint kernels pytest pytest-long
 
@@ -51,7 +55,7 @@ bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
 kernels: $(VENV)/.runtime $(COMPILER)
-	@$(PY) -m optimizer.energy.precompile
+	@$(PY) -m optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS))
 
 # The dev lockfile holds the runtime one whole, at the same versions.
 $(VENV)/.runtime: requirements.lock $(PY)

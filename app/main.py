@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 
 from fastapi import FastAPI
 
@@ -83,7 +84,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
-    app.state.engine = engine = Engine(settings, warm)
+    app.state.engine = engine = Engine(settings, partial(warm, settings.robots))
     app.state.store = store = Store(settings.database_url)
     engine.start()
     # in the background: requests that need no database do not wait for it

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import AliasChoices, Field, field_validator
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 
 def _default_database() -> str:
@@ -32,6 +32,11 @@ class Settings(BaseSettings):
         default_factory=lambda: len(os.sched_getaffinity(0)),
         ge=1,
         description="Worker processes; each solves one request at a time. Default: the CPUs that this process may use.",
+    )
+    robots: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=("ur5e",),
+        description="Robots whose kernels every worker loads before it is ready, separated by commas; others at "
+        "their first request.",
     )
     queue_size: int = Field(
         default=16, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
@@ -71,3 +76,18 @@ class Settings(BaseSettings):
     answers_max_age: float = Field(
         default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."
     )
+
+    @field_validator("robots", mode="before")
+    @classmethod
+    def _names(cls, given: Any) -> Any:
+        return tuple(name.strip() for name in given.split(",") if name.strip()) if isinstance(given, str) else given
+
+    @field_validator("robots")
+    @classmethod
+    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        from models.registry import robot_names  # the default needs no check, and the service starts sooner
+
+        unknown = [name for name in names if name not in robot_names()]
+        if unknown:
+            raise ValueError(f"there is no robot named {unknown[0]!r}: use some of {', '.join(robot_names())}")
+        return names

@@ -19,6 +19,15 @@ _QUARTER = np.pi / 2
 # for each link its mesh, and the mesh's position [m] and roll, pitch, yaw [rad] in the link frame: the meshes do not
 # say where they stand. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
 PLACEMENTS: dict[str, dict[str, tuple[str, list[float], list[float]]]] = {
+    "ur3e": {
+        "base": ("base", [0, 0, 0], [0, 0, np.pi]),
+        "shoulder": ("shoulder", [0, 0, 0], [0, 0, np.pi]),
+        "upper_arm": ("upperarm", [0, 0, 0.12], [_QUARTER, 0, -_QUARTER]),
+        "forearm": ("forearm", [0, 0, 0.027], [_QUARTER, 0, -_QUARTER]),
+        "wrist_1": ("wrist1", [0, 0, -0.104], [_QUARTER, 0, 0]),
+        "wrist_2": ("wrist2", [0, 0, -0.08535], [0, 0, 0]),
+        "wrist_3": ("wrist3", [0, 0, -0.0921], [_QUARTER, 0, 0]),
+    },
     "ur5e": {
         "base": ("base", [0, 0, 0], [0, 0, np.pi]),
         "shoulder": ("shoulder", [0, 0, 0], [0, 0, np.pi]),
@@ -27,7 +36,7 @@ PLACEMENTS: dict[str, dict[str, tuple[str, list[float], list[float]]]] = {
         "wrist_1": ("wrist1", [0, 0, -0.127], [_QUARTER, 0, 0]),
         "wrist_2": ("wrist2", [0, 0, -0.0997], [0, 0, 0]),
         "wrist_3": ("wrist3", [0, 0, -0.0989], [_QUARTER, 0, 0]),
-    }
+    },
 }
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from models.registry import robot_names
+from collections.abc import Sequence
+
 from optimizer.optimize import warm_up
 
 
-def warm() -> None:
-    """Loads robots and kernels, so that the first request need not wait for them."""
-    for name in robot_names():
+def warm(robots: Sequence[str]) -> None:
+    """Loads robots and their kernels, so that the first request for one of them need not wait."""
+    for name in robots:
         warm_up(name)

@@ -5,7 +5,7 @@ request may change (payload, gravity, drives, friction, objective) is a paramete
 system's C compiler and stored on disk: see `kernel_cache`. Until the compiled library exists, or if there is no
 compiler, CasADi's virtual machine evaluates the same expressions.
 
-`python -m optimizer.energy.precompile` compiles the kernels of all robots.
+`python -m optimizer.energy.precompile` compiles the kernels of all robots, or of those named.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What capsules hold: the proof over whole triangles against points of surfaces, and the UR5e against its meshes."""
+"""What capsules hold: the proof over whole triangles against points of surfaces, and robots against their meshes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ import pytest
 from models.capsule_cover import SMALLEST, not_held, outside
 from models.meshes import KINDS, PLACEMENTS, link_surfaces, sampled
 from models.registry import load_robot
-from models.robot import Array, LinkCapsule
+from models.robot import Array, LinkCapsule, Robot
 
 # m; double precision of sums of a few squares of lengths below 1 m
 ROUNDING = 1e-12
-ROBOT = load_robot("ur5e")
+ROBOTS = [load_robot(name) for name in PLACEMENTS]
 
 
-def meshes() -> Path:
-    """The folder of the UR5e's meshes in the package that ships them, which need not be imported."""
+def meshes(robot: str) -> Path:
+    """The folder of a robot's meshes in the package that ships them, which need not be imported."""
     package = find_spec("airo_models")
     assert package is not None and package.origin is not None, "a development dependency: `make test` installs it"
-    return Path(package.origin).parent / "arms" / "ur5e"
+    return Path(package.origin).parent / "arms" / robot
+
+
+def label(value: object) -> str:
+    return value.name if isinstance(value, Robot) else str(value)
 
 
 def capsule(begin: list[float], end: list[float], radius: float) -> LinkCapsule:
@@ -34,11 +38,11 @@ def triangles(*corners: list[list[float]]) -> Array:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("link", ROBOT.link_names)
-def test_capsules_hold_every_surface(link: str, kind: str) -> None:
+@pytest.mark.parametrize(("robot", "link"), [(robot, link) for robot in ROBOTS for link in robot.link_names], ids=label)
+def test_capsules_hold_every_surface(robot: Robot, link: str, kind: str) -> None:
     """Every triangle of the maker's meshes, wherever it is: no point is sampled."""
-    capsules = [each for each in ROBOT.capsules if ROBOT.link_names[each.link] == link]
-    surface = link_surfaces(meshes(), "ur5e", link)[kind]
+    capsules = [each for each in robot.capsules if robot.link_names[each.link] == link]
+    surface = link_surfaces(meshes(robot.name), robot.name, link)[kind]
     assert len(surface) > 100
     assert not len(not_held(surface, capsules))
     # the same by points of the surfaces, and the test would see a radius that is 2 mm too small
@@ -46,18 +50,21 @@ def test_capsules_hold_every_surface(link: str, kind: str) -> None:
     assert outside(points, capsules).min(axis=0).max() <= ROUNDING
 
 
-@pytest.mark.parametrize("number", range(len(ROBOT.capsules)))
-def test_no_capsule_is_idle(number: int) -> None:
+@pytest.mark.parametrize(
+    ("robot", "number"), [(robot, number) for robot in ROBOTS for number in range(len(robot.capsules))], ids=label
+)
+def test_no_capsule_is_idle(robot: Robot, number: int) -> None:
     """Each holds some of a surface alone: 2 mm less of any radius, and a surface is outside."""
-    own = ROBOT.capsules[number]
-    others = [each for each in ROBOT.capsules if each.link == own.link and each is not own]
+    own = robot.capsules[number]
+    others = [each for each in robot.capsules if each.link == own.link and each is not own]
     smaller = LinkCapsule(own.link, own.axis, own.radius - 2e-3)
-    surfaces = link_surfaces(meshes(), "ur5e", ROBOT.link_names[own.link])
+    surfaces = link_surfaces(meshes(robot.name), robot.name, robot.link_names[own.link])
     assert any(len(not_held(surface, [smaller, *others])) for surface in surfaces.values())
 
 
-def test_every_link_has_meshes() -> None:
-    assert tuple(PLACEMENTS["ur5e"]) == ROBOT.link_names
+@pytest.mark.parametrize("robot", ROBOTS, ids=label)
+def test_every_link_has_meshes(robot: Robot) -> None:
+    assert tuple(PLACEMENTS[robot.name]) == robot.link_names
 
 
 def test_a_triangle_between_two_capsules_is_not_held() -> None:

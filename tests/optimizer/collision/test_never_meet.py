@@ -17,37 +17,35 @@ from scipy.spatial import ConvexHull
 
 from models.capsule_cover import cut
 from models.meshes import link_surfaces
-from models.registry import load_robot
-from models.robot import Array
+from models.registry import load_robot, robot_names
+from models.robot import Array, Robot
 from optimizer.collision.coal_distance import coal_shape
 from optimizer.collision.cores import Core
 from optimizer.kinematics.forward import joint_placements, link_frames
 from tests.models.test_capsule_cover import meshes
 
-ROBOT = load_robot("ur5e")
-PLACEMENTS = joint_placements(ROBOT.model)
 # distances [m] that the links keep, as figures.yaml states them
-BY_HULLS = {(3, 5): 0.005, (4, 6): 0.010}
-BY_SURFACE = {(0, 2): 0.005}
+BY_HULLS = {("ur5e", 3, 5): 0.005, ("ur5e", 4, 6): 0.010, ("ur3e", 4, 6): 0.010}
+BY_SURFACE = {("ur5e", 0, 2): 0.005, ("ur3e", 0, 2): 0.005}
 # largest edge of a piece of a surface [m], and range of an angle that is looked at first [rad]
 EDGE, FIRST_STEP = 4e-3, np.deg2rad(8.0)
 # height [m] of the base below which it is widest
-FOOT = 0.074
+FOOT = {"ur5e": 0.074, "ur3e": 0.03}
 
 
-def hull(link: int) -> Array:
+def hull(robot: Robot, link: int) -> Array:
     """Vertices (k, 3) [m] of the convex hull of both meshes of a link."""
-    surfaces = link_surfaces(meshes(), "ur5e", ROBOT.link_names[link]).values()
+    surfaces = link_surfaces(meshes(robot.name), robot.name, robot.link_names[link]).values()
     points = np.concatenate([surface.reshape(-1, 3) for surface in surfaces])
     return np.asarray(points[ConvexHull(points).vertices])
 
 
-def distances(first: int, second: int, angles: Array) -> Array:
+def distances(robot: Robot, first: int, second: int, angles: Array) -> Array:
     """Distances (k,) [m] of the hulls of two links at angles (k, 2) [rad] of the two joints between them."""
-    q = np.zeros((len(angles), ROBOT.nq))
+    q = np.zeros((len(angles), robot.nq))
     q[:, first:second] = angles
-    frames = link_frames(PLACEMENTS, q)
-    shapes = [coal_shape(Core(hull(link)))[0] for link in (first, second)]
+    frames = link_frames(joint_placements(robot.model), q)
+    shapes = [coal_shape(Core(hull(robot, link)))[0] for link in (first, second)]
     request, result = coal.DistanceRequest(True, True), []
     for k in range(len(angles)):
         poses = [
@@ -59,9 +57,9 @@ def distances(first: int, second: int, angles: Array) -> Array:
     return np.array(result)
 
 
-def levers(second: int) -> tuple[float, float]:
+def levers(robot: Robot, second: int) -> tuple[float, float]:
     """Bounds [m] on how far the second hull reaches from the axes of the last two joints that move it."""
-    points, T = hull(second), PLACEMENTS[second - 1]
+    points, T = hull(robot, second), joint_placements(robot.model)[second - 1]
     own = float(np.linalg.norm(points[:, :2], axis=1).max())
     # at any angle of the last joint, a point stays on a circle about its axis
     centre = np.outer(points[:, 2], T[:3, 2]) + T[:3, 3]
@@ -69,30 +67,34 @@ def levers(second: int) -> tuple[float, float]:
     return float((np.linalg.norm(centre[:, :2], axis=1) + radius).max()), own
 
 
-@pytest.mark.parametrize("pair", sorted(BY_HULLS))
-def test_hulls_that_never_meet(pair: tuple[int, int]) -> None:
-    first, second = pair
-    reach = sum(levers(second))
+@pytest.mark.parametrize("pair", sorted(BY_HULLS), ids=str)
+def test_hulls_that_never_meet(pair: tuple[str, int, int]) -> None:
+    name, first, second = pair
+    robot = load_robot(name)
+    reach = sum(levers(robot, second))
     half = np.pi / 24
     grid = np.arange(-np.pi + half, np.pi, 2 * half)
     cells = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     while len(cells):
-        found = distances(first, second, cells)
+        found = distances(robot, first, second, cells)
         assert found.min() > BY_HULLS[pair]
         cells = cells[found - reach * half < BY_HULLS[pair]]
         half /= 2
         cells = (cells[:, None] + half * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(-1, 2)
 
 
-def test_base_and_upper_arm_never_meet() -> None:
+@pytest.mark.parametrize("pair", sorted(BY_SURFACE), ids=str)
+def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
     """The pan joint turns about the axis of the cylinder: only the lift joint changes the distance."""
-    base = link_surfaces(meshes(), "ur5e", "base")["visual"]
+    name, foot = pair[0], FOOT[pair[0]]
+    robot = load_robot(name)
+    base = link_surfaces(meshes(name), name, "base")["visual"]
     # the base has a foot and a neck
     cylinders = [
         (np.linalg.norm(part[..., :2], axis=-1).max(), base[..., 2].min(), part[..., 2].max())
-        for part in (base[base[..., 2].max(axis=1) <= FOOT], base[base[..., 2].max(axis=1) > FOOT])
+        for part in (base[base[..., 2].max(axis=1) <= foot], base[base[..., 2].max(axis=1) > foot])
     ]
-    pieces = link_surfaces(meshes(), "ur5e", "upper_arm")["visual"]
+    pieces = link_surfaces(meshes(name), name, "upper_arm")["visual"]
     small = []
     while len(pieces):
         edges = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)
@@ -109,21 +111,23 @@ def test_base_and_upper_arm_never_meet() -> None:
     while open_ranges:
         halved = []
         for angle, which in open_ranges:
-            q = np.zeros((1, ROBOT.nq))
+            q = np.zeros((1, robot.nq))
             q[:, 1] = angle
-            T = link_frames(PLACEMENTS, q)[0, 2]
+            T = link_frames(joint_placements(robot.model), q)[0, 2]
             x = points[which] @ T[:3, :3].T + T[:3, 3]
             least = np.full(len(which), np.inf)
             for radius, low, high in cylinders:
                 away = np.maximum(np.linalg.norm(x[:, :2], axis=1) - radius, 0)
                 beyond = np.maximum(np.maximum(x[:, 2] - high, low - x[:, 2]), 0)
                 least = np.minimum(least, np.hypot(away, beyond) - spacing)
-            assert least.min() > BY_SURFACE[0, 2]
-            which = which[least - lever[which] * half <= BY_SURFACE[0, 2]]
+            assert least.min() > BY_SURFACE[pair]
+            which = which[least - lever[which] * half <= BY_SURFACE[pair]]
             if len(which):
                 halved += [(angle + side * half / 2, which) for side in (-1, 1)]
         open_ranges, half = halved, half / 2
 
 
-def test_all_pairs_that_are_left_out_are_proven() -> None:
-    assert ROBOT.never_in_collision == set(BY_HULLS) | set(BY_SURFACE)
+@pytest.mark.parametrize("name", robot_names())
+def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
+    proven = {(first, second) for robot, first, second in (*BY_HULLS, *BY_SURFACE) if robot == name}
+    assert load_robot(name).never_in_collision == proven

@@ -189,7 +189,7 @@ def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Pat
 
 def test_several_processes_make_one_library(workshop: Workshop) -> None:
     """Three at once into an empty folder: one compiles, the others wait for it, nothing is left lying about."""
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile"]
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile", "ur5e"]
     processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     printed = [process.communicate(timeout=120)[0].strip() for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0]

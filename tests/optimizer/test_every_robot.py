@@ -1,0 +1,83 @@
+"""What holds for one robot holds for every robot that comes with the library: poses, dynamics, answers, proofs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.registry import load_robot, robot_names
+from models.robot import Array, Robot
+from optimizer import Arm, Pose, Problem, optimize
+from optimizer.collision.model import collision_model
+from optimizer.energy.plant import Plant
+from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.kinematics.inverse import required_inverse_kinematics
+from tests.selection import long_but
+
+# m and rad: what an answer may miss its pose by, and a configuration itself
+ACCURACY, FOUND = 1e-9, 1e-6
+# N·m; both recursions round at about 1e-13 of torques of some 500 N·m
+TORQUE = 1e-9
+# s: no search comes near it, however busy the machine
+AMPLE = 300.0
+# share of configurations, drawn at random, in which capsules of links meet: more would mean that they are too large
+OFTEN = 0.6
+
+
+@pytest.fixture(params=robot_names(), scope="module")
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return load_robot(request.param)
+
+
+def flange(robot: Robot, q: Array) -> Array:
+    """T_base_flange (4, 4) by Pinocchio."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
+
+
+def test_every_configuration_is_among_those_of_its_pose(robot: Robot) -> None:
+    rng, inverse = np.random.default_rng(31), required_inverse_kinematics(robot, "goal")
+    for q in rng.uniform(robot.limits.q_min, robot.limits.q_max, (100, robot.nq)):
+        T = flange(robot, q)
+        found = np.array([each.q for each in inverse.solve(T, np.eye(4), robot.limits, True, "goal")])
+        assert np.abs(found - q).max(axis=1).min() < FOUND
+        assert max(np.abs(flange(robot, each) - T).max() for each in found) < ACCURACY
+
+
+def test_dynamics_are_pinocchios(robot: Robot) -> None:
+    """The compiled torque against the recursion, with rotors and without friction."""
+    plant, rng = Plant(Arm(robot=robot)), np.random.default_rng(32)
+    limits = robot.limits
+    q = rng.uniform(limits.q_min, limits.q_max, (200, robot.nq))
+    v, a = (rng.uniform(-most, most, q.shape) for most in (limits.v_max, limits.a_max))
+    data = robot.model.createData()
+    expected = np.array([pin.rnea(robot.model, data, *state) for state in zip(q, v, a, strict=True)])
+    assert np.abs(plant.torques(q, v, a) - expected).max() < TORQUE
+
+
+def test_links_meet_in_some_configurations_only(robot: Robot) -> None:
+    model, rng = collision_model(Arm(robot=robot)), np.random.default_rng(33)
+    q = rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi), (400, robot.nq))
+    assert 0 < np.mean(model.signed_distances(q)[0].min(axis=1) < 0) < OFTEN
+
+
+@pytest.mark.parametrize("count", long_but((4,), (4, 200)))
+def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:
+    """From a random configuration to the pose of another, neither of which makes links meet."""
+    rng, limits = np.random.default_rng(34), robot.limits
+    model = collision_model(Arm(robot=robot))
+    for _ in range(count):
+        ends = []
+        while len(ends) < 2:
+            q = rng.uniform(np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi))
+            if model.signed_distances(q[None])[0].min() > 0.01:
+                ends.append(q)
+        start, goal = ends
+        asked = Problem(arm=Arm(robot=robot), start=start, goal=Pose(flange(robot, goal)), deadline=AMPLE)
+        answer = optimize(asked)
+        assert answer.status == "optimal" and answer.certificate.valid
+        assert 0 < answer.lower_bound <= answer.energy.electrical.total
+        reached = link_frames(joint_placements(robot.model), answer.goal.q[None])[0, -1] @ robot.T_last_flange
+        assert np.abs(reached - asked.goal.T).max() < ACCURACY  # type: ignore[union-attr]
