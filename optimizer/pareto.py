@@ -142,7 +142,9 @@ class _Search:
                 continue
             known = [node.spline for node in (left, right) if node.spline is not None]
             self.solve(math.sqrt(left.duration * right.duration), known)
-        complete = self.left() > 0 and not self.cut_short
+        # a dominated answer counts, too: solved to its end, it might not be dominated
+        solved = all(node.answer.status == "optimal" for node in self.nodes if node.answer is not None)
+        complete = self.left() > 0 and not self.cut_short and solved
         return self.result(min(spline.duration, self.nodes[0].duration), complete)
 
     def fastest(self) -> tuple[Spline, Solution | None]:
@@ -301,7 +303,7 @@ class _Search:
         if not points:
             raise DeadlineExceeded([candidate.report() for candidate in self.fastest_run.incumbent.candidates])
         return Front(
-            status="optimal" if complete and all(point.status == "optimal" for point in points) else "feasible",
+            status="optimal" if complete else "feasible",
             shortest=shortest,
             points=points,
             dropped=[each for each in dropped if math.isfinite(each.duration)],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -251,6 +252,14 @@ def test_moves_that_had_no_front_or_a_better_one(extra: dict[str, Any]) -> None:
     alone, front = optimize(asked, still), pareto(asked, 3, still)
     assert alone.status == "optimal"
     assert abs(objective(asked, front.points[-1]) / objective(asked, alone) - 1) < ROUNDING
+
+
+def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
+    """Also where the answer that this search still found is dominated by another one, which was solved to its end."""
+    asked = problem(HOME, HOME + np.array([0.3, 0.17, -0.17, 0.07, 0.0, 0.2]), objective="mechanical", duration_max=9.0)
+    for readings in range(130, 180, 5):
+        with suppress(DeadlineExceeded):
+            assert pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status == "feasible"
 
 
 @pytest.mark.parametrize("readings", [3, 10, 100, 400])

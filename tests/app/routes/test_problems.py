@@ -48,7 +48,7 @@ def test_unknown_robot(client: TestClient) -> None:
         client.get("/robots/r2d2"),
     ]
     for answer in answers:
-        assert refused(answer, problems.UnknownRobot)["known"] == ["ur5e"]
+        assert refused(answer, problems.UnknownRobot)["known"] == ["ur3e", "ur5e"]
         assert "r2d2" not in answer.text
 
 

@@ -15,6 +15,7 @@ from app.schemas.ik import IKResponse
 from app.schemas.robots import RobotDetail, RobotList
 from models.registry import load_robot
 from optimizer.kinematics.inverse import inverse_kinematics_for
+from tests.app.requests import PATIENT
 
 POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 
@@ -22,8 +23,22 @@ POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 def test_robots(client: TestClient) -> None:
     answer = client.get("/robots")
     robots = RobotList.model_validate_json(answer.content).robots
-    assert [robot.name for robot in robots] == ["ur5e"]
-    assert len(robots[0].joints) == 6
+    assert [robot.name for robot in robots] == ["ur3e", "ur5e"]
+    assert all(len(robot.joints) == 6 for robot in robots)
+    # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
+    assert "engineering defaults without a source (copper loss" in robots[0].energy_trust
+    assert "transferred from a sister robot (copper loss" in robots[1].energy_trust
+
+
+def test_another_robot_is_asked_for_by_name(client: TestClient) -> None:
+    """Its kernel is not loaded when the service starts. The same joints are another place, and cost other joules."""
+    ends = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [0.4, -1.2, 1.3, -1.7, -1.5, 0.3]}}
+    small, large = (client.post("/optimize", json=ends | PATIENT | {"robot": name}).json() for name in ("ur3e", "ur5e"))
+    assert (small["robot"], small["status"]) == ("ur3e", "optimal")
+    assert small["energy"]["electrical"]["friction"] < large["energy"]["electrical"]["friction"]
+    near = {"position": [-0.2, 0.25, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+    reached = [client.post("/ik", json={"robot": name, "pose": near}).json()["solutions"] for name in ("ur3e", "ur5e")]
+    assert reached[0] and reached[0] != reached[1]
 
 
 def test_robot_shows_every_figure(client: TestClient) -> None:
