@@ -30,8 +30,9 @@ STRETCHED = 5e-10
 # distance [m] from an edge of the reach within which the two branches that meet there count as one: a pose on the edge,
 # rounded to double precision, lies that near
 EDGE = 1e-13
-# angle [rad] that a pose rounded to double precision leaves open in q2 + q3 + q4, times the wrist's sine. Next to a
-# singular shoulder the first angle is open, too: by this over `ahead` [m], as far as LEAST_AHEAD
+# angle [rad] that a pose rounded to double precision leaves open in q2 + q3 + q4, times the wrist's sine. Where the
+# wrist is ahead of the first axis by less than 1 m, the first angle is open, too: by this over the distance, or over
+# LEAST_AHEAD [m] if that is more
 HEADING, LEAST_AHEAD = 1e-14, 1e-5
 # the excess is small against the circle that the fourth axis moves on: the second step meets the last digit
 NEWTON_STEPS = 4
@@ -105,9 +106,17 @@ class URClosedForm:
         return self._label(self._ahead(q), sin(q[2]), sin(q[4]))
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
-        """The parts of the label that are singular at a configuration (6,): within SINGULAR of changing."""
-        sizes = {"shoulder": self._ahead(q), "elbow": sin(q[2]), "wrist": sin(q[4])}
-        return tuple(part for part, size in sizes.items() if abs(size) < SINGULAR)
+        """The parts of the label that are singular at a configuration (6,): so near to changing that a pose rounded to
+        double precision may have changed them.
+
+        That is within SINGULAR. The elbow's angle near its edge is the root of twice the excess over the reach, times
+        the reach, over both links: next to a stretched wrist, where the fourth axis moves with the open heading, more.
+        """
+        ahead, sin_elbow, sin_wrist = abs(self._ahead(q)), abs(sin(q[2])), abs(sin(q[4]))
+        excess = abs(self.d5) * _open_heading(max(sin_wrist, STRETCHED), ahead)
+        elbow = sqrt(2 * excess * self._reach[1] / abs(self.a2 * self.a3))
+        near = {"shoulder": ahead < SINGULAR, "elbow": sin_elbow < max(SINGULAR, elbow), "wrist": sin_wrist < SINGULAR}
+        return tuple(part for part, singular in near.items() if singular)
 
     def _ahead(self, q: Array) -> float:
         """Distance [m] of the last axis' origin ahead of the first axis at a configuration (6,)."""
@@ -169,8 +178,7 @@ class URClosedForm:
             along = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             above = -(s6 * r31 + c6 * r32)
             height = pz - self.d6 * r33 - self.d1
-            slack = HEADING / (sine * min(1.0, max(abs(ahead), LEAST_AHEAD)))
-            turn, x, z = self._turned_into_reach(ahead, height, along, above, slack)
+            turn, x, z = self._turned_into_reach(ahead, height, along, above, _open_heading(sine, abs(ahead)))
             found.append((q5, q6 - turn if w > 0 else q6 + turn, sin_q5, x, z, atan2(along, -above) + turn))
         return found
 
@@ -293,3 +301,8 @@ class URClosedForm:
                 nearest, farthest = abs(radius - abs(self.d5)), radius + abs(self.d5)
                 best = min(best, max(0.0, least - farthest, nearest - most))
         return best
+
+
+def _open_heading(sine: float, ahead: float) -> float:
+    """Angle [rad] that a rounded pose leaves open in q2 + q3 + q4, from the wrist's sine and its distance [m] ahead."""
+    return HEADING / (sine * min(1.0, max(ahead, LEAST_AHEAD)))
