@@ -70,7 +70,7 @@ class _Task:
 def fit(robot: Robot, folder: Path, link: int) -> list[LinkCapsule]:
     """Capsules that hold the link, from those that the robot has."""
     rng = np.random.default_rng(0)
-    surfaces = list(link_surfaces(folder, robot.name, robot.link_names[link]).values())
+    surfaces = list(link_surfaces(folder, robot.name, link).values())
     checked = _outermost(np.vstack([sampled(each, CHECKED_SAMPLES, rng) for each in surfaces]), surfaces)
     task = replace(_weighed(robot, folder, link, rng), points=checked[rng.choice(len(checked), SURFACE_SAMPLES)])
     z = np.array([[*c.axis.ravel(), c.radius] for c in robot.capsules if c.link == link]).ravel()
@@ -116,7 +116,7 @@ def _weighed(robot: Robot, folder: Path, link: int, rng: np.random.Generator) ->
 def _solid(folder: Path, robot: Robot, link: int) -> _Solid:
     """The grid of a link: inside is what the outside does not reach through its surfaces."""
     rng = np.random.default_rng(0)
-    surfaces = link_surfaces(folder, robot.name, robot.link_names[link]).values()
+    surfaces = link_surfaces(folder, robot.name, link).values()
     points = np.vstack([np.vstack([sampled(each, 1_000_000, rng), each.reshape(-1, 3)]) for each in surfaces])
     corner = points.min(axis=0) - REACH - 2 * CELL
     is_wall = np.zeros(np.ceil((points.max(axis=0) + REACH + 2 * CELL - corner) / CELL).astype(int), dtype=bool)

@@ -15,36 +15,20 @@ from models.robot import Array
 
 # what is shown, in detail, and the coarser surfaces that the maker made for collision checking
 KINDS = ("visual", "collision")
-_QUARTER = np.pi / 2
-# for each link its mesh, and the mesh's position [m] and roll, pitch, yaw [rad] in the link frame: the meshes do not
-# say where they stand. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
-PLACEMENTS: dict[str, dict[str, tuple[str, list[float], list[float]]]] = {
-    "ur3e": {
-        "base": ("base", [0, 0, 0], [0, 0, np.pi]),
-        "shoulder": ("shoulder", [0, 0, 0], [0, 0, np.pi]),
-        "upper_arm": ("upperarm", [0, 0, 0.12], [_QUARTER, 0, -_QUARTER]),
-        "forearm": ("forearm", [0, 0, 0.027], [_QUARTER, 0, -_QUARTER]),
-        "wrist_1": ("wrist1", [0, 0, -0.104], [_QUARTER, 0, 0]),
-        "wrist_2": ("wrist2", [0, 0, -0.08535], [0, 0, 0]),
-        "wrist_3": ("wrist3", [0, 0, -0.0921], [_QUARTER, 0, 0]),
-    },
-    "ur5e": {
-        "base": ("base", [0, 0, 0], [0, 0, np.pi]),
-        "shoulder": ("shoulder", [0, 0, 0], [0, 0, np.pi]),
-        "upper_arm": ("upperarm", [0, 0, 0.138], [_QUARTER, 0, -_QUARTER]),
-        "forearm": ("forearm", [0, 0, 0.007], [_QUARTER, 0, -_QUARTER]),
-        "wrist_1": ("wrist1", [0, 0, -0.127], [_QUARTER, 0, 0]),
-        "wrist_2": ("wrist2", [0, 0, -0.0997], [0, 0, 0]),
-        "wrist_3": ("wrist3", [0, 0, -0.0989], [_QUARTER, 0, 0]),
-    },
-}
+# where the meshes stand: of upper arm, forearm and wrists the shift [m] along the joint's axis, which is all that
+# differs between arms of one maker. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
+SHIFTS = {"ur3e": (0.12, 0.027, -0.104, -0.08535, -0.0921), "ur5e": (0.138, 0.007, -0.127, -0.0997, -0.0989)}
+# file of each link, from the base on, and roll, pitch, yaw [rad] of its mesh in the link frame
+_ALONG, _UPRIGHT = (np.pi / 2, 0.0, -np.pi / 2), (np.pi / 2, 0.0, 0.0)
+_FILES = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3")
+_TURNS = ((0.0, 0.0, np.pi), (0.0, 0.0, np.pi), _ALONG, _ALONG, _UPRIGHT, (0.0, 0.0, 0.0), _UPRIGHT)
 
 
-def link_surfaces(folder: Path, robot: str, link: str) -> dict[str, Array]:
-    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link."""
-    name, position, rpy = PLACEMENTS[robot][link]
-    R = pin.rpy.rpyToMatrix(*rpy)
-    return {kind: _triangles(folder / kind / f"{name}.obj") @ R.T + position for kind in KINDS}
+def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
+    """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of SHIFTS."""
+    position = np.array([0.0, 0.0, (0.0, 0.0, *SHIFTS[robot])[link]])
+    R = pin.rpy.rpyToMatrix(*_TURNS[link])
+    return {kind: _triangles(folder / kind / f"{_FILES[link]}.obj") @ R.T + position for kind in KINDS}
 
 
 def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:

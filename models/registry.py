@@ -15,8 +15,6 @@ from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw,
 from models.urdf import urdf_of
 
 FIGURES = "figures.yaml"
-# Pinocchio's name of a revolute joint about z
-REVOLUTE = "JointModelRZ"
 
 
 @cache
@@ -41,7 +39,7 @@ def load_robot(name: str) -> Robot:
 @cache
 def _load_robot(name: str) -> Robot:
     figures = load_figures(name)
-    model = _model(name, figures)
+    model = pin.buildModelFromXML(urdf_of(name, figures))
     drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
     model.armature = drives.rotor_inertia
     limits, electronics, motion = figures["limits"], figures["electronics"], figures["default_motion"]
@@ -81,15 +79,6 @@ def load_figures(name: str) -> dict[str, Any]:
         raise LookupError(f"There is no robot named {name!r}: use one of {', '.join(robot_names())}.")
     figures: dict[str, Any] = yaml.safe_load((files("models") / name / FIGURES).read_text(encoding="utf-8"))
     return figures
-
-
-def _model(name: str, figures: dict[str, Any]) -> pin.Model:
-    """The Pinocchio model of a robot's figures. Raises ValueError if a joint is no revolute joint about z."""
-    model = pin.buildModelFromXML(urdf_of(name, figures))
-    # Pinocchio takes a joint without bounds, or about another axis, for one of another kind
-    if any(joint.shortname() != REVOLUTE for joint in list(model.joints)[1:]):
-        raise ValueError(f"{name}: every joint must be a revolute joint about z.")
-    return model
 
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:

@@ -13,20 +13,6 @@ TRUST = {
 }
 # sections of a robot's figures that its energies depend on
 ENERGY_SECTIONS = ("inertials", "friction_laws", "drives", "electronics")
-# what an energy depends on: section and figure, and its name in the sentence. Friction is its default law's
-_ENERGY_FIGURES = {
-    ("inertials", "mass"): "link masses",
-    ("inertials", "inertia"): "link inertias",
-    ("drives", "torque_constant"): "torque constants",
-    ("drives", "rotor_inertia"): "rotor inertias",
-    ("friction_laws", ""): "friction",
-    ("drives", "copper"): "copper loss",
-    ("drives", "inverter_constant"): "inverter loss",
-    ("electronics", "idle_power"): "idle power",
-    ("electronics", "regeneration"): "regeneration",
-    ("limits", "acceleration"): "acceleration limits",
-    ("limits", "jerk"): "jerk limits",
-}
 _GROUPS = {
     "A": "the maker's own figures",
     "B": "figures fitted to measured data",
@@ -39,12 +25,30 @@ _GROUPS = {
 def energy_trust(figures: dict[str, Any]) -> str:
     """One sentence on what the energies of a robot rest on, from the trust letters of its figures."""
     by_letter: dict[str, list[str]] = {letter: [] for letter in _GROUPS}
-    for (section, name), words in _ENERGY_FIGURES.items():
-        found = figures[section]
-        by_letter[worst_letter(next(iter(found.values())) if section == "friction_laws" else found[name])].append(words)
+    for words, section in _energy_figures(figures).items():
+        by_letter[worst_letter(section)].append(words)
     groups = [f"{_GROUPS[letter]} ({', '.join(names)})" for letter, names in by_letter.items() if names]
     *first, last = groups
     return f"Energies rest on {', '.join(first)} and {last}." if first else f"Energies rest on {last}."
+
+
+def _energy_figures(figures: dict[str, Any]) -> dict[str, Any]:
+    """What an energy depends on, in words, and the figures of each. Friction is the default law's."""
+    inertials, drives, electronics = (figures[section] for section in ("inertials", "drives", "electronics"))
+    return {
+        "link masses": inertials["mass"],
+        "centres of mass": inertials["center_of_mass"],
+        "link inertias": {part: inertials[part] for part in ("inertia", "inertia_frame_rpy")},
+        "torque constants": drives["torque_constant"],
+        "rotor inertias": drives["rotor_inertia"],
+        "friction": next(iter(figures["friction_laws"].values())),
+        "copper loss": drives["copper"],
+        "inverter loss": {part: figure for part, figure in drives.items() if part.startswith("inverter")},
+        "idle power": electronics["idle_power"],
+        "regeneration": electronics["regeneration"],
+        "acceleration limits": figures["limits"]["acceleration"],
+        "jerk limits": figures["limits"]["jerk"],
+    }
 
 
 def worst_letter(section: Any) -> str:

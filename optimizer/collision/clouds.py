@@ -17,7 +17,7 @@ from models.robot import Array
 from optimizer.collision.bounding_tree import ROUNDING, BoundingTree, point_segment
 from optimizer.collision.closed_form_distance import box_segment, segment_segment, triangle_segment
 from optimizer.collision.coal_distance import ConvexPairs
-from optimizer.collision.cores import Core, Indices, LeastHeight, box_corners
+from optimizer.collision.cores import Core, Indices, box_corners, least_height
 from optimizer.problem.clouds import Cloud as Shape
 from optimizer.problem.clouds import Points, TriangleMesh, Voxels, parts_of
 
@@ -141,7 +141,6 @@ class ConvexAgainstCloud:
 
     def __init__(self, cloud: Cloud, core: Core) -> None:
         self._cloud, self._core = cloud, core
-        self._height = LeastHeight(core)
         # a ball around the core, whose centre is in it
         self._centre = core.points.mean(axis=0)
         self._radius = float(np.linalg.norm(core.points - self._centre, axis=1).max()) + core.disc_radius
@@ -156,7 +155,7 @@ class ConvexAgainstCloud:
         query, part = cloud.tree.near(balls, reach, within, root, nearest=True)
         R, origin = T[query, :3, :3], T[query, :3, 3]
         in_core = np.einsum("kij,ki->kj", R, cloud.tree.centres[part] - origin)
-        least = self._height(in_core) - cloud.tree.radii[part]
+        least = least_height(self._core, in_core) - cloud.tree.radii[part]
         order = np.lexsort((least, query))
         distance, normal, point = np.full(len(T), np.inf), np.tile([0.0, 0.0, 1.0], (len(T), 1)), balls[:, 0].copy()
         for k in order.tolist():

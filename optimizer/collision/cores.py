@@ -7,6 +7,7 @@ its own. Signed distances are computed between cores, and the radii are subtract
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import assert_never
 
 import numpy as np
@@ -32,6 +33,11 @@ class Core:
     disc_radius: float = 0.0
     half_size: Array | None = None
     is_half_space: bool = False
+
+    @cached_property
+    def planes(self) -> Array:
+        """Of a hull of points: its faces (f, 4), outward normals and offsets [m], `n · x + d <= 0` inside."""
+        return np.asarray(ConvexHull(self.points).equations)
 
 
 def core_of(shape: Shape) -> Core:
@@ -61,24 +67,18 @@ def box_corners(low: Array, high: Array) -> Array:
     return np.array(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij")).reshape(3, 8).T
 
 
-class LeastHeight:
-    """Lower bounds on the distances of points from a convex core that is no half-space."""
+def least_height(core: Core, points: Array) -> Array:
+    """Lower bounds (k,) [m] on the distances of points (k, 3) [m], in the frame of the core, from it.
 
-    def __init__(self, core: Core) -> None:
-        self._core = core
-        is_hull = core.half_size is None and not core.disc_radius
-        self._planes = ConvexHull(core.points).equations if is_hull else np.zeros((0, 4))
-
-    def __call__(self, points: Array) -> Array:
-        """Lower bounds (k,) [m] for points (k, 3) [m] in the frame of the core."""
-        core = self._core
-        if core.half_size is not None:
-            return np.asarray(np.linalg.norm(np.maximum(np.abs(points) - core.half_size, 0.0), axis=1))
-        if core.disc_radius:
-            half = np.abs(core.points[:, 2]).max()
-            outside = np.stack([np.abs(points[:, 2]) - half, np.hypot(points[:, 0], points[:, 1]) - core.disc_radius])
-            return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=0))
-        return np.asarray(np.maximum((points @ self._planes[:, :3].T + self._planes[:, 3]).max(axis=1), 0.0))
+    The core is a box, a cylinder's discs or a hull with a volume: no half-space, point or segment.
+    """
+    if core.half_size is not None:
+        return np.asarray(np.linalg.norm(np.maximum(np.abs(points) - core.half_size, 0.0), axis=1))
+    if core.disc_radius:
+        half = np.abs(core.points[:, 2]).max()
+        outside = np.stack([np.abs(points[:, 2]) - half, np.hypot(points[:, 0], points[:, 1]) - core.disc_radius])
+        return np.asarray(np.linalg.norm(np.maximum(outside, 0.0), axis=0))
+    return np.asarray(np.maximum((points @ core.planes[:, :3].T + core.planes[:, 3]).max(axis=1), 0.0))
 
 
 def _on_z_axis(length: float) -> Array:

@@ -17,9 +17,12 @@ from models.registry import load_figures, load_robot, robot_names
 from models.robot import Array, Robot
 from models.trust import energy_trust
 from models.urdf import urdf_of
+from tests.models.test_capsule_cover import meshes as arm_folder
 
 # double precision over a product of seven matrices of entries about 1
 ROUNDING = 1e-14
+# the same over angles that are rounded to nine digits, and lengths of about 1 m; and of limits written as 3.14
+NINE_DIGITS, THREE_DIGITS = 1e-8, 1e-3
 # the same relative to torques of up to 150 N·m
 TORQUE_ROUNDING = 1e-11
 
@@ -94,8 +97,7 @@ def test_inertias_are_the_figures(robot: Robot) -> None:
         assert body.inertia == pytest.approx(
             R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T, abs=ROUNDING
         )
-    # by the makers' sheets, without the base: a UR3e of 11.2 kg, a UR5e of 20.6 kg
-    masses = {"ur3e": 8.7985, "ur5e": 17.7}
+    masses = {"ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261, "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365}
     assert pin.computeTotalMass(robot.model) == pytest.approx(masses[robot.name])
 
 
@@ -183,19 +185,18 @@ def test_figures_of_another_number_of_joints_are_refused(part: str) -> None:
         urdf_of("ur5e", figures)
 
 
-def test_the_model_is_that_of_another_reader_of_the_urdf(robot: Robot) -> None:
-    """The text is plain URDF: what Pinocchio reads from a file of it is the robot's model."""
-    model = pin.buildModelFromXML(urdf_of(robot.name, robot.figures))
-    model.armature = robot.drives.rotor_inertia
-    assert model == robot.model
-
-
-def test_a_joint_that_is_not_a_plain_revolute_one_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kinematics here are of angles about z, one a joint: any other axis would give wrong poses without a word."""
-    sound = registry.urdf_of
-    monkeypatch.setattr(registry, "urdf_of", lambda *given: sound(*given).replace("0 0 1", "0 1 0", 1))
-    with pytest.raises(ValueError, match="revolute joint about z"):
-        registry._load_robot.__wrapped__("ur5e")
+@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
+def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
+    """The maker's description as another package has it, whose numbers are rounded."""
+    robot, model = load_robot(name), pin.buildModelFromUrdf(str(arm_folder(name) / f"{name}.urdf"))
+    assert model.lowerPositionLimit == pytest.approx(robot.limits.q_min, rel=THREE_DIGITS)
+    assert model.upperPositionLimit == pytest.approx(robot.limits.q_max, rel=THREE_DIGITS)
+    assert model.upperVelocityLimit == pytest.approx(robot.limits.v_max, rel=THREE_DIGITS)
+    data, (base, tool) = model.createData(), (model.getFrameId(frame) for frame in ("base", "tool0"))
+    for q in configurations():
+        pin.framesForwardKinematics(model, data, q)
+        T = data.oMf[base].actInv(data.oMf[tool]).homogeneous
+        assert np.abs(T - dh_flange(q, robot.figures["kinematics"])).max() < NINE_DIGITS
 
 
 def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -211,7 +212,7 @@ def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 def test_the_sentence_on_energies_is_made_from_the_letters(robot: Robot) -> None:
     assert energy_trust(robot.figures).startswith(
-        "Energies rest on the maker's own figures (link masses, link inertias"
+        "Energies rest on the maker's own figures (link masses, centres of mass, link inertias"
     )
     figures = load_figures("ur5e")
     told = energy_trust(figures)
@@ -221,6 +222,23 @@ def test_the_sentence_on_energies_is_made_from_the_letters(robot: Robot) -> None
     for _, figure in leaves(figures):
         figure["trust"] = "E"
     assert energy_trust(figures).startswith("Energies rest on engineering defaults without a source (link masses")
+
+
+@pytest.mark.parametrize(
+    ("section", "name", "words"),
+    [
+        ("inertials", "center_of_mass", "centres of mass"),
+        ("inertials", "inertia_frame_rpy", "link inertias"),
+        *(("drives", f"inverter_{part}", "inverter loss") for part in ("constant", "linear", "quadratic")),
+        ("limits", "jerk", "jerk limits"),
+    ],
+)
+def test_the_worst_of_several_letters_counts(section: str, name: str, words: str) -> None:
+    figures = load_figures("ur5e")
+    for _, figure in leaves(figures):
+        figure["trust"] = "A"
+    figures[section][name]["trust"] = "E"
+    assert energy_trust(figures).endswith(f" and engineering defaults without a source ({words}).")
 
 
 def test_every_link_has_capsules(robot: Robot) -> None:

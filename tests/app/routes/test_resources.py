@@ -31,7 +31,7 @@ def test_robots(client: TestClient) -> None:
 
 
 def test_another_robot_is_asked_for_by_name(client: TestClient) -> None:
-    """Its kernel is not loaded when the service starts. The same joints are another place, and cost other joules."""
+    """Its kernel is not loaded when the service starts. The same joints give another pose, and cost other joules."""
     ends = {"start": {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]}, "goal": {"q": [0.4, -1.2, 1.3, -1.7, -1.5, 0.3]}}
     small, large = (client.post("/optimize", json=ends | PATIENT | {"robot": name}).json() for name in ("ur3e", "ur5e"))
     assert (small["robot"], small["status"]) == ("ur3e", "optimal")

@@ -38,14 +38,14 @@ FOOT = {"ur5e": 0.074, "ur3e": 0.03}
 
 def hull(robot: Robot, link: int) -> Array:
     """Vertices (k, 3) [m] of the convex hull of both meshes of a link."""
-    surfaces = link_surfaces(meshes(robot.name), robot.name, robot.link_names[link]).values()
+    surfaces = link_surfaces(meshes(robot.name), robot.name, link).values()
     points = np.concatenate([surface.reshape(-1, 3) for surface in surfaces])
     return np.asarray(points[ConvexHull(points).vertices])
 
 
 def surface(robot: Robot, link: int) -> coal.CollisionGeometry:
     """The visual mesh of a link, as triangles in a tree."""
-    triangles = link_surfaces(meshes(robot.name), robot.name, robot.link_names[link])["visual"]
+    triangles = link_surfaces(meshes(robot.name), robot.name, link)["visual"]
     points, corners = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
     for k, triangle in enumerate(triangles):
         points.extend(triangle)
@@ -108,13 +108,13 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
     """The pan joint turns about the axis of the cylinder: only the lift joint changes the distance."""
     name, foot = pair[0], FOOT[pair[0]]
     robot = load_robot(name)
-    base = link_surfaces(meshes(name), name, "base")["visual"]
+    base = link_surfaces(meshes(name), name, 0)["visual"]
     # the base has a foot and a neck
     cylinders = [
         (np.linalg.norm(part[..., :2], axis=-1).max(), base[..., 2].min(), part[..., 2].max())
         for part in (base[base[..., 2].max(axis=1) <= foot], base[base[..., 2].max(axis=1) > foot])
     ]
-    pieces = link_surfaces(meshes(name), name, "upper_arm")["visual"]
+    pieces = link_surfaces(meshes(name), name, 2)["visual"]
     small = []
     while len(pieces):
         edges = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)
@@ -125,7 +125,7 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
     # no point of the surface is farther from a corner of its piece than this, nor a corner from where it is rounded to
     spacing = EDGE / np.sqrt(3) + np.sqrt(3) / 2 * 1e-3
     lever = np.linalg.norm(points[:, :2], axis=1)
-    half = FIRST_STEP / 2
+    half, placements = FIRST_STEP / 2, joint_placements(robot.model)
     # of every range of angles, the points that are not yet proven to keep away
     open_ranges = [(angle, np.arange(len(points))) for angle in np.arange(-np.pi + half, np.pi, FIRST_STEP)]
     while open_ranges:
@@ -133,7 +133,7 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
         for angle, which in open_ranges:
             q = np.zeros((1, robot.nq))
             q[:, 1] = angle
-            T = link_frames(joint_placements(robot.model), q)[0, 2]
+            T = link_frames(placements, q)[0, 2]
             x = points[which] @ T[:3, :3].T + T[:3, 3]
             least = np.full(len(which), np.inf)
             for radius, low, high in cylinders:
