@@ -55,7 +55,7 @@ bench: $(VENV)/.benchmarks kernels
 	$(PY) -m benchmarks $(BENCH_ARGS)
 
 kernels: $(VENV)/.runtime $(COMPILER)
-	@$(PY) -m optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS))
+	@$(if $(JOULEPATH_ROBOTS),$(PY) -m optimizer.energy.precompile $(subst $(comma), ,$(JOULEPATH_ROBOTS)))
 
 # The dev lockfile holds the runtime one whole, at the same versions.
 $(VENV)/.runtime: requirements.lock $(PY)

@@ -9,7 +9,7 @@ from types import FrameType
 
 
 def main() -> None:
-    """Serves until SIGTERM or Ctrl-C, then exits with 0."""
+    """Serves until SIGTERM or Ctrl-C, then exits with 0; with 1 and a message if a setting is wrong."""
     # for the time before uvicorn handles signals, and after: when it is done, it raises the signal again
     signal.signal(signal.SIGTERM, _exit)
     signal.signal(signal.SIGINT, _exit)
@@ -20,9 +20,12 @@ def main() -> None:
 
     from app.logs import configure_logging
     from app.server import serve
-    from app.settings import Settings
+    from app.settings import WrongSettings, read_settings
 
-    settings = Settings()
+    try:
+        settings = read_settings()
+    except WrongSettings as error:
+        sys.exit(str(error))
     configure_logging(settings.log_level)
     serve(settings)
 

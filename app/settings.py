@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, Field, field_validator
+from pydantic import AliasChoices, Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 
@@ -91,3 +91,21 @@ class Settings(BaseSettings):
         if unknown:
             raise ValueError(f"there is no robot named {unknown[0]!r}: use some of {', '.join(robot_names())}")
         return names
+
+
+class WrongSettings(Exception):
+    """Environment variables that are no settings; the message has a line for each."""
+
+
+def read_settings() -> Settings:
+    """The settings of this environment. Raises WrongSettings."""
+    try:
+        return Settings()
+    except ValidationError as error:
+        prefix = Settings.model_config["env_prefix"]
+        lines = []
+        for each in error.errors():
+            name = str(each["loc"][0])
+            variable = name if name.startswith(prefix) else f"{prefix}{name.upper()}"
+            lines.append(f"{variable}={each['input']!r}: {each['msg'].removeprefix('Value error, ')}")
+        raise WrongSettings("\n".join(lines)) from error

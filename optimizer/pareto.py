@@ -155,6 +155,7 @@ class _Search:
         """
         self.fastest_run.prepare()
         found = fastest(self.fastest_run.incumbent)
+        self.note_end(self.fastest_run)
         if found is not None:
             return found[1], None
         run = self.run([])
@@ -164,8 +165,13 @@ class _Search:
             candidate = between(incumbent.prepared, incumbent.candidates, answer.start.q, answer.goal.q)
             faster = fastest_from(incumbent, candidate, known)
         finally:
+            self.note_end(run)
             self.solves += run.incumbent.solves
         return (known if faster is None or faster.duration > known.duration else faster), answer
+
+    def note_end(self, run: Run) -> None:
+        """Note if the deadline ended a search for a fastest motion: it has but a share of the time."""
+        self.cut_short |= run.incumbent.deadline.passed
 
     def left(self) -> float:
         """Time left [s] but for that to encode the answers so far."""
@@ -226,9 +232,11 @@ class _Search:
         try:
             run.prepare()
         except DeadlineExceeded:
+            self.cut_short = True
             return False
         candidate = between(run.incumbent.prepared, run.incumbent.candidates, q_start, q_goal)
         spline = fastest_of(run.incumbent, candidate)
+        self.note_end(run)
         self.solves += run.incumbent.solves
         if spline is None or not distinct(left.duration, spline.duration):
             return False

@@ -11,5 +11,8 @@ from models.registry import load_robot, robot_names
 from optimizer.energy.kernel_cache import compile_kernel
 
 if __name__ == "__main__":
-    for name in sys.argv[1:] or robot_names():
+    wanted = sys.argv[1:] or robot_names()
+    if unknown := set(wanted) - set(robot_names()):
+        sys.exit(f"There is no robot named {', '.join(sorted(unknown))}: use some of {', '.join(robot_names())}.")
+    for name in wanted:
         print(compile_kernel(load_robot(name)))

@@ -26,8 +26,9 @@ class Incumbent:
     """State of one search, shared by all of its stages.
 
     `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all attempts. `cut_short` says
-    that an attempt ended at the deadline although another attempt on the same candidate found a motion. `end` is the
-    instant at which the answer is due, `longest` [s] the longest duration that the answer is known to have, perhaps.
+    that the deadline ended a part of the search although there is a motion: with more time there might be a better one.
+    `end` is the instant at which the answer is due, `longest` [s] the longest duration that the answer is known to
+    have, perhaps.
     """
 
     prepared: PreparedProblem

@@ -91,6 +91,8 @@ class Run:
             refine(incumbent, best)
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
+            # a coarse motion that was not refined is no optimum
+            incumbent.cut_short |= incumbent.deadline.passed
             answer = self.answer(best, table)
             if answer is not None:
                 return answer

@@ -25,12 +25,15 @@ from optimizer.problem.scene import Mesh, Obstacle, Scene
 from optimizer.search.reserve import reserve
 from optimizer.whatif import whatif
 from tests.optimizer.cells import at
+from tests.optimizer.clocks import CountingClock, still
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, tcp_pose
 from tests.selection import long_but
 
 # what the work of a call takes on one core [s]: per node of the kernel, instant of Pinocchio's recursion, forward
 # kinematics, distance by Coal, row of a quadratic program
 NODE, INSTANT, PLACEMENT, DISTANCE, ROW = 1.2e-6, 1.5e-6, 3e-6, 6e-6, 2e-5
+# relative; the same sums in the same order
+ROUNDING = 1e-12
 # the most that a deadline may be overrun [s]
 OVERRUN = 0.3
 
@@ -140,6 +143,18 @@ def test_what_was_verified_by_then_is_answered(clock: WorkClock) -> None:
     assert any(each.status == "unvisited" for each in answer.candidates)
     assert answer.energy.mechanical.total >= whole.energy.mechanical.total * (1 - 1e-9)
     assert clock.now - needed < needed / 4 + OVERRUN
+
+
+def test_what_the_deadline_left_coarse_is_not_optimal() -> None:
+    """The motion with few control points is found and proven best of all branches, but its refinement is cut short."""
+    asked = problem(START, GOAL)
+    least, found = optimize(asked, still).energy.electrical.total, []
+    for readings in range(20, 110, 6):
+        with suppress(DeadlineExceeded):
+            found.append(optimize(replace(asked, deadline=float(readings)), CountingClock()))
+    optimal = [each.energy.electrical.total for each in found if each.status == "optimal"]
+    assert len(optimal) and len(optimal) < len(found)
+    assert max(optimal) == pytest.approx(least, rel=ROUNDING)
 
 
 def test_the_request_that_was_killed_is_answered(clock: WorkClock) -> None:

@@ -262,6 +262,16 @@ def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
             assert pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status == "feasible"
 
 
+def test_a_front_whose_fastest_motion_was_cut_short_is_not_optimal() -> None:
+    """The first search has but a share of the time."""
+    asked = problem(HOME, HOME + np.array([0.9, 0.4, -0.5, 0.3, 0.2, -0.6]))
+    whole = pareto(asked, 4, still)
+    for readings in range(200, 280, 8):
+        with suppress(DeadlineExceeded):
+            front = pareto(replace(asked, deadline=float(readings)), 4, CountingClock())
+            assert front.status == "feasible" or len(front.points) == len(whole.points)
+
+
 @pytest.mark.parametrize("readings", [3, 10, 100, 400])
 def test_a_deadline_gives_what_was_found(readings: int) -> None:
     """By a clock that moves on with each reading: the front comes a few readings after the deadline, or none at all."""
