@@ -190,10 +190,16 @@ def test_the_model_is_that_of_another_reader_of_the_urdf(robot: Robot) -> None:
     assert model == robot.model
 
 
-def test_a_joint_that_is_not_a_plain_revolute_one_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("sound", "broken"), [("0 0 1", "0 1 0"), ('"revolute"', '"prismatic"'), ('"revolute"', '"continuous"')]
+)
+def test_a_joint_that_is_not_a_plain_revolute_one_is_refused(
+    sound: str, broken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Kinematics here are of angles about z, one a joint: any other axis would give wrong poses without a word."""
-    sound = registry.urdf_of
-    monkeypatch.setattr(registry, "urdf_of", lambda *given: sound(*given).replace("0 0 1", "0 1 0", 1))
+    text = urdf_of("ur5e", load_figures("ur5e"))
+    assert sound in text
+    monkeypatch.setattr(registry, "urdf_of", lambda *_: text.replace(sound, broken, 1))
     with pytest.raises(ValueError, match="revolute joint about z"):
         registry._load_robot.__wrapped__("ur5e")
 
