@@ -173,9 +173,29 @@ def test_all_cells_of_the_greatest_grid_fit() -> None:
     assert shape.cells.tolist() == [[255, 255, 127]]
 
 
-def test_a_file_is_read_once_and_memory_is_bounded() -> None:
-    assert mesh_from_file("stl", MESH_FILE, 0.001) is mesh_from_file("stl", MESH_FILE, 0.001)
-    kept = mesh_file._mesh.cache
-    before, count = kept.currsize, len(mesh_from_file("stl", MESH_FILE, 0.007).corners)
-    # the cache counts triangles, not files
-    assert kept.currsize == before + count and kept.maxsize == MOST_KEPT_TRIANGLES >= MOST_TRIANGLES
+def test_a_file_is_read_once_for_each_scale() -> None:
+    found, twice = (mesh_from_file("stl", MESH_FILE, scale) for scale in (0.001, 0.002))
+    assert mesh_from_file("stl", MESH_FILE, 0.001) is found
+    assert twice.corners == pytest.approx(2 * found.corners)
+
+
+def file_of(count: int, seed: int) -> str:
+    """An STL file of triangles at random, in base64."""
+    corners = np.random.default_rng(seed).uniform(-0.9, 0.9, (3 * count, 3))
+    faces = np.arange(3 * count).reshape(-1, 3)
+    return base64_of(trimesh.Trimesh(corners, faces, process=False).export(file_type="stl"))
+
+
+def test_the_mesh_that_rested_longest_leaves_a_full_cache() -> None:
+    kept, fit = mesh_file._mesh, MOST_KEPT_TRIANGLES // MOST_TRIANGLES
+    kept.cache_clear()
+    files = [file_of(MOST_TRIANGLES, seed) for seed in range(fit + 1)]
+    made = [mesh_from_file("stl", file, 1.0) for file in files[:fit]]
+    # it counts triangles, not files
+    assert kept.cache.currsize == MOST_KEPT_TRIANGLES == kept.cache.maxsize
+    assert mesh_from_file("stl", files[0], 1.0) is made[0]  # now the second one has rested longest
+    made.append(mesh_from_file("stl", files[fit], 1.0))
+    assert kept.cache.currsize == MOST_KEPT_TRIANGLES
+    again = [mesh_from_file("stl", files[k], 1.0) is made[k] for k in (0, *range(2, fit + 1), 1)]
+    assert again == [True] * fit + [False]
+    kept.cache_clear()

@@ -21,11 +21,14 @@ from tests.app.requests import EXAMPLES, HOME, move
 from tests.app.routes.test_examples import EXAMPLES as FILES
 from tests.app.routes.test_problems import DOWN, refused
 from tests.optimizer.moves import ROBOT
+from tests.selection import long_but
 
 # a far obstacle may cost no more than this share of the energy
 FAR = 1e-3
 # forearm folded onto the upper arm
 FOLDED = [0.3, -1.4, 3.0, -1.5, -1.57, 0.2]
+# every method but the one that takes seconds
+FAST = ["bspline", "time_scaling", "lagrange", "uniform_scaling"]
 CONE = {"axis": [0.0, 0.0, 1.0], "direction": [0.0, 0.0, -1.0], "half_angle": 0.1}
 
 
@@ -130,13 +133,13 @@ def test_no_way(client: TestClient) -> None:
     assert content["start"] == content["candidates"][0]["start"]
 
 
-def test_a_scan_voxels_and_a_mesh_file_are_obstacles(client: TestClient) -> None:
+@pytest.mark.parametrize("methods", long_but([["bspline", "uniform_scaling"]], [["bspline", "uniform_scaling"], FAST]))
+def test_a_scan_voxels_and_a_mesh_file_are_obstacles(client: TestClient, methods: list[str]) -> None:
     """All three at once, by a free and by a fixed path; Pinocchio's replay keeps off every point."""
     request = EXAMPLES["past_a_scan"]
-    methods = ["bspline", "uniform_scaling"]
     rows = answered(client, request | {"methods": methods, "answers": True, "deadline": 60.0}, "/compare")["methods"]
     free = answered(client, request | {"collisions": False})
-    assert [row["valid"] for row in rows] == [True] * 2
+    assert [row["valid"] for row in rows] == [True] * len(methods)
     scan = request["scene"]["obstacles"][0]
     for answer in (*(row["answer"] for row in rows), free):
         spline = answer["trajectory"]["spline"]
@@ -245,12 +248,12 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
         assert errors[0]["loc"][: len(where)] == where
 
 
-def test_compare_and_pareto_keep_clear_too(client: TestClient) -> None:
+@pytest.mark.parametrize("methods", long_but([FAST[:3]], [FAST[:3], [*FAST, "polynomial_ga"]]))
+def test_compare_and_pareto_keep_clear_too(client: TestClient, methods: list[str]) -> None:
+    """Also the methods whose straight line hits the post."""
     request = EXAMPLES["over_a_post"]
-    # the straight line hits the post
-    methods = ["bspline", "time_scaling", "lagrange"]
     compared = answered(client, request | {"methods": methods, "deadline": 60.0}, "/compare")["methods"]
-    assert len(compared) == 3 and all(row["valid"] and row["problem"] is None for row in compared)
+    assert len(compared) == len(methods) and all(row["valid"] and row["problem"] is None for row in compared)
     front = answered(client, request | {"points": 2, "duration": {"max": 1.5}}, "/pareto")
     kept = client.get(front["points"][0]["answer"]).json()["answer"]
     assert kept["certificate"]["clearance"]["min_clearance"] >= 0

@@ -10,6 +10,7 @@ from starlette.testclient import TestClient
 from app.schemas.compare import CompareResponse
 from optimizer.problem.problem import MethodName
 from tests.app.requests import PATIENT
+from tests.selection import long_but
 
 ALL = list(get_args(MethodName))
 QUICK = [method for method in ALL if method != "polynomial_ga"]
@@ -88,11 +89,12 @@ def test_a_method_that_cannot_be_as_fast_says_so_in_its_row(client: TestClient) 
     assert rows["lagrange"]["duration"] is None and rows["lagrange"]["valid"] is None
 
 
-def test_where_no_method_finds_a_motion_the_answer_is_a_problem(client: TestClient) -> None:
+@pytest.mark.parametrize("methods", long_but([QUICK], [QUICK, ALL]))
+def test_where_no_method_finds_a_motion_the_answer_is_a_problem(client: TestClient, methods: list[str]) -> None:
     far = {"pose": {"position": [3.0, 0.0, 0.0], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
     answer = client.post("/compare", json=MOVE | {"goal": far})
     assert answer.status_code == 422 and answer.json()["type"] == "/problems/unreachable-pose"
-    answer = client.post("/compare", json=MOVE | {"duration": 0.1, "methods": QUICK})
+    answer = client.post("/compare", json=MOVE | {"duration": 0.1, "methods": methods})
     assert answer.status_code == 422 and answer.json()["type"] == "/problems/duration-too-short"
 
 

@@ -12,7 +12,7 @@ from models.robot import Array
 from optimizer.collision.bounding_tree import BoundingTree, point_segment
 from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
 from optimizer.collision.closed_form_distance import triangle_segment
-from optimizer.collision.clouds import LONGEST_EDGE, MOST_DIVIDED, MOST_KEPT_PARTS, Cloud, cloud_of, divided
+from optimizer.collision.clouds import LONGEST_EDGE, Cloud, divided
 from optimizer.collision.coal_distance import SKIN, coal_shape
 from optimizer.collision.cores import Core
 from optimizer.collision.model import CollisionModel
@@ -271,17 +271,6 @@ def test_the_planner_rejects_what_collides(kind: str) -> None:
     assert (valid == (distance > 0))[clear].all() and 5 < valid.sum() < 295
     strict = np.array([stricter.is_valid(each) for each in q])
     assert (strict == (distance > 5e-3))[np.abs(distance - 5e-3) > COAL].all()
-
-
-def test_a_repeated_obstacle_is_built_once_and_memory_is_bounded() -> None:
-    points = around(500, 21)
-    first = cloud_of(Points(points, 0.01))
-    assert cloud_of(Points(points.copy(), 0.02)) is first  # the radius is none of the tree's
-    kept = cloud_of.cache
-    before = kept.currsize
-    assert cloud_of(Points(points[:-1], 0.01)) is not first
-    # the cache counts parts, not obstacles
-    assert kept.currsize == before + 499 and kept.maxsize == MOST_KEPT_PARTS >= MOST_DIVIDED
 
 
 def test_two_obstacles_of_one_content_at_two_places() -> None:

@@ -18,6 +18,7 @@ from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.scene import Attachment, Cylinder, Mesh, Obstacle, Scene, Shape, Sphere, capsule_between
 from tests.optimizer.cells import LOADS, arm_in_cell
 from tests.optimizer.moves import ROBOT
+from tests.selection import long_but
 
 AGREEMENT = 1e-9  # m; closed forms against Coal's, and its iterations ended at 1e-12
 ITERATED = 5e-9  # m; two runs of Coal's iterations, where a round body makes them end early
@@ -53,10 +54,11 @@ def by_coal(model: CollisionModel, q: Array) -> Array:
     return result
 
 
+@pytest.mark.parametrize("count", long_but((12,), (12, 25)))
 @pytest.mark.parametrize("load", LOADS, ids=lambda shape: type(shape).__name__)
-def test_distances_are_coals(load: Shape) -> None:
+def test_distances_are_coals(load: Shape, count: int) -> None:
     model = CollisionModel(arm_in_cell(load))
-    q = configurations(12)
+    q = configurations(count)
     ours, theirs = model.signed_distances(q)[0], by_coal(model, q)
     closed = model.geometry.is_closed_form
     assert closed.sum() > 100 and (~closed).sum() > 20

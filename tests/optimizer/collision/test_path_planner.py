@@ -268,8 +268,9 @@ def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(monkeyp
     assert "allow a longer deadline" in str(cut_short.value)
 
 
-def test_a_failed_candidate_names_the_colliding_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planned_paths, "MOST_STATES", 2_000)
+@pytest.mark.parametrize("states", long_but((2_000,), (2_000, planned_paths.MOST_STATES)))
+def test_a_failed_candidate_names_the_colliding_bodies(states: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
     with pytest.raises(NoTrajectory) as raised:
         optimize(problem(*walled_in()))
     (candidate,) = raised.value.candidates

@@ -246,21 +246,21 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
         assert np.abs(bend / (2 * h) - hessian[:, k]).max() < DIFFERENCE * (1 + np.abs(hessian).max())
 
 
+@pytest.mark.parametrize("name", long_but(("up", "down"), MOVES))
 @pytest.mark.parametrize("bus", BUSES, ids=lambda bus: f"{bus.mode} {bus.efficiency} {bus.initial}")
-def test_bounds_hold_on_every_bus(bus: Bus) -> None:
+def test_bounds_hold_on_every_bus(name: str, bus: Bus) -> None:
     """The energies of optimised motions over other buses, too: every motion is one that each bus allows."""
-    for name in ("down", "up"):
-        move = MOVES[name]
-        task = PreparedProblem.of(problem(**move, payload=HEAVY, bus=bus))
-        start, goal = np.array(move["start"], dtype=float), np.array(move["goal"], dtype=float)
-        potential_gain = task.potential(goal) - task.potential(start)
-        bound = float(lower_bounds(task, (goal - start)[None], np.array([potential_gain]))[0][0])
-        for other in (Bus(), Bus("isolated"), Bus("recuperating", efficiency=1.0), STORE):
-            energy = task.energy(solved(name, other).trajectory.spline).electrical
-            assert energy.parts_sum == pytest.approx(energy.total, rel=1e-3)
-            assert bound <= energy.total
-        if bus.mode == "isolated":
-            assert bound >= ROBOT.electronics.idle_power * 0.3  # the electronics' share of 0.3 s and more
+    move = MOVES[name]
+    task = PreparedProblem.of(problem(**move, payload=HEAVY, bus=bus))
+    start, goal = np.array(move["start"], dtype=float), np.array(move["goal"], dtype=float)
+    potential_gain = task.potential(goal) - task.potential(start)
+    bound = float(lower_bounds(task, (goal - start)[None], np.array([potential_gain]))[0][0])
+    for other in (Bus(), Bus("isolated"), Bus("recuperating", efficiency=1.0), STORE):
+        energy = task.energy(solved(name, other).trajectory.spline).electrical
+        assert energy.parts_sum == pytest.approx(energy.total, rel=1e-3)
+        assert bound <= energy.total
+    if bus.mode == "isolated":
+        assert bound >= ROBOT.electronics.idle_power * 0.3  # the electronics' share of 0.3 s and more
 
 
 def test_inverter_figures_replace_the_robots() -> None:

@@ -19,6 +19,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from models.registry import robot_names
 from models.robot import Robot
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
@@ -79,9 +80,8 @@ class Workshop:
         return len(log.read_text().splitlines()) if log.exists() else 0
 
     @property
-    def library(self) -> Path:
-        (found,) = (self.folder / "cache").glob("*.so")
-        return found
+    def libraries(self) -> list[str]:
+        return sorted(map(str, (self.folder / "cache").glob("*.so")))
 
     def leftovers(self) -> list[str]:
         """What is in the cache besides the library, its seal and its lock."""
@@ -187,14 +187,16 @@ def test_a_damaged_library_is_noticed_and_rebuilt(workshop: Workshop, whole: Pat
     assert workshop.compilations == 1  # and is whole now
 
 
-def test_several_processes_make_one_library(workshop: Workshop) -> None:
+@pytest.mark.parametrize("names", long_but([["ur5e"]], [["ur5e"], []]), ids=lambda names: ", ".join(names) or "all")
+def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, names: list[str]) -> None:
     """Three at once into an empty folder: one compiles, the others wait for it, nothing is left lying about."""
-    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile", "ur5e"]
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-m", "optimizer.energy.precompile", *names]
     processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
-    printed = [process.communicate(timeout=120)[0].strip() for process in processes]
+    printed = [process.communicate(timeout=120)[0].splitlines() for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0]
-    assert printed == [str(workshop.library)] * 3
-    assert workshop.compilations == 1 and workshop.leftovers() == []
+    assert [sorted(each) for each in printed] == [workshop.libraries] * 3
+    assert workshop.compilations == len(workshop.libraries) == len(names or robot_names())
+    assert workshop.leftovers() == []
     assert kernel_for(workshop.robot).compiled
 
 

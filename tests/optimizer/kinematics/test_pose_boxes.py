@@ -21,6 +21,7 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem
+from tests.selection import long_but
 
 TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.9), np.array([0.03, -0.02, 0.15])).homogeneous
 # that joint positions may lie outside a box [rad]: angles are rounded, not bounds
@@ -66,12 +67,13 @@ def wrist_boxes(arm: Arm, pose: ConeOrientedPose) -> WristBoxes:
     return WristBoxes(geometry, pose)
 
 
+@pytest.mark.parametrize("count", long_but((30,), (30, 60)))
 @pytest.mark.parametrize("kind", [PoseBoxes, wrist_boxes])
 @pytest.mark.parametrize("half_angle", [0.0, 0.02, 0.3, 1.6, np.pi])
 @pytest.mark.parametrize("name", ARMS)
-def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, kind: Any) -> None:
+def test_what_reaches_the_pose_stays_in_its_box(name: str, half_angle: float, kind: Any, count: int) -> None:
     rng = np.random.default_rng(7)
-    for _ in range(30):
+    for _ in range(count):
         q, pose = reached(rng, ARMS[name], half_angle)
         centre, half = boxes_around(rng, q, 64)
         if kind is wrist_boxes:

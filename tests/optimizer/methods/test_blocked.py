@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -68,9 +70,15 @@ def planned_path(prepared: PreparedProblem) -> Array:
     return to_goal(method, plan(method))[0]
 
 
-@pytest.mark.parametrize("method", long_but(("bspline", "time_scaling", "polynomial_ga"), METHODS))
-def test_the_error_names_the_colliding_pair(method: MethodName, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planned_paths, "MOST_STATES", FEW_STATES)
+@pytest.mark.parametrize(
+    ("method", "states"),
+    long_but(
+        [(method, FEW_STATES) for method in ("bspline", "time_scaling", "polynomial_ga")],
+        product(METHODS, (FEW_STATES, planned_paths.MOST_STATES)),
+    ),
+)
+def test_the_error_names_the_colliding_pair(method: MethodName, states: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planned_paths, "MOST_STATES", states)
     problem = blocked(method, WALL)
     with pytest.raises(NoCollisionFreeTrajectory) as caught:
         optimize(problem)

@@ -26,6 +26,7 @@ from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import ends
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
+from tests.selection import long_but
 
 TURN = 2 * np.pi
 SAME = 1e-6  # rad; inverse kinematics agrees with itself to 1e-9
@@ -123,15 +124,16 @@ def test_between_poses_every_joint_may_go_either_way_round(own: Any) -> None:
         assert len(travels) == np.prod([len(set(np.round(travels[:, j], 6).tolist())) for j in range(6)])
 
 
+@pytest.mark.parametrize("count", long_but((800,), (800, 2000)))
 @pytest.mark.parametrize("own", [ROBOT.limits, NARROW], ids=["two turns", "one and a bit"])
-def test_between_poses_nothing_that_may_be_best_is_missing(own: Any) -> None:
+def test_between_poses_nothing_that_may_be_best_is_missing(own: Any, count: int) -> None:
     """Every pair of configurations has a candidate of its own displacement, or one that ends alike and travels no
     further."""
     task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), limits=own)
     kept = np.array([candidate.q_goal - candidate.q_start for candidate in candidates(task)])
     starts, goals = every_configuration(START, task), every_configuration(GOAL, task)
     rng = np.random.default_rng(1)
-    for _ in range(800):
+    for _ in range(count):
         displacement = goals[rng.integers(len(goals))] - starts[rng.integers(len(starts))]
         alike = np.abs(np.sin((kept - displacement) / 2)).max(axis=1) < SAME
         no_further = (np.abs(kept) <= np.abs(displacement) + SAME).all(axis=1)

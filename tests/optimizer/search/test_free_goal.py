@@ -298,11 +298,12 @@ def test_respects_the_deadline() -> None:
     assert any(each.status == "unvisited" for each in solution.candidates)
 
 
-def test_a_front_follows_a_goal_that_turns() -> None:
+@pytest.mark.parametrize("count", long_but((3,), (3, 4)))
+def test_a_front_follows_a_goal_that_turns(count: int) -> None:
     """Every point of a front goes where its own duration is cheapest: none is beaten by a longer one's motion."""
     # with little idle power, time costs little: slower motions need less energy
     robot = replace(ROBOT, electronics=replace(ROBOT.electronics, idle_power=4.0))
-    front = pareto(problem(goal=ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), robot=robot), 3, still)
+    front = pareto(problem(goal=ConeOrientedPose(tcp_pose(GOAL).T[:3, 3]), robot=robot), count, still)
     energies = [energy(point) for point in front.points]
     assert len(energies) >= 2 and energies == sorted(energies, reverse=True)
     assert all(point.certificate.valid and point.lower_bound <= energy(point) for point in front.points)

@@ -22,6 +22,7 @@ from optimizer.search.free_goal_bound import MOST_FIRST, family_bound
 from optimizer.search.lower_bound import lower_bounds
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose
+from tests.selection import long_but
 
 TOOL = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.9), np.array([0.03, -0.02, 0.15])).homogeneous
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -97,16 +98,24 @@ def test_the_bound_tells_far_from_near() -> None:
     assert far > near + 30
 
 
-@pytest.mark.parametrize("most", [MOST_FIRST, 1])
-def test_many_starts_are_bounded_together(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("most", "alone", "rounds", "rounds_at_goal"),
+    long_but(
+        [(most, 2, 20, 10) for most in (MOST_FIRST, 1)],
+        [(most, *given) for most in (MOST_FIRST, 8, 1) for given in ((2, 20, 10), (4, 30, 30))],
+    ),
+)
+def test_many_starts_are_bounded_together(
+    most: int, alone: int, rounds: int, rounds_at_goal: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also more starts than can have fine boxes at first: the bound of all is no higher than that of any."""
     monkeypatch.setattr(free_goal_bound, "MOST_FIRST", most)
     rng = np.random.default_rng(6)
     made, pose = PreparedProblem.of(problem(HOME, GOAL)), ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
     starts = HOME + rng.normal(scale=0.05, size=(4, 6))
-    together = family_bound(made, pose, starts, 20)
-    assert 0 < together <= min(family_bound(made, pose, start[None], 40) for start in starts[:2])
-    assert family_bound(made, pose, np.concatenate([starts, GOAL[None]]), 10) == 0
+    together = family_bound(made, pose, starts, rounds)
+    assert 0 < together <= min(family_bound(made, pose, start[None], 2 * rounds) for start in starts[:alone])
+    assert family_bound(made, pose, np.concatenate([starts, GOAL[None]]), rounds_at_goal) == 0
 
 
 def test_the_rim_of_the_tools_cone_is_covered() -> None:

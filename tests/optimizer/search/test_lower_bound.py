@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -211,19 +212,24 @@ def test_standing_still_costs_idling() -> None:
     assert bound(torques, q, q, duration_min=2.0)[0][0] == pytest.approx(36.7 * 2.0, rel=1e-3)
 
 
-def test_the_bound_is_the_least_over_the_duration() -> None:
+@pytest.mark.parametrize(
+    ("name", "pairs"),
+    long_but(
+        (("as it comes", 2), ("wide reversal", 2)), product(("as it comes", "hardly idle", "wide reversal"), (2, 4))
+    ),
+)
+def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None:
     """Against bounds at two thousand fixed durations: none is lower, and the least of them is as low."""
-    for name in ("as it comes", "wide reversal"):
-        torques = Torques(problem(**CONDITIONS[name]))
-        start, goal = ends(7, 2)
-        free, shortest = bound(torques, start, goal)
-        for k in range(2):
-            times = np.geomspace(shortest[k], LONGEST_DURATION, 2000)
-            each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[::20]]
-            assert free[k] <= min(each) * (1 + EXACT)
-            low = max(int(np.argmin(each)) - 1, 0) * 20
-            fine = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[low : low + 41]]
-            assert free[k] == pytest.approx(min(fine), rel=1e-4)  # between two of the durations
+    torques = Torques(problem(**CONDITIONS[name]))
+    start, goal = ends(7, pairs)
+    free, shortest = bound(torques, start, goal)
+    for k in range(pairs):
+        times = np.geomspace(shortest[k], LONGEST_DURATION, 2000)
+        each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[::20]]
+        assert free[k] <= min(each) * (1 + EXACT)
+        low = max(int(np.argmin(each)) - 1, 0) * 20
+        fine = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[low : low + 41]]
+        assert free[k] == pytest.approx(min(fine), rel=1e-4)  # between two of the durations
 
 
 def test_duration_bounds_raise_the_bound() -> None:

@@ -19,6 +19,7 @@ from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.spline import Spline, peak_rates, spline_of, time_scale
 from optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import PAYLOAD, TILTED, fixed, limits, problem
+from tests.selection import long_but
 
 # relative; corners of |tau v| fall inside the quadrature's panels, and the weightless bound is near a motion's work
 QUADRATURE = 1e-4
@@ -92,14 +93,15 @@ def _random_motion(rng: np.random.Generator, start: Array, goal: Array, rates: A
     return spline_of(space, points, fastest * (1 + 1e-9) * (1.0 if rng.random() < 0.5 else 10 ** rng.uniform(0, 1)))
 
 
+@pytest.mark.parametrize("count", long_but((80,), (80, 150)))
 @pytest.mark.parametrize("name", CONDITIONS)
-def test_no_random_motion_does_less_work(name: str) -> None:
+def test_no_random_motion_does_less_work(name: str, count: int) -> None:
     """Short and long, direct and on detours, with full turns, as fast as possible and slow."""
     rng = np.random.default_rng(2)
     task = prepared(1.0, **CONDITIONS[name])
     own = task.problem.arm.active_limits
     stronger = 0
-    for _ in range(80):
+    for _ in range(count):
         start = rng.uniform(own.q_min, own.q_max)
         goal = start + rng.uniform(-5.0, 5.0, 6) * 10 ** rng.uniform(-2, 0) * (rng.random(6) < 0.5)
         goal[:2] += rng.choice([0.0, -5.0, 5.0], 2)  # over the top, or through the bottom

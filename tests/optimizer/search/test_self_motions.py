@@ -25,6 +25,7 @@ from optimizer.search.ends import ends
 from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.solution import Solution
 from tests.optimizer.moves import ROBOT, problem, tcp_pose
+from tests.selection import long_but
 
 START = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 STRETCHED = np.array([0.6, -1.2, 1.3, -0.8, 0.0, 0.4])  # wrist
@@ -64,13 +65,14 @@ def test_a_pose_needs_no_more_than_its_configuration(goal: Array) -> None:
         assert posed.lower_bound <= energy(given)
 
 
-def test_the_answer_is_the_best_of_the_curve() -> None:
+@pytest.mark.parametrize("count", long_but((4,), (4, 7)))
+def test_the_answer_is_the_best_of_the_curve(count: int) -> None:
     answer = solved(START, tcp_pose(STRETCHED))
     # what is solved is a sample: whether another is better is not proven
     assert answer.status == "feasible"
     for motion in curves(STRETCHED):
         lower, upper = motion.arcs[0]
-        for member in motion.at(np.linspace(lower, upper, 4)):
+        for member in motion.at(np.linspace(lower, upper, count)):
             try:
                 other = solved(START, member)
             except JoulepathError:
