@@ -36,7 +36,7 @@ start = Pose(pointing_down(0.45, 0.3, 0.2))
 places = [Pose(pointing_down(x, -0.3, 0.2)) for x in (0.35, 0.45, 0.55)]
 
 # without full-turn alternatives, which would make some forty times as many candidates
-problem = Problem(arm=arm, start=start, goal=AnyOf(tuple(places)), windings=False, deadline=60.0)
+problem = Problem(arm=arm, start=start, goal=AnyOf(tuple(places)), windings=False, deadline=300.0)
 
 solution = optimize(problem)
 

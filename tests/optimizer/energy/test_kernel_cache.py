@@ -205,7 +205,7 @@ def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> Non
     code = (
         "from optimizer import Arm, Problem, load_robot, optimize\n"
         f"arm, start, goal = Arm(robot=load_robot('ur5e')), {START.tolist()}, {GOAL.tolist()}\n"
-        "print(optimize(Problem(arm=arm, start=start, goal=goal)).certificate.valid)\n"
+        "print(optimize(Problem(arm=arm, start=start, goal=goal, deadline=100)).certificate.valid)\n"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert (run.returncode, run.stdout.strip(), run.stderr) == (0, "True", "")
