@@ -13,6 +13,9 @@ import pinocchio as pin
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+# robots of whom models, kernels and inverse kinematics are kept ready; users may bring any number of arms
+MOST_ROBOTS = 64
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -134,7 +137,7 @@ class Robot:
 
     Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of links that cannot
     touch at any joint positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be
-    limited; None for an arm without one.
+    limited; None for an arm without one. `default_motion` is None for an arm whose controller's defaults are unknown.
     """
 
     name: str
@@ -145,7 +148,7 @@ class Robot:
     drives: Drives
     electronics: Electronics
     friction_laws: dict[str, FrictionLaw]
-    default_motion: DefaultMotion
+    default_motion: DefaultMotion | None
     capsules: tuple[LinkCapsule, ...]
     never_in_collision: frozenset[tuple[int, int]]
     figures: dict[str, Any] = field(repr=False)

@@ -7,7 +7,7 @@ from typing import Any
 TRUST = {
     "A": "maker's own file or data packet",
     "B": "fitted to measured data",
-    "C": "value from a paper, quoted second-hand",
+    "C": "value from a paper or another's file, second-hand",
     "T": "transferred from a sister robot",
     "E": "engineering default, no source",
 }
@@ -16,7 +16,7 @@ ENERGY_SECTIONS = ("inertials", "friction_laws", "drives", "electronics")
 _GROUPS = {
     "A": "the maker's own figures",
     "B": "figures fitted to measured data",
-    "C": "second-hand figures from papers",
+    "C": "second-hand figures",
     "T": "figures transferred from a sister robot",
     "E": "engineering defaults without a source",
 }

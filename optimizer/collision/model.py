@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from models.robot import Array, Mask, Robot
+from models.robot import MOST_ROBOTS, Array, Mask, Robot
 from optimizer.collision.bodies import Body, Indices, bodies_of
 from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from optimizer.kinematics.forward import joint_placements, link_frames
@@ -203,6 +203,6 @@ def collision_model(arm: Arm) -> CollisionModel:
     return _robot_alone(arm.robot) if bare else CollisionModel(arm)
 
 
-@cache
+@lru_cache(MOST_ROBOTS)
 def _robot_alone(robot: Robot) -> CollisionModel:
     return CollisionModel(Arm(robot=robot))

@@ -11,12 +11,12 @@ compiler, CasADi's virtual machine evaluates the same expressions.
 from __future__ import annotations
 
 import threading
-from functools import cache
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
-from models.robot import Array, Robot
+from models.robot import MOST_ROBOTS, Array, Robot
 from optimizer.deadline import checkpoint
 from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, seal_path
 from optimizer.energy.kernel_expressions import FUNCTION_NAMES, SYMBOLICS, build
@@ -162,14 +162,14 @@ class _Loader:
 _LOADERS = threading.Lock()
 
 
-@cache
+@lru_cache(MOST_ROBOTS)
 def _loader(robot: Robot) -> _Loader:
     return _Loader(robot)
 
 
 def kernel_for(robot: Robot) -> Kernel:
     """The kernel of a robot: compiled if the library is on disk, else interpreted while the compiler runs."""
-    # `cache` lets two threads that miss at the same time both build: only one loader may compile
+    # the cache lets two threads that miss at the same time both build: only one loader may compile
     with _LOADERS:
         loader = _loader(robot)
     return loader.get()

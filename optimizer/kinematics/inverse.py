@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import product
 from math import ceil, floor, tau
 from typing import Protocol
 
 import numpy as np
 
-from models.robot import Array, Limits, Robot
+from models.robot import MOST_ROBOTS, Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.jacobians import geometric_jacobian
@@ -99,7 +99,7 @@ class InverseKinematics(Protocol):
         ...
 
 
-@cache
+@lru_cache(MOST_ROBOTS)
 def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """The robot's inverse kinematics, built once; None for an arm that has none here."""
     form = URClosedForm.of(robot.model)

@@ -71,15 +71,19 @@ def baselines(
 
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
-    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]."""
+    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]. The last one is left
+    out for a robot whose controller's default motion is unknown."""
     limits = problem.arm.active_limits
     fastest = time_optimal(limits, q_start, q_goal)
+    default = problem.arm.robot.default_motion
+    known: dict[BaselineName, SampledMotion]
+    known = {} if default is None else {"controller_default": controller_default(limits, default, q_start, q_goal)}
     return {
         "trapezoid": trapezoid(limits, q_start, q_goal, duration),
         "quintic": quintic(q_start, q_goal, duration),
         "ruckig": fastest,
         "ruckig_slowed": fastest.scaled_to(duration),
-        "controller_default": controller_default(limits, problem.arm.robot.default_motion, q_start, q_goal),
+        **known,
     }
 
 

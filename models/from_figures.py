@@ -1,0 +1,86 @@
+"""A robot from its figures: section, figure, then value, unit, source, trust and note, as in a `figures.yaml`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pinocchio as pin
+
+from models.arrays import read_only
+from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, LinkCapsule, Robot, link_names
+from models.urdf import urdf_of
+
+
+def robot_of(name: str, figures: dict[str, Any]) -> Robot:
+    """The robot that the figures describe. Raises ValueError if one of them has not one entry for each joint."""
+    model = pin.buildModelFromXML(urdf_of(name, figures))
+    drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
+    model.armature = drives.rotor_inertia
+    limits, electronics = figures["limits"], figures["electronics"]
+    capsules = _capsules(figures, model)
+    return Robot(
+        name=name,
+        title=figures["title"],
+        model=model,
+        limits=Limits(
+            q_min=_joints(limits["position_min"], model.nq),
+            q_max=_joints(limits["position_max"], model.nq),
+            v_max=_joints(limits["velocity"], model.nq),
+            a_max=_joints(limits["acceleration"], model.nq),
+            j_max=_joints(limits["jerk"], model.nq),
+            tau_max=_joints(limits["torque"], model.nq),
+        ),
+        rated_payload=float(limits["rated_payload"]["value"]),
+        drives=drives,
+        electronics=Electronics(
+            **{part: float(electronics[part]["value"]) for part in Electronics.__dataclass_fields__}
+        ),
+        friction_laws=_friction_laws(figures, model.nq),
+        default_motion=_default_motion(figures),
+        capsules=capsules,
+        never_in_collision=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
+        figures=figures,
+        elbow=_elbow(figures, capsules),
+    )
+
+
+def _joints(figure: dict[str, Any], nq: int) -> Array:
+    """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises ValueError."""
+    return read_only(figure["value"], (nq,), "A figure over joints")
+
+
+def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, ...]:
+    """Capsules of all links, from the base on; those of a link in the order of its figure."""
+    rows = [
+        (link, read_only(row, (7,), f"A capsule of {name}"))
+        for link, name in enumerate(link_names(model))
+        for row in figures["collision"][name]["value"]
+    ]
+    return tuple(LinkCapsule(link, row[:6].reshape(2, 3), float(row[6])) for link, row in rows)
+
+
+def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:
+    """None for a robot whose maker publishes no default: one without this section."""
+    if "default_motion" not in figures:
+        return None
+    return DefaultMotion(**{part: float(figures["default_motion"][part]["value"]) for part in ("velocity", "acceleration")})
+
+
+def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCapsule | None:
+    """The last capsule of the link that the figure `elbow` names; None for a robot without this figure."""
+    if "elbow" not in figures["collision"]:
+        return None
+    link = figures["collision"]["elbow"]["value"]
+    return [capsule for capsule in capsules if capsule.link == link][-1]
+
+
+def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:
+    knee = float(figures["friction_table"]["knee"]["value"])
+    return {
+        name: FrictionLaw(
+            name=name,
+            knee=knee,
+            **{part: _joints(law[part], nq) for part in ("coulomb", "curved", "speed", "viscous")},
+        )
+        for name, law in figures["friction_laws"].items()
+    }

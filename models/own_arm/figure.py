@@ -1,0 +1,54 @@
+"""One figure: a value with its unit, source, trust letter and note, as a robot's file has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from models.own_arm.description import Description, InvalidArm, PerJoint
+from models.robot import Array
+
+
+def stated(description: Description, value: Any, unit: str, note: str) -> dict[str, Any]:
+    """A figure of the URDF, or of the description, whose source and letter the user states."""
+    return _figure(value, unit, description.source, description.trust, note)
+
+
+def assumed(value: Any, unit: str, note: str) -> dict[str, Any]:
+    """A figure that nobody gave."""
+    return _figure(value, unit, "none: engineering default", "E", note)
+
+
+def either(
+    description: Description, given: Any, default: Any, unit: str, notes: tuple[str, str]
+) -> dict[str, Any]:
+    """The figure that the user gave, or the default where it is None; `notes` on both."""
+    if given is None:
+        return assumed(default, unit, notes[1])
+    return stated(description, given, unit, notes[0])
+
+
+def per_joint(field: str, given: PerJoint | None, joints: tuple[str, ...], least: float = 0.0) -> Array | None:
+    """One value (nq,) for each joint. Raises InvalidArm unless all are above `least`; None stays None."""
+    if given is None:
+        return None
+    values = np.array(given, dtype=float)
+    if values.ndim and values.shape != (len(joints),):
+        raise InvalidArm(
+            field, f"{field} must be one number or a list of {len(joints)}, one per joint: {', '.join(joints)}."
+        )
+    values = np.broadcast_to(values, len(joints))
+    for value, joint in zip(values, joints, strict=True):
+        if not np.isfinite(value) or value < least or (least == 0 and field in POSITIVE and value == 0):
+            raise InvalidArm(field, f"{field} of joint {joint!r} must be a number above {least:g}.")
+    return np.asarray(values)
+
+
+# limits, of which none may be zero
+POSITIVE = ("acceleration", "velocity", "torque", "jerk")
+
+
+def _figure(value: Any, unit: str, source: str, trust: str, note: str) -> dict[str, Any]:
+    plain = value.tolist() if isinstance(value, np.ndarray) else value
+    return {"value": plain, "unit": unit, "source": source, "trust": trust, "note": note}

@@ -1,0 +1,173 @@
+"""The figures of a robot, as a bundled robot's file has them, from the description of a user's own arm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from models.own_arm import rules
+from models.own_arm.collision_figures import collision_figures
+from models.own_arm.description import Description, InvalidArm
+from models.own_arm.energy_figures import drives, electronics, friction
+from models.own_arm.figure import assumed, either, per_joint, stated
+from models.own_arm.upright import UprightChain
+from models.own_arm.urdf_chain import Chain, chain_of
+from models.urdf import BASE, FLANGE
+
+_PLACEMENT = "x, y, z, roll, pitch, yaw"
+
+
+def own_figures(name: str, description: Description) -> tuple[dict[str, Any], list[str]]:
+    """Figures of a robot with this name; and warnings: what is hardly real, and which figures are defaults.
+
+    Raises InvalidArm, which names the field of the description, and the link or joint.
+    """
+    chain = chain_of(description)
+    upright, links = UprightChain.of(chain), _link_names(chain)
+    warnings = list[str]()
+    limits = _limits(description, chain)
+    tau_max = np.array(limits["torque"]["value"])
+    figures = {
+        "title": description.title or name,
+        "kinematics": _kinematics(description, chain, upright, links),
+        "inertials": _inertials(description, chain, upright, warnings),
+        "limits": limits,
+        "collision": collision_figures(description, chain, upright, links),
+        "drives": drives(description, chain.joints, tau_max),
+        "electronics": electronics(description, chain.nq),
+        "friction_table": {"knee": assumed(rules.KNEE, "rad/s", "Coulomb friction's step is spread over this speed.")},
+        "friction_laws": {"coulomb_viscous": friction(description, chain.joints, tau_max)},
+    }
+    if (motion := description.default_motion) is not None:
+        if min(motion.velocity, motion.acceleration) <= 0:
+            raise InvalidArm("default_motion", "default_motion must have a speed and an acceleration above 0.")
+        figures["default_motion"] = {
+            "velocity": stated(description, motion.velocity, "rad/s", "Of the leading joint."),
+            "acceleration": stated(description, motion.acceleration, "rad/s²", "Of the leading joint."),
+        }
+    defaults = ", ".join(_assumed(figures))
+    return figures, [*warnings, f"Engineering defaults, see their notes: {defaults}."] if defaults else warnings
+
+
+def _link_names(chain: Chain) -> list[str]:
+    """Names of the moving links. Those that stand for the two ends of every robot are not theirs."""
+    names = list[str]()
+    for link in chain.links:
+        while link in (BASE, FLANGE, *names):
+            link += "_link"
+        names.append(link)
+    return names
+
+
+def _kinematics(description: Description, chain: Chain, upright: UprightChain, links: list[str]) -> dict[str, Any]:
+    frame = f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the joint turns about z."
+    return {
+        "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
+        "link_names": stated(description, links, "1", "The link that each joint moves."),
+        "joint_origin": stated(description, [_row(each) for each in upright.placements], "m, rad", frame),
+        "flange_origin": stated(
+            description, _row(upright.flange), "m, rad", f"{_PLACEMENT} of the tip in the frame of the last link."
+        ),
+    }
+
+
+def _row(placement: pin.SE3) -> list[float]:
+    return [*placement.translation.tolist(), *pin.rpy.matrixToRpy(placement.rotation).tolist()]
+
+
+def _inertials(
+    description: Description, chain: Chain, upright: UprightChain, warnings: list[str]
+) -> dict[str, Any]:
+    """Of each moving link with all that is fixed to it."""
+    ends = [*upright.placements[1:], upright.flange]
+    for link, body, end in zip(chain.links, upright.inertias, ends, strict=True):
+        _check_body(link, body, float(np.linalg.norm(end.translation)), warnings)
+    tensors = [[body.inertia[i, j] for i, j in _ENTRIES] for body in upright.inertias]
+    return {
+        "mass": stated(
+            description, [body.mass for body in upright.inertias], "kg", "Of the moving links, with what is fixed to them."
+        ),
+        "center_of_mass": stated(
+            description, [body.lever.tolist() for body in upright.inertias], "m", "In the link frame: z along the joint."
+        ),
+        "inertia_frame_rpy": stated(
+            description, [[0.0, 0.0, 0.0]] * chain.nq, "rad", "The tensors' axes are those of the link frame."
+        ),
+        "inertia": stated(
+            description, [[float(entry) for entry in row] for row in tensors], "kg·m²",
+            "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, in the link frame.",
+        ),
+    }  # fmt: skip
+
+
+_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]) -> None:
+    """Whether a body can be real; a warning where it hardly is. `length` [m] to the next joint."""
+    if not body.mass > 0:
+        raise InvalidArm("urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>.")
+    if not np.isfinite([body.mass, *body.lever, *body.inertia.ravel()]).all():
+        raise InvalidArm("urdf", f"Link {link!r} has an inertia that is not finite.")
+    moments = np.linalg.eigvalsh(body.inertia)
+    if moments[0] < -rules.ROUNDED * abs(moments[2]):
+        raise InvalidArm("urdf", f"Link {link!r} has an inertia with a negative principal moment of {moments[0]:.3g}.")
+    excess = moments[2] / max(moments[0] + moments[1], 1e-300) - 1
+    if moments[2] > 0 and excess > rules.IMPOSSIBLE:
+        raise InvalidArm(
+            "urdf",
+            f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² is more than the sum "
+            f"of the others, {moments[0] + moments[1]:.3g} kg·m².",
+        )
+    if moments[2] > 0 and excess > rules.ROUNDED:
+        warnings.append(f"Link {link!r}: a principal moment is {excess:.1%} above the sum of the others.")
+    least = rules.LEAST_GYRATION * length / np.sqrt(12)
+    gyration = float(np.sqrt(max(moments[2], 0.0) / body.mass))
+    if gyration < least:
+        warnings.append(
+            f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} m, 0.7 of that of a rod "
+            "to the next joint."
+        )
+
+
+def _limits(description: Description, chain: Chain) -> dict[str, Any]:
+    acceleration = per_joint("acceleration", description.acceleration, chain.joints)
+    assert acceleration is not None
+    jerk = per_joint("jerk", description.jerk, chain.joints)
+    found = {}
+    for field, given, of_urdf, part in (
+        ("velocity", description.velocity, chain.v_max, "velocity"),
+        ("torque", description.torque, chain.tau_max, "effort"),
+    ):
+        values = per_joint(field, given, chain.joints)
+        for joint, value in zip(chain.joints, of_urdf, strict=True):
+            if values is None and not value > 0:
+                raise InvalidArm(
+                    field, f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or give `{field}`."
+                )
+        found[field] = of_urdf if values is None else values
+    if not (np.isfinite(description.payload) and description.payload >= 0):
+        raise InvalidArm("payload", "payload must be a mass in kg, 0 or more.")
+    return {
+        "position_min": stated(description, chain.q_min, "rad", "A joint without end has one turn to either side."),
+        "position_max": stated(description, chain.q_max, "rad", "A joint without end has one turn to either side."),
+        "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
+        "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
+        "jerk": either(
+            description, jerk, rules.JERK * acceleration, "rad/s³", ("Symmetric.", rules.NOTES["jerk"])
+        ),
+        "torque": stated(description, found["torque"], "N·m", "Of the motor, behind the gear; friction included."),
+        "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
+    }
+
+
+def _assumed(figures: dict[str, Any]) -> Iterator[str]:
+    """Places of the figures that are defaults."""
+    for name, content in figures.items():
+        if isinstance(content, dict) and content.get("trust") == "E":
+            yield name
+        elif isinstance(content, dict) and "value" not in content:
+            yield from (f"{name}.{each}" for each in _assumed(content))

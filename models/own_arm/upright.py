@@ -1,0 +1,46 @@
+"""A chain whose joints all turn about the z axis of their own frames, as every robot's do here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from models.own_arm.urdf_chain import Chain
+from models.robot import Array
+
+
+@dataclass(frozen=True)
+class UprightChain:
+    """`R` (nq + 1, 3, 3): axes of each link's frame in the URDF's, the base first. `placements`: each joint's frame in
+    the one before; `flange`: the tip in the last; `inertias` of the moving links, in their frames."""
+
+    R: Array
+    placements: tuple[pin.SE3, ...]
+    flange: pin.SE3
+    inertias: tuple[pin.Inertia, ...]
+
+    @staticmethod
+    def of(chain: Chain) -> UprightChain:
+        """The same arm with its frames turned."""
+        R = np.array([np.eye(3), *(_onto(axis) for axis in chain.axes)])
+        # the base keeps its own axes, wherever it stands in the URDF
+        turns = [pin.SE3(chain.T_base), *(pin.SE3(each, np.zeros(3)) for each in R[1:])]
+        placements = list(chain.model.jointPlacements)[1:]
+        return UprightChain(
+            R,
+            tuple(turns[k].inverse() * each * turns[k + 1] for k, each in enumerate(placements)),
+            turns[-1].inverse() * pin.SE3(chain.T_tip),
+            tuple(turn.actInv(body) for turn, body in zip(turns[1:], list(chain.model.inertias)[1:], strict=True)),
+        )
+
+
+def _onto(axis: Array) -> Array:
+    """The rotation (3, 3) of least angle that turns the z axis into a unit vector (3,)."""
+    x, y, z = axis
+    if z < -0.5:
+        # about x by half a turn, and on from there
+        return np.asarray(np.diag([1.0, -1.0, -1.0]) @ _onto(np.array([x, -y, -z])))
+    v = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
+    return np.asarray(np.eye(3) + v + v @ v / (1 + z))

@@ -1,0 +1,277 @@
+"""The chain of joints from base to tip in a URDF: checked by name here, read and merged by Pinocchio."""
+
+from __future__ import annotations
+
+import copy
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NoReturn
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from models.own_arm.description import Description, InvalidArm
+from models.robot import Array
+
+MOST_JOINTS, MOST_ELEMENTS = 16, 5_000
+MOST_NAMES = 12
+# a continuous joint turns without end; it is planned over one turn to either side [rad]
+CONTINUOUS = 2 * math.pi
+TURNING, FIXED = ("revolute", "continuous"), "fixed"
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The moving joints from base to tip, `nq` of them, and what a URDF says of each.
+
+    `model`: Pinocchio's, with these joints alone; what others carry is merged into their links. `links` are the names
+    of the links that the joints move, `T_base` (4, 4) places the base link in the model's world, `T_tip` (4, 4) the tip
+    in the frame of the last joint. `axes` (nq, 3): unit vectors that the joints turn about, in their frames. Limits (nq,): position [rad], speed [rad/s], torque [N·m]; 0 where none is given.
+    `rigid` names, for the base and each joint, the URDF links that move with it.
+    """
+
+    model: pin.Model
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    rigid: tuple[tuple[str, ...], ...]
+    axes: Array
+    T_base: Array
+    T_tip: Array
+    q_min: Array
+    q_max: Array
+    v_max: Array
+    tau_max: Array
+    base: str
+    root: Element
+
+    @property
+    def nq(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+
+def chain_of(description: Description) -> Chain:
+    """The chain of a description. Raises InvalidArm, which names the link or joint."""
+    root = _parsed(description.urdf)
+    tree = _Tree.of(root)
+    locked = dict(description.locked or {})
+    base = description.base or tree.root
+    for field, link in (("base", base), ("tip", description.tip)):
+        if link not in tree.links:
+            _refuse(field, f"There is no link {link!r} in the URDF: its links are {_listed(tree.links)}.")
+    for name in locked:
+        if name not in tree.joints:
+            _refuse("locked", f"There is no joint {name!r} in the URDF: its joints are {_listed(tree.joints)}.")
+    path = tree.path(base, description.tip)
+    moving = [joint for joint in path if joint.get("type") != FIXED and joint.get("name") not in locked]
+    _check_chain(moving)
+    _check_rest(tree, moving, locked)
+    return _merged(root, tree, moving, locked, base, description.tip)
+
+
+@dataclass(frozen=True)
+class _Tree:
+    """Links and joints by name, and the joint above each link."""
+
+    links: tuple[str, ...]
+    joints: Mapping[str, Element]
+    above: Mapping[str, Element]
+    root: str
+
+    @staticmethod
+    def of(robot: Element) -> _Tree:
+        links = tuple(_name(each) for each in robot.findall("link"))
+        joints = {_name(each): each for each in robot.findall("joint")}
+        for kind, names, count in (("link", links, len(set(links))), ("joint", joints, len(robot.findall("joint")))):
+            if count != len(names):
+                _refuse("urdf", f"Two {kind}s of the URDF have one name: give each a name of its own.")
+        above: dict[str, Element] = {}
+        for name, joint in joints.items():
+            parent, child = (_end(joint, side) for side in ("parent", "child"))
+            for link in (parent, child):
+                if link not in links:
+                    _refuse("urdf", f"Joint {name!r} is at a link {link!r} that the URDF does not have.")
+            if child in above:
+                _refuse("urdf", f"Link {child!r} hangs on two joints: a URDF is a tree.")
+            above[child] = joint
+        if not links:
+            _refuse("urdf", "The URDF has no <link>.")
+        roots = [link for link in links if link not in above]
+        if len(roots) != 1:
+            _refuse("urdf", f"A URDF has one root link, not {len(roots)}: {_listed(roots)}.")
+        return _Tree(links, joints, above, roots[0])
+
+    def path(self, base: str, tip: str) -> list[Element]:
+        """Joints from base to tip."""
+        found, link = list[Element](), tip
+        while link != base:
+            if link not in self.above:
+                _refuse("tip", f"The tip {tip!r} is not carried by the base {base!r}: name a base that it hangs on.")
+            found.append(self.above[link])
+            link = _end(found[-1], "parent")
+        return found[::-1]
+
+    def carrier(self, link: str, moving: Mapping[str, int]) -> int:
+        """Number of the chain's joint that carries a link, 0 for none."""
+        while link in self.above:
+            joint = self.above[link]
+            if _name(joint) in moving:
+                return moving[_name(joint)]
+            link = _end(joint, "parent")
+        return 0
+
+
+def _parsed(text: str) -> Element:
+    """The root element of a URDF."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        _refuse("urdf", "The URDF has a document type: leave it out.")
+    # generated files still quote their macros in comments
+    plain = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+    if "<xacro:" in plain or "${" in plain:
+        _refuse("urdf", "This is xacro: make a URDF of it first, by `xacro arm.urdf.xacro > arm.urdf`.")
+    try:
+        root = ElementTree.fromstring(_declared(text))
+    except (ElementTree.ParseError, ValueError) as error:
+        _refuse("urdf", f"The URDF is not XML: {error}.")
+    if root.tag != "robot":
+        _refuse("urdf", "The root element of a URDF is <robot>.")
+    if sum(1 for _ in root) > MOST_ELEMENTS:
+        _refuse("urdf", f"The URDF has more than {MOST_ELEMENTS} links and joints.")
+    return root
+
+
+def _declared(text: str) -> str:
+    """The text with its prefixes declared: readers of URDF take tags and attributes of tools without."""
+    used = set(re.findall(r"</?([A-Za-z][\w.-]*):", text)) | set(re.findall(r"\s([A-Za-z][\w.-]*):[\w.-]+\s*=", text))
+    missing = used - set(re.findall(r"xmlns:([\w.-]+)\s*=", text)) - {"xml", "xmlns"}
+    names = "".join(f' xmlns:{prefix}="{prefix}"' for prefix in sorted(missing))
+    return re.sub(r"<robot\b", f"<robot{names}", text, count=1)
+
+
+def _check_chain(moving: list[Element]) -> None:
+    """Whether the moving joints of the chain are plain revolute ones with limits."""
+    if not 1 <= len(moving) <= MOST_JOINTS:
+        _refuse("tip", f"Between base and tip {len(moving)} joints move: from 1 to {MOST_JOINTS} are possible.")
+    for joint in moving:
+        name, kind = _name(joint), joint.get("type")
+        if kind not in TURNING:
+            _refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move; hold it by a position in `locked`.")
+        if joint.find("mimic") is not None:
+            _refuse("urdf", f"Joint {name!r} mimics another one: hold it by a position in `locked`.")
+        limit = joint.find("limit")
+        if kind == "revolute" and (limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib):
+            _refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
+        if kind == "revolute" and not _number(limit, "lower", name) < _number(limit, "upper", name):
+            _refuse("urdf", f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it fixed.")
+
+
+def _check_rest(tree: _Tree, moving: list[Element], locked: Mapping[str, float]) -> None:
+    """Whether nothing moves that hangs on the chain beside it."""
+    names = {_name(joint): k for k, joint in enumerate(moving, start=1)}
+    for name, joint in tree.joints.items():
+        if name in names or name in locked or joint.get("type") == FIXED:
+            continue
+        if tree.carrier(_end(joint, "parent"), names):
+            _refuse("locked", f"Joint {name!r} moves a link beside the chain to the tip: give its position in `locked`.")
+
+
+def _merged(
+    root: Element, tree: _Tree, moving: list[Element], locked: Mapping[str, float], base: str, tip: str
+) -> Chain:
+    """The chain, as Pinocchio reads and reduces it."""
+    ranges, bare = [_range(joint) for joint in moving], copy.deepcopy(root)
+    for joint in bare.findall("joint"):
+        # Pinocchio gives a continuous joint two coordinates
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0") if limit is None else limit
+            limit.set("lower", repr(-CONTINUOUS))
+            limit.set("upper", repr(CONTINUOUS))
+    for link in bare.findall("link"):
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(shape)
+    names = {_name(joint): k for k, joint in enumerate(moving, start=1)}
+    given = {f"joint {k}": _name(joint) for k, joint in enumerate(bare.findall("joint"))}
+    for unique, joint in zip(given, bare.findall("joint"), strict=True):
+        joint.set("name", unique)  # a URDF's joints may be named as its links are, Pinocchio's frames may not
+    try:
+        whole = pin.buildModelFromXML(ElementTree.tostring(bare, encoding="unicode"))
+        q, held = pin.neutral(whole), [k for k in range(1, whole.njoints) if given.get(whole.names[k]) not in names]
+        for k in held:
+            if whole.joints[k].nq == 1:
+                q[whole.joints[k].idx_q] = locked.get(given.get(whole.names[k], ""), 0.0)
+        model = pin.buildReducedModel(whole, held, q)
+    except (RuntimeError, ValueError, IndexError) as error:
+        _refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
+    rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
+    for link in tree.links:
+        rigid[tree.carrier(link, names)].append(link)
+    at = {name: model.frames[model.getFrameId(name, pin.FrameType.BODY)].placement.homogeneous for name in (base, tip)}
+    q_min, q_max, v_max, tau_max = (np.array(column) for column in zip(*ranges, strict=True))
+    axes = np.array([_axis(joint) for joint in moving])
+    return Chain(
+        model, tuple(names), tuple(_end(joint, "child") for joint in moving), tuple(map(tuple, rigid)),
+        axes, at[base], at[tip], q_min, q_max, v_max, tau_max, base, root,
+    )  # fmt: skip
+
+
+def _range(joint: Element) -> tuple[float, float, float, float]:
+    """Least and greatest position, greatest speed and torque; 0 where the URDF has none."""
+    limit, name = joint.find("limit"), _name(joint)
+    ends = (-CONTINUOUS, CONTINUOUS)
+    if joint.get("type") == "revolute":
+        ends = _number(limit, "lower", name), _number(limit, "upper", name)
+    speed, torque = (abs(_number(limit, part, name)) for part in ("velocity", "effort"))
+    return *ends, speed, torque
+
+
+def _axis(joint: Element) -> Array:
+    """Unit vector (3,) that a joint turns about, in its frame; x if the URDF names none."""
+    element = joint.find("axis")
+    try:
+        axis = np.array([float(part) for part in ("1 0 0" if element is None else element.get("xyz", "")).split()])
+    except ValueError:
+        axis = np.zeros(0)
+    if axis.shape != (3,) or not np.isfinite(axis).all() or not np.linalg.norm(axis) > 0:
+        _refuse("urdf", f"Joint {_name(joint)!r} has an <axis> that is no vector of three numbers.")
+    return np.asarray(axis / np.linalg.norm(axis))
+
+
+def _number(limit: Element | None, part: str, joint: str) -> float:
+    text = "0" if limit is None else limit.get(part, "0")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        _refuse("urdf", f"Joint {joint!r} has a limit `{part}` that is no finite number.")
+    return value
+
+
+def _end(joint: Element, side: str) -> str:
+    end = joint.find(side)
+    link = None if end is None else end.get("link")
+    if not link:
+        _refuse("urdf", f"Joint {_name(joint)!r} has no <{side}> link.")
+    return link
+
+
+def _name(element: Element) -> str:
+    name = element.get("name")
+    if not name or len(name) > 100 or not name.isprintable():
+        _refuse("urdf", f"A {element.tag} of the URDF has no name of up to 100 printable characters.")
+    return name
+
+
+def _listed(names: object) -> str:
+    found = list(names)  # type: ignore[call-overload]
+    return ", ".join(found[:MOST_NAMES]) + (f" and {len(found) - MOST_NAMES} others" if len(found) > MOST_NAMES else "")
+
+
+def _refuse(field: str, message: str) -> NoReturn:
+    raise InvalidArm(field, message)
