@@ -12,6 +12,8 @@ ServiceError
 ├── UnknownStudy        no study has that id
 │   └── UnknownIteration
 ├── EmptyStudy          the study has no iteration yet
+├── RobotExists         the name of a robot is taken
+├── TooManyRobots       the service holds as many robots of users as it may
 ├── KeyReused           the Idempotency-Key was used for a different request
 └── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType
 """
@@ -104,6 +106,21 @@ class EmptyStudy(ServiceError):
     """The study has no iteration that suggestions could start from."""
 
     MESSAGE = "The study has no iteration yet: add a first iteration, then ask for suggestions."
+
+
+class RobotExists(ServiceError):
+    """The name of a robot is taken, or is that of a robot that comes with the service."""
+
+    MESSAGE = (
+        "A robot has this name: use another one. PUT replaces a robot that was added; the robots that come with the "
+        "service cannot be changed or deleted."
+    )
+
+
+class TooManyRobots(ServiceError):
+    """The service holds as many robots of users as it may."""
+
+    MESSAGE = "The service holds as many added robots as it may: delete one that is not used."
 
 
 class KeyReused(ServiceError):

@@ -38,6 +38,7 @@ class Settings(BaseSettings):
         description="Robots whose kernels every worker loads before it is ready, separated by commas; others at "
         "their first request.",
     )
+    max_robots: int = Field(default=100, ge=0, description="Robots of users' own that the database holds at most.")
     queue_size: int = Field(
         default=16, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
     )

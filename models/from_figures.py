@@ -10,6 +10,9 @@ from models.arrays import read_only
 from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, LinkCapsule, Robot, link_names
 from models.urdf import urdf_of
 
+# figures of the section `collision` that are no link's capsules
+NO_LINKS = ("elbow", "meshes", "never_meet")
+
 
 def robot_of(name: str, figures: dict[str, Any]) -> Robot:
     """The robot that the figures describe. Raises ValueError if one of them has not one entry for each joint."""
@@ -63,7 +66,9 @@ def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:
     """None for a robot whose maker publishes no default: one without this section."""
     if "default_motion" not in figures:
         return None
-    return DefaultMotion(**{part: float(figures["default_motion"][part]["value"]) for part in ("velocity", "acceleration")})
+    return DefaultMotion(
+        **{part: float(figures["default_motion"][part]["value"]) for part in ("velocity", "acceleration")}
+    )
 
 
 def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCapsule | None:

@@ -78,11 +78,11 @@ class InvalidTable(InvalidProblem):
 
 
 class UnknownRobot(JoulepathError):
-    """No robot of that name."""
+    """No robot is named `name`; `known` are the names of all."""
 
-    def __init__(self, known: Sequence[str]) -> None:
+    def __init__(self, name: str, known: Sequence[str]) -> None:
         super().__init__(f"There is no robot of that name: use one of {', '.join(known)}.")
-        self.known = list(known)
+        self.name, self.known = name, list(known)
 
 
 @dataclass(frozen=True)

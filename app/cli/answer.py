@@ -54,25 +54,30 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
     try:
         return model.model_validate_json(body)
     except ValidationError as error:
-        raise _refused(invalid_request(error, "body"), request_id) from None
+        raise refused(invalid_request(error, "body"), request_id) from None
 
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
+    from app.cli.store import with_own_robot
     from app.exceptions import ServiceError
-    from optimizer.exceptions import JoulepathError
+    from optimizer.exceptions import JoulepathError, UnknownRobot
 
     try:
-        return task.run(deadline).document
+        try:
+            return task.run(deadline).document
+        except UnknownRobot as error:
+            return with_own_robot(task, error.name).run(deadline).document
     except (JoulepathError, ServiceError) as error:
-        raise _refused(error, request_id) from None
+        raise refused(error, request_id) from None
 
 
-def _refused(error: Exception, request_id: str) -> Refused:
+def refused(error: Exception, request_id: str | None = None) -> Refused:
+    """What a command raises for an error of the library or the service."""
     from app.engine.result import json_document
     from app.http.problem_details import problem_content
 
-    return Refused(json_document(problem_content(error, request_id)))
+    return Refused(json_document(problem_content(error, request_id or new_id())))
 
 
 def compile_kernel_of(robot_name: str) -> None:
@@ -80,13 +85,15 @@ def compile_kernel_of(robot_name: str) -> None:
 
     Without a C compiler, and for a robot that nobody knows, nothing happens.
     """
-    from models.registry import load_robot, robot_names
+    from app.cli.store import robot_named
+    from app.exceptions import StoreUnavailable
     from optimizer.energy.kernel_cache import compile_kernel
+    from optimizer.exceptions import UnknownRobot
 
-    if robot_name not in robot_names():
-        return
     try:
-        compile_kernel(load_robot(robot_name))
+        compile_kernel(robot_named(robot_name))
+    except (UnknownRobot, StoreUnavailable):
+        return  # the answer says so
     except (RuntimeError, OSError):
         return  # CasADi's virtual machine evaluates the same expressions
 

@@ -2,23 +2,105 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
 import click
 
-from app.cli.answer import write
+from app.cli.answer import refused, write
+from app.cli.store import in_store
 
 
-@click.command(
+@click.group(
+    invoke_without_command=True,
     epilog="""\b
-Example:
-  joulepath robots"""
+Examples:
+  joulepath robots
+  joulepath robots add my_arm.yaml""",
 )
-def robots() -> None:
-    """Lists the robots that a request can name.
+@click.pass_context
+def robots(context: click.Context) -> None:
+    """Lists the robots that a request can name; adds and removes robots of your own.
 
     The columns are the name, the title, the number of joints, the rated payload [kg], and the trust letters of the
     parameters that energies depend on. A: published by the manufacturer, B: fitted to measured data, C: second-hand
-    from a paper, T: transferred from a sister robot, E: engineering default without a source.
+    from a paper or another's file, T: transferred from a sister robot, E: engineering default without a source.
     """
+    if context.invoked_subcommand is None:
+        write(_table().encode(), None)
+
+
+@robots.command(
+    epilog="""\b
+Example:
+  joulepath robots add my_arm.yaml --replace"""
+)
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--name", help="Name in requests. Default: that of FILE.")
+@click.option("--replace", is_flag=True, help="Replace a robot of this name that was added before.")
+def add(file: Path, name: str | None, replace: bool) -> None:
+    """Adds an arm of your own to the database of the service: JOULEPATH_DATABASE_URL.
+
+    FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
+    """
+    from app.exceptions import RobotExists, ServiceError
+    from app.schemas.own_arm import NAME_PATTERN
+    from app.settings import Settings
+    from app.store import robots as stored
+    from app.store.tables import OwnRobot, now
+    from models.own_arm.description import InvalidArm
+    from models.own_arm.figures import own_figures
+    from models.own_arm.reading import read_description
+    from models.own_arm.robots import own_robot
+    from models.registry import robot_names
+    from models.trust import energy_trust
+    from optimizer.exceptions import InvalidProblem
+
+    name = file.stem if name is None else name
+    if not NAME_PATTERN.fullmatch(name):
+        raise click.UsageError("The name must have small letters, digits, - and _ only: give another one by --name.")
+    try:
+        if name in robot_names():
+            raise RobotExists
+        figures, warnings = own_figures(name, read_description(file))
+        row = OwnRobot(name=name, created=now(), figures=figures, warnings=warnings)
+        put = partial(stored.put if replace else stored.add, robot=row, most=Settings().max_robots)
+        in_store(lambda store: store.write(put))
+    except InvalidArm as error:
+        raise refused(InvalidProblem(error.field, str(error))) from None
+    except ServiceError as error:
+        raise refused(error) from None
+    robot = own_robot(name, figures)
+    write("\n".join([f"{name}: {robot.nq} joints. {energy_trust(figures)}", *warnings]).encode(), None)
+
+
+@robots.command(
+    epilog="""\b
+Example:
+  joulepath robots remove my_arm"""
+)
+@click.argument("name")
+def remove(name: str) -> None:
+    """Deletes a robot that was added. Studies and stored answers about it stay."""
+    from app.exceptions import RobotExists, ServiceError
+    from app.store import robots as stored
+    from models.registry import robot_names
+    from optimizer.exceptions import UnknownRobot
+
+    try:
+        if name in robot_names():
+            raise RobotExists
+        if not in_store(lambda store: store.write(partial(stored.delete, name=name))):
+            raise UnknownRobot(name, [*robot_names(), *in_store(lambda store: store.read(stored.names))])
+    except (ServiceError, UnknownRobot) as error:
+        raise refused(error) from None
+
+
+def _table() -> str:
+    """Bundled robots, then those in the database; without these where the database does not answer."""
+    from app.exceptions import StoreUnavailable
+    from app.store import robots as stored
+    from models.own_arm.robots import own_robot
     from models.registry import load_robot, robot_names
     from models.trust import ENERGY_SECTIONS, trust_letters
 
@@ -29,10 +111,15 @@ def robots() -> None:
         "payload [kg]",
         *(f"trust: {part.replace('_', ' ')}" for part in ENERGY_SECTIONS),
     )
+    found = [load_robot(name) for name in robot_names()]
+    try:
+        found += [own_robot(each.name, each.figures) for each in in_store(lambda store: store.read(stored.all_of))]
+    except StoreUnavailable:
+        click.echo("The database does not answer: robots that were added are not listed.", err=True)
     rows = [head]
-    for robot in map(load_robot, robot_names()):
+    for robot in found:
         letters = (" ".join(sorted(trust_letters(robot.figures[part]))) for part in ENERGY_SECTIONS)
         rows.append((robot.name, robot.title, str(robot.nq), f"{robot.rated_payload:g}", *letters))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
-    write("\n".join(lines).encode(), None)
+    return "\n".join(lines)

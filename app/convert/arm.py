@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 
+from app.convert.own_robots import own_figures_of
 from app.convert.pose import to_matrix
 from app.convert.scene import to_attachment, to_scene, to_tool
 from app.schemas import arm as asked
+from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
 from models.robot import Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, UnknownRobot
@@ -18,10 +20,16 @@ from optimizer.problem.tool_cone import ToolCone
 
 
 def robot_named(name: str) -> Robot:
-    """The robot with this name. Raises UnknownRobot."""
-    if name not in robot_names():
-        raise UnknownRobot(robot_names())
-    return load_robot(name)
+    """The robot with this name: one that comes with the library, or the own robot of this request.
+
+    Raises UnknownRobot.
+    """
+    if name in robot_names():
+        return load_robot(name)
+    figures = own_figures_of(name)
+    if figures is None:
+        raise UnknownRobot(name, robot_names())
+    return own_robot(name, figures)
 
 
 def to_arm(request: asked.ArmRequest) -> Arm:

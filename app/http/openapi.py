@@ -89,7 +89,8 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
     # put in here, because FastAPI leaves out what is null in the examples of a route
     for path, by_media_type in BODY_EXAMPLES.items():
         for media_type, examples in by_media_type.items():
-            document["paths"][path]["post"]["requestBody"]["content"][media_type]["examples"] = examples
+            operation = document["paths"][path].get("post") or document["paths"][path]["put"]
+            operation["requestBody"]["content"][media_type]["examples"] = examples
     for deadline in _deadlines(document):
         deadline["maximum"] = settings.max_deadline
         if "default" in deadline:

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas.compare import CompareRequest, CompareResponse
@@ -26,7 +26,7 @@ async def compare(
     request: Request,
     body: CompareRequest,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
 ) -> Response:
     """Solves one request with several methods, one after another. The answer is a table of their energies, durations
     and solve times; each motion is certified. A method that finds no motion has its problem in its row. If no method

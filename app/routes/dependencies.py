@@ -9,6 +9,7 @@ from fastapi import Depends, Request
 from app.engine.pool import Engine
 from app.settings import Settings
 from app.store.store import Store
+from app.tasks.arm_engine import ArmEngine
 
 # coroutines, because FastAPI would run plain functions in a thread
 
@@ -31,3 +32,10 @@ async def _store(request: Request) -> Store:
 ServiceSettings = Annotated[Settings, Depends(_settings)]
 ServiceEngine = Annotated[Engine, Depends(_engine)]
 ServiceStore = Annotated[Store, Depends(_store)]
+
+
+async def _arm_engine(engine: ServiceEngine, store: ServiceStore) -> ArmEngine:
+    return ArmEngine(engine, store)
+
+
+ServiceArmEngine = Annotated[ArmEngine, Depends(_arm_engine)]

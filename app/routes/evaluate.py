@@ -11,7 +11,7 @@ from app.exceptions import UnsupportedMediaType
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.parameters import WantedFormat
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
@@ -61,7 +61,7 @@ def _openapi() -> dict[str, Any]:
     openapi_extra=_openapi(),
 )
 async def evaluate(
-    request: Request, wanted: WantedFormat, settings: ServiceSettings, engine: ServiceEngine
+    request: Request, wanted: WantedFormat, settings: ServiceSettings, engine: ServiceArmEngine
 ) -> Response:
     """The energy of a given motion, per segment and in total, and the limits that it violates. The motion is a list of
     configurations with the times between them, or a log. It is sent as JSON, or as CSV with the settings as query

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.ik_path import IKPathRequest, IKPathResponse
@@ -26,7 +26,7 @@ async def follow(
     request: Request,
     body: IKPathRequest,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
 ) -> Response:
     """Follows positions or poses of the TCP from a guess, each from the configuration before (Levenberg-Marquardt).
     Points that are out of reach, nearly singular or beyond the range of a joint are listed, but left out of

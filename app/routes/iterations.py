@@ -9,11 +9,10 @@ from typing import Annotated, Any, TypeVar
 import orjson
 from fastapi import APIRouter, Body, Path, Request, Response
 
-from app.engine.pool import Engine
 from app.engine.result import TaskResult
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -23,6 +22,7 @@ from app.schemas.studies import IterationDetail, IterationRequest, OptimizeStep
 from app.store import studies
 from app.store.tables import Study
 from app.studies.answers import detail
+from app.tasks.arm_engine import ArmEngine
 from app.tasks.evaluate import EvaluateTask
 from app.tasks.optimize import OptimizeTask
 from optimizer.exceptions import InvalidProblem
@@ -57,7 +57,7 @@ async def add(
     id: StudyId,
     body: Annotated[IterationRequest, Body()],
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
     store: ServiceStore,
     key: Key = None,
 ) -> Any:
@@ -78,7 +78,7 @@ async def add(
 
 
 async def _result(
-    asked: OptimizeRequest | EvaluateRequest, request_id: str, engine: Engine, max_deadline: float
+    asked: OptimizeRequest | EvaluateRequest, request_id: str, engine: ArmEngine, max_deadline: float
 ) -> TaskResult:
     """The answer of the endpoint that the request is for."""
     if isinstance(asked, OptimizeRequest):

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas.request import OptimizeRequest
@@ -27,7 +27,7 @@ async def optimize(
     request: Request,
     body: OptimizeRequest,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
 ) -> Response:
     """Finds the motion of least energy from standstill at `start` to standstill at `goal`, over all arm configurations.
     The answer has its energy breakdown, and a certificate that the motion is within all limits."""

@@ -47,8 +47,9 @@ Key = Annotated[
 ]
 REPLAYED = "Idempotency-Replayed"
 """Header of a response to a request that was sent before."""
+LOCATION_HEADER = {"Location": {"description": "Path of the created resource.", "schema": {"type": "string"}}}
 CREATED_HEADERS = {
-    "Location": {"description": "Path of the created resource.", "schema": {"type": "string"}},
+    **LOCATION_HEADER,
     REPLAYED: {
         "description": "`true` if an earlier request with the same key created it.",
         "schema": {"type": "string"},

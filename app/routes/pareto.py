@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -32,7 +32,7 @@ async def pareto(
     body: ParetoRequest,
     wanted: WantedFormat,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
     store: ServiceStore,
 ) -> Response:
     """Finds the Pareto front of duration and energy over all arm configurations, from the fastest motion to the motion

@@ -11,8 +11,19 @@ WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Busy,
     problems.ShuttingDown,
     problems.DeadlineExceeded,
+    problems.StoreUnavailable,
 )
 """Of every request that a worker computes."""
+
+ADDING_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
+    problems.Validation,
+    problems.BodyTooLarge,
+    problems.Busy,
+    problems.ShuttingDown,
+    problems.TooManyRobots,
+    problems.StoreUnavailable,
+)
+"""Of every request that adds a robot."""
 
 MOTION_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     *WORKER_PROBLEMS,

@@ -1,50 +1,161 @@
-"""GET /robots and GET /robots/{name}."""
+"""GET /robots and POST /robots; GET, PUT and DELETE /robots/{name}."""
 
 from __future__ import annotations
 
-from functools import cache
+from functools import partial
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Path
+import orjson
+from fastapi import APIRouter, Path, Request, Response
+from sqlalchemy.exc import IntegrityError
 
-from app.convert.arm import robot_named
+from app.exceptions import RobotExists
+from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.parameters import LOCATION_HEADER
+from app.routes.problem_lists import ADDING_PROBLEMS
 from app.schemas import errors as problems
+from app.schemas.own_arm import NewRobot, OwnArm, OwnName
 from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
+from app.store import robots
+from app.store.store import Store
+from app.store.tables import OwnRobot, now
+from app.tasks.own_robot import OwnRobotTask
+from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
 from models.robot import Robot
 from models.trust import TRUST, energy_trust
+from optimizer.exceptions import UnknownRobot
 
 router = APIRouter(prefix="/robots", tags=["robots"])
+
+Name = Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])]
+NewName = Annotated[OwnName, Path(description="Name of the robot.", examples=["my_arm"])]
 
 _SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electronics", "default_motion")
 
 
-@router.get("", summary="All robots", response_model=RobotList, responses=problem_responses())
-def list_robots() -> RobotList:
+@router.get("", summary="All robots", response_model=RobotList, responses=problem_responses(problems.StoreUnavailable))
+async def list_robots(store: ServiceStore) -> RobotList:
     """Names, titles and joints of all robots, and what their energies rest on."""
-    return RobotList(robots=[RobotSummary(**_summary(load_robot(name))) for name in robot_names()])
+    bundled = [RobotSummary(**_summary(load_robot(name), added=False)) for name in robot_names()]
+    added = [own_robot(each.name, each.figures) for each in await store.read(robots.all_of)]
+    return RobotList(robots=[*bundled, *(RobotSummary(**_summary(robot, added=True)) for robot in added)])
+
+
+@router.post(
+    "",
+    summary="Add a robot",
+    status_code=201,
+    response_model=RobotDetail,
+    responses={201: {"headers": LOCATION_HEADER}, **problem_responses(*ADDING_PROBLEMS, problems.RobotExists)},
+)
+async def add(
+    request: Request,
+    response: Response,
+    body: NewRobot,
+    settings: ServiceSettings,
+    engine: ServiceEngine,
+    store: ServiceStore,
+) -> RobotDetail:
+    """Adds an arm of your own, from its URDF and what a URDF does not hold. What is missing follows from stated rules,
+    is marked with the trust letter E, and listed in `warnings`."""
+    if body.name in robot_names():
+        raise RobotExists
+    robot = await _computed(request, body.name, body, engine, settings.max_deadline)
+    try:
+        await store.write(partial(robots.add, robot=robot, most=settings.max_robots))
+    except IntegrityError:  # another process has just added a robot of this name
+        raise RobotExists from None
+    response.headers["Location"] = f"{request.scope.get('root_path', '')}/robots/{body.name}"
+    return _of_user(robot)
 
 
 @router.get(
     "/{name}",
     summary="All parameters of a robot",
     response_model=RobotDetail,
-    responses=problem_responses(problems.UnknownRobot),
+    responses=problem_responses(problems.UnknownRobot, problems.StoreUnavailable),
 )
-def show_robot(
-    name: Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])],
-) -> RobotDetail:
+async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
     friction laws with their coefficients."""
-    return _detail(robot_named(name).name)
+    if name in robot_names():
+        return _detail(load_robot(name), added=False, warnings=[])
+    found = await store.read(partial(robots.get, name=name))
+    if found is None:
+        raise await _unknown(store, name)
+    return _of_user(found)
 
 
-@cache
-def _detail(name: str) -> RobotDetail:
-    robot = load_robot(name)
-    sections = {section: robot.figures[section] for section in _SECTIONS}
-    return RobotDetail(**_summary(robot), trust=TRUST, friction=_friction(robot), **sections)
+@router.put(
+    "/{name}",
+    summary="Add or replace a robot",
+    response_model=RobotDetail,
+    responses={
+        201: {"model": RobotDetail, "description": "Added", "headers": LOCATION_HEADER},
+        **problem_responses(*ADDING_PROBLEMS, problems.RobotExists),
+    },
+)
+async def put(
+    request: Request,
+    response: Response,
+    name: NewName,
+    body: OwnArm,
+    settings: ServiceSettings,
+    engine: ServiceEngine,
+    store: ServiceStore,
+) -> RobotDetail:
+    """Adds an arm of your own under this name, or replaces it. Requests from then on use the new one; stored answers
+    stay."""
+    if name in robot_names():
+        raise RobotExists
+    robot = await _computed(request, name, body, engine, settings.max_deadline)
+    write = partial(robots.put, robot=robot, most=settings.max_robots)
+    try:
+        is_new = await store.write(write)
+    except IntegrityError:  # another process has just added it
+        is_new = await store.write(write)
+    if is_new:
+        response.status_code = 201
+        response.headers["Location"] = f"{request.scope.get('root_path', '')}/robots/{name}"
+    return _of_user(robot)
+
+
+@router.delete(
+    "/{name}",
+    summary="Delete a robot",
+    status_code=204,
+    responses=problem_responses(problems.UnknownRobot, problems.RobotExists, problems.StoreUnavailable),
+)
+async def delete(name: Name, store: ServiceStore) -> None:
+    """Deletes a robot that was added. Studies and stored answers about it stay."""
+    if name in robot_names():
+        raise RobotExists
+    if not await store.write(partial(robots.delete, name=name)):
+        raise await _unknown(store, name)
+
+
+async def _computed(request: Request, name: str, arm: OwnArm, engine: ServiceEngine, deadline: float) -> OwnRobot:
+    """The row of a user's arm. Raises InvalidProblem."""
+    task = OwnRobotTask(name, arm, request.state.id)
+    content = orjson.loads((await unless_disconnected(request, engine.run(task, deadline))).document)
+    return OwnRobot(name=name, created=now(), **content)
+
+
+async def _unknown(store: Store, name: str) -> UnknownRobot:
+    return UnknownRobot(name, [*robot_names(), *await store.read(robots.names)])
+
+
+def _of_user(row: OwnRobot) -> RobotDetail:
+    return _detail(own_robot(row.name, row.figures), added=True, warnings=row.warnings)
+
+
+def _detail(robot: Robot, added: bool, warnings: list[str]) -> RobotDetail:
+    content: dict[str, Any] = {section: robot.figures.get(section) for section in _SECTIONS}
+    content |= _summary(robot, added) | {"trust": TRUST, "friction": _friction(robot), "warnings": warnings}
+    return RobotDetail(**content)
 
 
 def _friction(robot: Robot) -> Friction:
@@ -58,10 +169,11 @@ def _friction(robot: Robot) -> Friction:
     )
 
 
-def _summary(robot: Robot) -> dict[str, Any]:
+def _summary(robot: Robot, added: bool) -> dict[str, Any]:
     return {
         "name": robot.name,
         "title": robot.title,
         "joints": list(robot.joint_names),
+        "added": added,
         "energy_trust": energy_trust(robot.figures),
     }

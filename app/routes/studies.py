@@ -8,7 +8,6 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.exc import IntegrityError
 
-from app.convert.arm import robot_named
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
@@ -17,6 +16,7 @@ from app.schemas.examples.studies import STUDY_CSV
 from app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from app.store import studies
 from app.studies.answers import as_csv, full, summary
+from app.tasks.arm_engine import robot_in
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -45,7 +45,7 @@ async def create(
     key: Key = None,
 ) -> StudySummary:
     """Begins a study: a motion that is improved step by step until its energy is at most `threshold`."""
-    robot_named(body.robot)
+    await robot_in(store, body.robot)
     study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key)
     try:
         made, again = await store.write(partial(studies.create, study=study))

@@ -10,14 +10,13 @@ from typing import Annotated, Any
 import orjson
 from fastapi import APIRouter, Query, Request, Response
 
-from app.engine.pool import Engine
 from app.engine.result import TaskResult
 from app.exceptions import Busy, EmptyStudy, TaskFailed, WorkerDied
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.http.problem_details import problem_type
-from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import StudyId, allowed_deadline
 from app.schemas import errors as problems
 from app.schemas.request import OptimizeRequest
@@ -26,6 +25,7 @@ from app.store import answers, studies
 from app.store.store import Store
 from app.studies.progress import best_of
 from app.studies.suggestions import Proposal, base_of, proposals
+from app.tasks.arm_engine import ArmEngine, known_here
 from app.tasks.optimize import OptimizeTask
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 
@@ -41,6 +41,7 @@ Outcome = dict[str, Any]
     responses=problem_responses(
         problems.Validation,
         problems.UnknownStudy,
+        problems.UnknownRobot,
         problems.EmptyStudy,
         problems.ShuttingDown,
         problems.StoreUnavailable,
@@ -51,7 +52,7 @@ async def suggest(
     id: StudyId,
     query: Annotated[SuggestQuery, Query()],
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
     store: ServiceStore,
 ) -> Response:
     """Suggestions for the next iteration: each differs from the best iteration (or the last) in one respect. The
@@ -75,7 +76,8 @@ async def _suggestions(store: Store, study_id: str, which: str, computing: _Comp
     up_to_base = await store.read(partial(studies.up_to, study_id=study_id, number=iteration.number))
     _, body = await store.read(partial(answers.get, answer_id=iteration.answer_id))
     base = base_of(iteration.kind, up_to_base.iterations[-1].request, orjson.loads(body), study.objective)
-    found = [] if base is None else proposals(base)
+    with await known_here(store, study.robot):
+        found = [] if base is None else proposals(base)
     outcomes = await computing.outcomes(found, study.objective)
     computed = []
     for outcome in outcomes:
@@ -94,7 +96,7 @@ async def _suggestions(store: Store, study_id: str, which: str, computing: _Comp
 class _Computing:
     """Computes proposals until `end` [s] of the event loop's clock; `turn` limits how many run at the same time."""
 
-    engine: Engine
+    engine: ArmEngine
     turn: asyncio.Semaphore
     request_id: str
     end: float

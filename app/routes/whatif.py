@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -28,7 +28,7 @@ async def whatif(
     request: Request,
     body: WhatifRequest,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceArmEngine,
     store: ServiceStore,
 ) -> Response:
     """Compares one motion on the arm as it is with the same task on changed arms: lighter links, another payload, other

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field
 from pydantic_core import PydanticCustomError
 
 from app.schemas.examples.values import REQUEST_ID
+from app.schemas.lengths import ROBOT_LENGTH
 from optimizer.problem.names import is_plain
 from optimizer.problem.pose import QUATERNION_TOLERANCE
 
@@ -155,7 +156,7 @@ Pose = Annotated[
 
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])
 
-RobotName = Annotated[str, Field(min_length=1, max_length=64)]
+RobotName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH)]
 
 
 class RobotWithTcp(Request):

@@ -8,3 +8,5 @@ KEY_LENGTH = 128
 """Of an `Idempotency-Key`."""
 NAME_LENGTH = 200
 """Of a study's name."""
+ROBOT_LENGTH = 64
+"""Of a robot's name."""

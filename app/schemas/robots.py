@@ -52,6 +52,7 @@ class RobotSummary(Response):
     joints: list[str] = described(
         "Names of the joints, from base to flange.", None, ["shoulder_pan_joint", "shoulder_lift_joint"]
     )
+    added: bool = described("Whether a user added it; the others come with the service.", None, False)
     energy_trust: str = described(
         "What the energies of this robot rest on, from the trust letters of its parameters.",
         None,
@@ -80,4 +81,11 @@ class RobotDetail(RobotSummary):
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part("Power that the electronics draw, and what the supply takes back.")
     friction: Friction = part("Joint friction.")
-    default_motion: Parameters = part("Default speed and acceleration of the robot's own controller.")
+    default_motion: Parameters | None = part(
+        "Default speed and acceleration of the robot's own controller; null if they are unknown."
+    )
+    warnings: list[str] = described(
+        "Of a robot that a user added: what is hardly real, and which parameters are engineering defaults.",
+        None,
+        ["Engineering defaults, see their notes: limits.jerk."],
+    )

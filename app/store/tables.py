@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from app.schemas.lengths import ID_LENGTH, KEY_LENGTH, NAME_LENGTH
+from app.schemas.lengths import ID_LENGTH, KEY_LENGTH, NAME_LENGTH, ROBOT_LENGTH
 
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
@@ -65,11 +65,22 @@ class Study(Table):
 
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
     name: Mapped[str] = mapped_column(String(NAME_LENGTH))
-    robot: Mapped[str] = mapped_column(String(64))
+    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
     objective: Mapped[str] = mapped_column(String(32))
     threshold: Mapped[float]
     created: Mapped[datetime] = mapped_column(Instant)
     idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
+
+
+class OwnRobot(Table):
+    """A robot that a user added: its figures, as a bundled robot's file has them, and what was remarked on them."""
+
+    __tablename__ = "robots"
+
+    name: Mapped[str] = mapped_column(String(ROBOT_LENGTH), primary_key=True)
+    created: Mapped[datetime] = mapped_column(Instant)
+    figures: Mapped[dict[str, Any]] = mapped_column(JSON)
+    warnings: Mapped[list[str]] = mapped_column(JSON)
 
 
 class Answer(Table):

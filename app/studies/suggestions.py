@@ -15,6 +15,7 @@ import numpy as np
 from app.convert.arm import to_arm
 from app.schemas.arm import ArmRequest
 from app.schemas.request import OptimizeRequest
+from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.tcp import rotated_poses
 from optimizer.problem.problem import LONGEST_DURATION
 
@@ -78,7 +79,8 @@ def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base 
 
 def proposals(base: Base) -> list[Proposal]:
     """All suggestions for the base, in the order in which they are computed: usually those first that save most."""
-    return [*_method(base), *_duration(base), *_branch(base), *_orientation(base), *_payload(base)]
+    turned = _orientation(base) if _takes_poses(base) else ()
+    return [*_method(base), *_duration(base), *_branch(base), *turned, *_payload(base)]
 
 
 def _method(base: Base) -> Iterator[Proposal]:
@@ -101,11 +103,11 @@ def _duration(base: Base) -> Iterator[Proposal]:
 
 def _branch(base: Base) -> Iterator[Proposal]:
     fixed = "q" in base.request["goal"]
-    if fixed:
+    if fixed and _takes_poses(base):
         pose = _poses(base, [np.zeros(3)])[0]
         request = _without(base.request, "branch", "windings") | {"goal": pose}
         yield Proposal("branch", "Reach the same pose in the arm configuration of least energy.", request)
-    elif any(name in base.request for name in ("branch", "windings")):
+    elif not fixed and any(name in base.request for name in ("branch", "windings")):
         yield Proposal(
             "branch",
             "Allow every arm configuration and all full-turn alternatives.",
@@ -156,6 +158,11 @@ def _timed(base: Base, duration: float | None) -> Fields:
 
 def _without(request: Fields, *names: str) -> Fields:
     return {name: value for name, value in request.items() if name not in names}
+
+
+def _takes_poses(base: Base) -> bool:
+    """Whether there is inverse kinematics for the arm."""
+    return inverse_kinematics_for(to_arm(OptimizeRequest.model_validate(base.request)).robot) is not None
 
 
 def _poses(base: Base, rotvecs: list[Any]) -> list[Fields]:

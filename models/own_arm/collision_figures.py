@@ -104,9 +104,7 @@ def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
     return [[*(share * end).tolist(), *((1 - share) * end).tolist(), radius]]
 
 
-def _never_meet(
-    description: Description, chain: Chain, upright: UprightChain, capsules: list[Rows]
-) -> dict[str, Any]:
+def _never_meet(description: Description, chain: Chain, upright: UprightChain, capsules: list[Rows]) -> dict[str, Any]:
     """Pairs of links that are not compared: the user's, else those whose capsules are hardly ever apart."""
     given = description.collision.never_meet
     if given is not None:

@@ -59,9 +59,7 @@ def electronics(description: Description, nq: int) -> dict[str, Any]:
         "controller_power": either(
             description, given.controller_power, 0.0, "W", ("Control box.", NOTES["controller_power"])
         ),
-        "regeneration": either(
-            description, given.regeneration, 0.0, "1", ("Of surplus power.", NOTES["regeneration"])
-        ),
+        "regeneration": either(description, given.regeneration, 0.0, "1", ("Of surplus power.", NOTES["regeneration"])),
     }
 
 

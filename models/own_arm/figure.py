@@ -20,9 +20,7 @@ def assumed(value: Any, unit: str, note: str) -> dict[str, Any]:
     return _figure(value, unit, "none: engineering default", "E", note)
 
 
-def either(
-    description: Description, given: Any, default: Any, unit: str, notes: tuple[str, str]
-) -> dict[str, Any]:
+def either(description: Description, given: Any, default: Any, unit: str, notes: tuple[str, str]) -> dict[str, Any]:
     """The figure that the user gave, or the default where it is None; `notes` on both."""
     if given is None:
         return assumed(default, unit, notes[1])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from models.from_figures import NO_LINKS
 from models.own_arm import rules
 from models.own_arm.collision_figures import collision_figures
 from models.own_arm.description import Description, InvalidArm
@@ -53,10 +54,10 @@ def own_figures(name: str, description: Description) -> tuple[dict[str, Any], li
 
 
 def _link_names(chain: Chain) -> list[str]:
-    """Names of the moving links. Those that stand for the two ends of every robot are not theirs."""
+    """Names of the moving links. Those that mean something else in the figures get an ending."""
     names = list[str]()
     for link in chain.links:
-        while link in (BASE, FLANGE, *names):
+        while link in (BASE, FLANGE, *NO_LINKS, *names):
             link += "_link"
         names.append(link)
     return names
@@ -78,29 +79,22 @@ def _row(placement: pin.SE3) -> list[float]:
     return [*placement.translation.tolist(), *pin.rpy.matrixToRpy(placement.rotation).tolist()]
 
 
-def _inertials(
-    description: Description, chain: Chain, upright: UprightChain, warnings: list[str]
-) -> dict[str, Any]:
+def _inertials(description: Description, chain: Chain, upright: UprightChain, warnings: list[str]) -> dict[str, Any]:
     """Of each moving link with all that is fixed to it."""
     ends = [*upright.placements[1:], upright.flange]
     for link, body, end in zip(chain.links, upright.inertias, ends, strict=True):
         _check_body(link, body, float(np.linalg.norm(end.translation)), warnings)
-    tensors = [[body.inertia[i, j] for i, j in _ENTRIES] for body in upright.inertias]
+    bodies = upright.inertias
+    tensors = [[float(body.inertia[i, j]) for i, j in _ENTRIES] for body in bodies]
+    of_all = "Of the moving links, with what is fixed to them."
+    in_link = "In the link frame: z along the joint."
+    about = "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, in the link frame."
     return {
-        "mass": stated(
-            description, [body.mass for body in upright.inertias], "kg", "Of the moving links, with what is fixed to them."
-        ),
-        "center_of_mass": stated(
-            description, [body.lever.tolist() for body in upright.inertias], "m", "In the link frame: z along the joint."
-        ),
-        "inertia_frame_rpy": stated(
-            description, [[0.0, 0.0, 0.0]] * chain.nq, "rad", "The tensors' axes are those of the link frame."
-        ),
-        "inertia": stated(
-            description, [[float(entry) for entry in row] for row in tensors], "kg·m²",
-            "ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, in the link frame.",
-        ),
-    }  # fmt: skip
+        "mass": stated(description, [body.mass for body in bodies], "kg", of_all),
+        "center_of_mass": stated(description, [body.lever.tolist() for body in bodies], "m", in_link),
+        "inertia_frame_rpy": stated(description, [[0.0] * 3] * chain.nq, "rad", "Axes of the link frame."),
+        "inertia": stated(description, tensors, "kg·m²", about),
+    }
 
 
 _ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -119,8 +113,8 @@ def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]
     if moments[2] > 0 and excess > rules.IMPOSSIBLE:
         raise InvalidArm(
             "urdf",
-            f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² is more than the sum "
-            f"of the others, {moments[0] + moments[1]:.3g} kg·m².",
+            f"Link {link!r} has an impossible inertia: the principal moment {moments[2]:.3g} kg·m² is more than the "
+            f"sum of the others, {moments[0] + moments[1]:.3g} kg·m².",
         )
     if moments[2] > 0 and excess > rules.ROUNDED:
         warnings.append(f"Link {link!r}: a principal moment is {excess:.1%} above the sum of the others.")
@@ -128,8 +122,8 @@ def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]
     gyration = float(np.sqrt(max(moments[2], 0.0) / body.mass))
     if gyration < least:
         warnings.append(
-            f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} m, 0.7 of that of a rod "
-            "to the next joint."
+            f"Link {link!r}: its radius of gyration of {gyration:.3g} m is less than {least:.3g} m, 0.7 of that of a "
+            "rod to the next joint."
         )
 
 
@@ -156,9 +150,7 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
         "position_max": stated(description, chain.q_max, "rad", "A joint without end has one turn to either side."),
         "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
         "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
-        "jerk": either(
-            description, jerk, rules.JERK * acceleration, "rad/s³", ("Symmetric.", rules.NOTES["jerk"])
-        ),
+        "jerk": either(description, jerk, rules.JERK * acceleration, "rad/s³", ("Symmetric.", rules.NOTES["jerk"])),
         "torque": stated(description, found["torque"], "N·m", "Of the motor, behind the gear; friction included."),
         "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
     }

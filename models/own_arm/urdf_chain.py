@@ -29,9 +29,10 @@ class Chain:
     """The moving joints from base to tip, `nq` of them, and what a URDF says of each.
 
     `model`: Pinocchio's, with these joints alone; what others carry is merged into their links. `links` are the names
-    of the links that the joints move, `T_base` (4, 4) places the base link in the model's world, `T_tip` (4, 4) the tip
-    in the frame of the last joint. `axes` (nq, 3): unit vectors that the joints turn about, in their frames. Limits (nq,): position [rad], speed [rad/s], torque [N·m]; 0 where none is given.
-    `rigid` names, for the base and each joint, the URDF links that move with it.
+    of the links that the joints move; `axes` (nq, 3) unit vectors that the joints turn about, in their frames. `T_base`
+    (4, 4) places the base link in the model's world, `T_tip` (4, 4) the tip in the frame of the last joint. Limits
+    (nq,): position [rad], speed [rad/s], torque [N·m]; 0 where none is given. `rigid` names, for the base and each
+    joint, the URDF links that move with it.
     """
 
     model: pin.Model
@@ -100,7 +101,7 @@ class _Tree:
             above[child] = joint
         if not links:
             _refuse("urdf", "The URDF has no <link>.")
-        roots = [link for link in links if link not in above]
+        roots = [each for each in links if each not in above]
         if len(roots) != 1:
             _refuse("urdf", f"A URDF has one root link, not {len(roots)}: {_listed(roots)}.")
         return _Tree(links, joints, above, roots[0])
@@ -159,9 +160,9 @@ def _check_chain(moving: list[Element]) -> None:
     for joint in moving:
         name, kind = _name(joint), joint.get("type")
         if kind not in TURNING:
-            _refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move; hold it by a position in `locked`.")
+            _refuse("urdf", f"Joint {name!r} is {kind}: only revolute joints can move. Give its position in `locked`.")
         if joint.find("mimic") is not None:
-            _refuse("urdf", f"Joint {name!r} mimics another one: hold it by a position in `locked`.")
+            _refuse("urdf", f"Joint {name!r} mimics another one: give its position in `locked`.")
         limit = joint.find("limit")
         if kind == "revolute" and (limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib):
             _refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
@@ -176,7 +177,7 @@ def _check_rest(tree: _Tree, moving: list[Element], locked: Mapping[str, float])
         if name in names or name in locked or joint.get("type") == FIXED:
             continue
         if tree.carrier(_end(joint, "parent"), names):
-            _refuse("locked", f"Joint {name!r} moves a link beside the chain to the tip: give its position in `locked`.")
+            _refuse("locked", f"Joint {name!r} moves a link beside those to the tip: give its position in `locked`.")
 
 
 def _merged(
@@ -185,13 +186,15 @@ def _merged(
     """The chain, as Pinocchio reads and reduces it."""
     ranges, bare = [_range(joint) for joint in moving], copy.deepcopy(root)
     for joint in bare.findall("joint"):
-        # Pinocchio gives a continuous joint two coordinates
+        # Pinocchio gives a continuous joint two coordinates, and reads no limits that lack a part
+        limit = joint.find("limit")
+        if joint.get("type") in (FIXED, "floating", "planar"):
+            continue
+        limit = ElementTree.SubElement(joint, "limit") if limit is None else limit
+        limit.attrib.update({"lower": "0", "upper": "0", "effort": "0", "velocity": "0"} | limit.attrib)
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
-            limit = joint.find("limit")
-            limit = ElementTree.SubElement(joint, "limit", effort="0", velocity="0") if limit is None else limit
-            limit.set("lower", repr(-CONTINUOUS))
-            limit.set("upper", repr(CONTINUOUS))
+            limit.attrib.update({"lower": repr(-CONTINUOUS), "upper": repr(CONTINUOUS)})
     for link in bare.findall("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             link.remove(shape)
@@ -209,8 +212,8 @@ def _merged(
     except (RuntimeError, ValueError, IndexError) as error:
         _refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
     rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
-    for link in tree.links:
-        rigid[tree.carrier(link, names)].append(link)
+    for name in tree.links:
+        rigid[tree.carrier(name, names)].append(name)
     at = {name: model.frames[model.getFrameId(name, pin.FrameType.BODY)].placement.homogeneous for name in (base, tip)}
     q_min, q_max, v_max, tau_max = (np.array(column) for column in zip(*ranges, strict=True))
     axes = np.array([_axis(joint) for joint in moving])

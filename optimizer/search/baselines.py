@@ -71,8 +71,10 @@ def baselines(
 
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
-    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]. The last one is left
-    out for a robot whose controller's default motion is unknown."""
+    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s].
+
+    The last one is left out for a robot whose controller's default motion is unknown.
+    """
     limits = problem.arm.active_limits
     fastest = time_optimal(limits, q_start, q_goal)
     default = problem.arm.robot.default_motion

@@ -13,6 +13,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.main import create_app
+from app.schemas.examples.own_arm import PUT_EXAMPLES
 from tests.app.requests import HOME, NEAR
 
 # the document is served before the workers run
@@ -44,7 +45,7 @@ class Operation:
     def check(self, answer: Any) -> None:
         """The status must be documented and, of a JSON answer, the schema, too."""
         documented = self.content["responses"][str(answer.status_code)]
-        if answer.headers.get("content-type") == "application/json":
+        if answer.status_code != 204 and answer.headers.get("content-type") == "application/json":
             schema = documented["content"]["application/json"]["schema"]
             jsonschema_rs.validate(schema | {"components": DOCUMENT["components"]}, answer.json())
 
@@ -82,10 +83,18 @@ def test_every_body_has_an_example() -> None:
 SLOW = "post /pareto application/json branch_switch"
 
 
+@pytest.fixture
+def robot(client: TestClient) -> str:
+    """The name of a robot that a user added."""
+    answer = client.put("/robots/added", json=PUT_EXAMPLES["makers_figures"]["value"])
+    assert answer.is_success, answer.text
+    return "added"
+
+
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n == SLOW else n for n in BODIES])
-def test_body_is_answered(name: str, client: TestClient, study: str) -> None:
+def test_body_is_answered(name: str, client: TestClient, study: str, robot: str) -> None:
     operation, media_type, example = BODIES[name]
-    content, url = example["value"], operation.path.format(id=study)
+    content, url = example["value"], operation.path.format(id=study, name=robot)
     if media_type == "text/csv":
         # the settings of a CSV file are query parameters, which the example's summary names
         query = re.search(r"\?\S+", example["summary"])
@@ -98,10 +107,12 @@ def test_body_is_answered(name: str, client: TestClient, study: str) -> None:
 
 
 @pytest.mark.parametrize("operation", [own for own in OPERATIONS if own.parameters("path")], ids=str)
-def test_path_is_answered(operation: Operation, client: TestClient) -> None:
+def test_path_is_answered(operation: Operation, client: TestClient, robot: str) -> None:
     names = operation.parameters("path")
+    if operation.method in ("put", "delete"):
+        names |= {"name": robot}
     # an id stands for something that was made before; the example's was not, and the document says what then comes
-    expected = 404 if "id" in names else 200
+    expected = 404 if "id" in names else 204 if operation.method == "delete" else 200
     body = next((example["value"] for _, _, example in operation.bodies()), None)
     answer = client.request(operation.method, operation.path.format(**names), json=body)
     assert answer.status_code == expected, answer.text

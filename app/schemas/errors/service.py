@@ -92,6 +92,24 @@ class EmptyStudy(ProblemDetails):
     status: Literal[409] = fixed("status", 409)
 
 
+class RobotExists(ProblemDetails):
+    """The name of the robot is taken. Use another name, or `PUT /robots/{name}` to replace a robot that was added. The
+    robots that come with the service can be neither replaced nor deleted."""
+
+    type: Literal["/problems/robot-exists"] = fixed("type", "/problems/robot-exists")
+    title: Literal["Robot exists"] = fixed("title", "Robot exists")
+    status: Literal[409] = fixed("status", 409)
+
+
+class TooManyRobots(ProblemDetails):
+    """The service holds as many added robots as `JOULEPATH_MAX_ROBOTS` allows. Delete one that is not used with
+    `DELETE /robots/{name}`."""
+
+    type: Literal["/problems/too-many-robots"] = fixed("type", "/problems/too-many-robots")
+    title: Literal["Too many robots"] = fixed("title", "Too many robots")
+    status: Literal[409] = fixed("status", 409)
+
+
 class KeyReused(ProblemDetails):
     """This `Idempotency-Key` was already used for a different request. A key belongs to one request and its
     repetitions: use a new key for each new request."""

@@ -8,6 +8,7 @@ from app.schemas.examples.compare import COMPARE_EXAMPLES
 from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
+from app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from app.schemas.examples.pareto import PARETO_EXAMPLES
 from app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
 from app.schemas.examples.whatif import WHATIF_EXAMPLES
@@ -21,6 +22,8 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/evaluate": {JSON: EVALUATE_EXAMPLES, CSV: CSV_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
+    "/robots": {JSON: NEW_ROBOT_EXAMPLES},
+    "/robots/{name}": {JSON: PUT_EXAMPLES},
     "/studies": {JSON: STUDY_EXAMPLES},
     "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},
 }

@@ -24,7 +24,7 @@ HIT = Clearance(-0.02, -0.02, ("table", "forearm"), 0.5)
 ERRORS: list[JoulepathError] = [
     exceptions.InvalidProblem("limits.velocity", "limits.velocity must be positive."),
     exceptions.OutsideLimits("start", "elbow_joint", 4.0, -3.1, 3.1),
-    exceptions.UnknownRobot(["ur5e"]),
+    exceptions.UnknownRobot("r2d2", ["ur5e"]),
     exceptions.UnreachablePose("goal", 0.1, "The goal pose is out of reach."),
     exceptions.UnreachablePose("goal", None, "The goal pose is out of reach."),
     exceptions.NoReachableTarget("start", [UnreachableTarget("start", 0, "The start pose is out of reach.")]),
@@ -46,6 +46,7 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.TaskFailed, service.StoreUnavailable, service.UnknownAnswer, service.EmptyStudy)),
     *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
     *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
+    *(kind() for kind in (service.RobotExists, service.TooManyRobots)),
 ]
 
 

@@ -14,6 +14,7 @@ from app.main import create_app
 from app.schemas import errors as problems
 from app.schemas.errors import PROBLEMS, ProblemDetails
 from app.settings import Settings
+from models.robot import Robot
 from optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.app.requests import move
 from tests.optimizer.chains import serial_chain
@@ -134,7 +135,7 @@ def test_not_found(client: TestClient, path: str) -> None:
     ("method", "path", "allow"),
     [
         ("GET", "/optimize", "POST"),
-        ("DELETE", "/robots", "GET"),
+        ("DELETE", "/robots", "GET, POST"),
         ("POST", "/healthz", "GET"),
         ("FANCY", "/ik", "POST"),
         ("PUT", "/studies", "GET, POST"),
@@ -174,7 +175,10 @@ def test_not_ready(tmp_path: Any) -> None:
 
 
 def test_a_pose_for_an_arm_without_inverse_kinematics(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.routes.ik.robot_named", lambda _: serial_chain(3))
+    async def chain(*_: object) -> Robot:
+        return serial_chain(3)
+
+    monkeypatch.setattr("app.routes.ik.robot_in", chain)
     answer = client.post("/ik", json={"pose": {"position": [0.4, -0.2, 0.3], "quaternion": DOWN}})
     (error,) = refused(answer, problems.Validation)["errors"]
     assert error["loc"] == ["body", "pose"] and "give joint positions" in error["msg"]

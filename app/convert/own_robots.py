@@ -1,0 +1,26 @@
+"""The robot of a user's own that a request is about: its figures come along with the task, from the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
+
+_ROBOT: ContextVar[tuple[str, dict[str, Any]] | None] = ContextVar("own robot", default=None)
+
+
+@contextmanager
+def own_robot_named(name: str, figures: dict[str, Any]) -> Iterator[None]:
+    """Within the context, and its thread, requests may name this robot."""
+    before = _ROBOT.set((name, figures))
+    try:
+        yield
+    finally:
+        _ROBOT.reset(before)
+
+
+def own_figures_of(name: str) -> dict[str, Any] | None:
+    """Figures of the robot of that name; None if the request brought none."""
+    robot = _ROBOT.get()
+    return robot[1] if robot is not None and robot[0] == name else None

@@ -1,0 +1,132 @@
+"""A user's own arm: what `POST /robots` and `PUT /robots/{name}` take."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.common import NO_CONTROLS, PLAIN, Request, described
+from app.schemas.examples.own_arm import URDF
+from app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
+
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+NotNegative = Annotated[float, Field(ge=0, le=1e6)]
+PositivePerJoint = Positive | Annotated[list[Positive], Field(min_length=1, max_length=16)]
+PerJoint = NotNegative | Annotated[list[NotNegative], Field(min_length=1, max_length=16)]
+Text = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
+# a name in the URDF
+Named = Annotated[str, Field(min_length=1, max_length=100)]
+Length = Annotated[float, Field(ge=-10, le=10)]
+Capsule = Annotated[list[Length], Field(min_length=7, max_length=7)]
+Pair = Annotated[list[Named], Field(min_length=2, max_length=2)]
+NAME_PATTERN = re.compile(rf"^[a-z0-9][a-z0-9_-]{{0,{ROBOT_LENGTH - 1}}}$")
+OwnName = Annotated[str, Field(min_length=1, max_length=ROBOT_LENGTH, pattern=NAME_PATTERN.pattern)]
+
+
+class OwnDrives(Request):
+    """Motors and gears, joint-side: one value for all joints, or one per joint from base to tip. Null: by a rule from
+    the torque limits, whose range the note of the parameter tells."""
+
+    rotor_inertia: PerJoint | None = described("Inertia of the rotors behind the gear.", "kg·m²", 0.4, default=None)
+    coulomb: PerJoint | None = described("Coulomb friction.", "N·m", [6.0, 6.0, 4.0, 1.5, 1.5, 1.5], default=None)
+    viscous: PerJoint | None = described("Viscous friction.", "N·m·s/rad", 1.2, default=None)
+    copper: PositivePerJoint | None = described(
+        "Copper loss over the square of the motor torque.", "W/(N·m)²", 0.005, default=None
+    )
+
+
+class OwnElectronics(Request):
+    """Power that the electronics draw. Null: a default, which is marked so."""
+
+    idle_power: NotNegative | None = described("Of the arm at rest.", "W", 40.0, default=None)
+    controller_power: NotNegative | None = described("Of the control box. Null: 0.", "W", 60.0, default=None)
+    regeneration: Annotated[float, Field(ge=0, le=1)] | None = described(
+        "Share of surplus power that the supply takes back. Null: 0.", "1", 0.0, default=None
+    )
+
+
+class OwnCollision(Request):
+    """Shape of the links. A link without `capsules` has one around each sphere, cylinder and box among its
+    `<collision>` shapes in the URDF; a link without such shapes, one from joint to joint. Meshes are not read."""
+
+    capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
+        "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis in the link's URDF "
+        "frame.",
+        "m",
+        {"forearm": [[0.0, 0.0, 0.05, 0.0, 0.0, 0.3, 0.05]]},
+        default=None,
+        max_length=200,
+    )
+    radius: Annotated[float, Field(gt=0, lt=1)] | None = described(
+        "Radius of the capsules from joint to joint. Null: 4.5 % of the arm's length.", "m", 0.05, default=None
+    )
+    never_meet: Annotated[list[Pair], Field(max_length=200)] | None = described(
+        "Pairs of links that are not compared. Null: those whose capsules meet in nearly every configuration.",
+        None,
+        [["base_link", "upper_arm"]],
+        default=None,
+    )
+
+
+class OwnMotion(Request):
+    """Default motion of the robot's own controller, for the baseline `controller_default`."""
+
+    velocity: Positive = described("Speed of the leading joint.", "rad/s", 1.0)
+    acceleration: Positive = described("Acceleration of the leading joint.", "rad/s²", 1.4)
+
+
+class OwnArm(Request):
+    """An arm of a user's own: its URDF, and what a URDF does not hold."""
+
+    urdf: str = described(
+        "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they must be revolute or "
+        "continuous. All else that hangs on them must be fixed, or `locked`. Meshes are not read.",
+        None,
+        URDF,
+        min_length=1,
+    )
+    tip: Named = described("Link at the end of the arm: its frame is the flange.", None, "tool")
+    base: Named | None = described(
+        "Link whose frame is the world frame. Null: the root link of the URDF.", None, "base", default=None
+    )
+    title: Text | None = described("Manufacturer and model. Null: the name.", None, "Example arm", default=None)
+    source: Text = described(
+        "Where the URDF and the other values are from.", None, "maker's repository, 2025", default="given by the user"
+    )
+    trust: Literal["A", "B", "C", "T"] = described(
+        "Trust letter of the URDF and the other values: see `trust` of a robot.", None, "C", default="C"
+    )
+    acceleration: PositivePerJoint = described("Limits on the acceleration.", "rad/s²", 8.0)
+    payload: Annotated[float, Field(ge=0, le=1e4)] = described("Greatest mass of a payload.", "kg", 2.0)
+    velocity: PositivePerJoint | None = described(
+        "Limits on the speed. Null: those of the URDF.", "rad/s", 3.0, default=None
+    )
+    torque: PositivePerJoint | None = described(
+        "Limits on the motor torque behind the gear. Null: `effort` of the URDF.", "N·m", [60.0, 40.0], default=None
+    )
+    jerk: PositivePerJoint | None = described(
+        "Limits on the jerk. Null: 20 1/s times those on the acceleration.", "rad/s³", 160.0, default=None
+    )
+    locked: dict[Named, Annotated[float, Field(ge=-100, le=100)]] | None = described(
+        "Positions of joints that are held: of fingers, or of joints of the arm.",
+        "rad or m",
+        {"finger_joint": 0.02},
+        default=None,
+        max_length=100,
+    )
+    drives: OwnDrives = described("Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives())
+    electronics: OwnElectronics = described("Electronics.", None, {"idle_power": 40.0}, default=OwnElectronics())
+    collision: OwnCollision = described("Shape of the links.", None, {"radius": 0.05}, default=OwnCollision())
+    default_motion: OwnMotion | None = described(
+        "Default motion of the controller. Null: unknown.", None, {"velocity": 1.0, "acceleration": 1.4}, default=None
+    )
+
+
+class NewRobot(OwnArm):
+    """An arm of a user's own, and its name."""
+
+    name: OwnName = described(
+        "Name in requests: small letters, digits, `-` and `_`; no robot has it yet.", None, "my_arm"
+    )

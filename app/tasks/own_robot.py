@@ -1,0 +1,31 @@
+"""POST /robots and PUT /robots/{name} in a worker, because no URDF is to end the service: figures of a user's arm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.convert.own_arm import to_description
+from app.engine.result import TaskResult
+from app.schemas.own_arm import OwnArm
+from models.own_arm.description import InvalidArm
+from models.own_arm.figures import own_figures
+from models.own_arm.robots import own_robot
+from optimizer.exceptions import InvalidProblem
+
+
+@dataclass(frozen=True)
+class OwnRobotTask:
+    """A validated arm, its name, and the request's id."""
+
+    name: str
+    arm: OwnArm
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """`figures` and `warnings`. `deadline` is not watched: it takes a second at most. Raises InvalidProblem."""
+        try:
+            figures, warnings = own_figures(self.name, to_description(self.arm))
+        except InvalidArm as error:
+            raise InvalidProblem(error.field, str(error)) from None
+        own_robot(self.name, figures)
+        return TaskResult.of_json({"figures": figures, "warnings": warnings})

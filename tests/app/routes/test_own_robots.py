@@ -1,0 +1,155 @@
+"""Robots of users' own: added, used by every endpoint, replaced, deleted; and what makes none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.main import create_app
+from app.schemas import errors as problems
+from app.schemas.examples.own_arm import ARM
+from app.schemas.robots import RobotDetail, RobotList
+from app.settings import Settings
+from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from tests.app.requests import PATIENT
+from tests.app.routes.test_problems import refused
+
+MINE = {"robot": "mine"}
+START, GOAL = [0.2, 0.4], [-0.9, 1.3]
+MOVE: dict[str, Any] = {"start": {"q": START}, "goal": {"q": GOAL}, **MINE, **PATIENT}
+
+
+@pytest.fixture
+def mine(client: TestClient) -> Iterator[TestClient]:
+    """The service with a robot of a user's own."""
+    assert client.put("/robots/mine", json=ARM).status_code == 201
+    yield client
+    client.delete("/robots/mine")
+
+
+def test_a_robot_is_added_shown_and_deleted(client: TestClient) -> None:
+    answer = client.post("/robots", json={"name": "new_arm", "title": "New arm", **ARM})
+    assert (answer.status_code, answer.headers["location"]) == (201, "/robots/new_arm")
+    made = RobotDetail.model_validate_json(answer.content)
+    assert (made.name, made.title, made.joints, made.added) == ("new_arm", "New arm", ["shoulder", "elbow"], True)
+    assert made.default_motion is None and "drives.rotor_inertia" in made.warnings[-1]
+    assert client.get("/robots/new_arm").json() == answer.json()
+    listed = RobotList.model_validate_json(client.get("/robots").content).robots
+    assert "new_arm" in [each.name for each in listed if each.added] and not listed[0].added
+    refused(client.post("/robots", json={"name": "new_arm", **ARM}), problems.RobotExists)
+    assert client.delete("/robots/new_arm").status_code == 204
+    assert "ur5e" in refused(client.get("/robots/new_arm"), problems.UnknownRobot)["known"]
+    refused(client.delete("/robots/new_arm"), problems.UnknownRobot)
+
+
+def test_the_robots_of_the_service_stay(client: TestClient) -> None:
+    refused(client.post("/robots", json={"name": "ur5e", **ARM}), problems.RobotExists)
+    refused(client.put("/robots/ur5e", json=ARM), problems.RobotExists)
+    refused(client.delete("/robots/ur5e"), problems.RobotExists)
+
+
+def test_a_motion_of_least_energy(mine: TestClient) -> None:
+    answer = mine.post("/optimize", json=MOVE).json()
+    assert (answer["robot"], answer["status"]) == ("mine", "optimal")
+    assert max(answer["certificate"]["worst_ratio"].values()) <= 1 + RATIO_TOLERANCE
+    energy = answer["energy"]
+    assert 0 < energy["lower_bound"] <= energy["electrical"]["total"]
+    assert "controller_default" not in [each["name"] for each in answer["baselines"]]
+
+
+def test_every_endpoint_knows_it(mine: TestClient) -> None:
+    fronts = mine.post("/pareto", json={**MOVE, "points": 3}).json()
+    assert fronts["robot"] == "mine" and fronts["points"]
+    motion = {"configurations": [START, GOAL], "time_per_segment": 1.5}
+    evaluated = mine.post("/evaluate", json={**motion, **MINE})
+    assert evaluated.json()["robot"] == "mine"
+    table = f"q1,q2\n{START[0]},{START[1]}\n{GOAL[0]},{GOAL[1]}\n"
+    query = {"time_per_segment": "1.5", "robot": "mine"}
+    of_csv = mine.post("/evaluate", content=table, params=query, headers={"content-type": "text/csv"})
+    assert of_csv.json()["total"]["energy"] == evaluated.json()["total"]["energy"]
+    pose = {"position": [0.3, 0.0, 0.6], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+    (error,) = refused(mine.post("/ik", json={"pose": pose, **MINE}), problems.Validation)["errors"]
+    assert "give joint positions" in error["msg"]
+    study = mine.post("/studies", json={"name": "own", "threshold": 10.0, **MINE}).json()["id"]
+    step = {"optimize": {"start": {"q": START}, "goal": {"q": GOAL}, **PATIENT}}
+    assert mine.post(f"/studies/{study}/iterations", json=step).status_code == 201
+    suggested = mine.get(f"/studies/{study}/suggest", params={"deadline": 60})
+    assert suggested.status_code == 200
+    # a shorter motion may be impossible; what needs inverse kinematics is not suggested
+    assert {each["problem"] for each in suggested.json()["not_computed"]} <= {"duration-too-short"}
+    assert {each["step"] for each in suggested.json()["suggestions"]} >= {"duration"}
+
+
+def test_another_robot_of_the_same_name_is_used_at_once(mine: TestClient) -> None:
+    """Twice the friction: by `PUT` the next request has it, in whichever worker."""
+    rubbed = ARM | {"drives": {"coulomb": [7.2, 4.8], "viscous": [6.6, 4.4]}}
+    motion = {"configurations": [START, GOAL], "time_per_segment": 1.5, **MINE}
+    before = [mine.post("/evaluate", json=motion).json()["total"]["energy"]["electrical"] for _ in range(3)]
+    assert mine.put("/robots/mine", json=rubbed).status_code == 200
+    after = [mine.post("/evaluate", json=motion).json()["total"]["energy"]["electrical"] for _ in range(3)]
+    for old, new in zip(before, after, strict=True):
+        # the defaults are 0.06 and 0.055 of 60 and 40 N·m
+        assert new["friction"] == pytest.approx(2 * old["friction"], rel=1e-9)
+
+
+def test_a_name_that_nobody_added(mine: TestClient) -> None:
+    known = refused(mine.post("/optimize", json={**MOVE, "robot": "yours"}), problems.UnknownRobot)["known"]
+    assert "mine" in known and "ur5e" in known
+    refused(mine.post("/ik", json={"pose": {"position": [0.3, 0, 0.6], "rpy": [0, 0, 0]}, "robot": "yours"}),
+            problems.UnknownRobot)  # fmt: skip
+    refused(mine.post("/studies", json={"name": "s", "threshold": 1.0, "robot": "yours"}), problems.UnknownRobot)
+
+
+@pytest.mark.parametrize(
+    ("changes", "place", "words"),
+    [
+        ({"tip": "nowhere"}, ["body", "tip"], "There is no link 'nowhere'"),
+        ({"urdf": ARM["urdf"].replace('effort="40"', "")}, ["body", "torque"], "Joint 'elbow' has no limit `effort`"),
+        ({"urdf": "<robot>"}, ["body", "urdf"], "not XML"),
+        ({"drives": {"copper": [0.1, 0.1, 0.1]}}, ["body", "drives", "copper"], "a list of 2"),
+        ({"payload": "heavy"}, ["body", "payload"], "number"),
+        ({"meshes": []}, ["body"], "Unknown field"),
+    ],
+    ids=lambda value: str(value)[:30],
+)
+def test_what_makes_no_robot(client: TestClient, changes: dict[str, Any], place: list[str], words: str) -> None:
+    for answer in (
+        client.put("/robots/wrong", json=ARM | changes),
+        client.post("/robots", json=ARM | changes | {"name": "w"}),
+    ):
+        (error,) = refused(answer, problems.Validation)["errors"]
+        assert error["loc"][: len(place)] == place and words in error["msg"]
+    refused(client.get("/robots/wrong"), problems.UnknownRobot)
+
+
+@pytest.mark.parametrize("name", ["Mine", "../etc", "a b", "x" * 65, "-x"])
+def test_a_name_that_is_none(client: TestClient, name: str) -> None:
+    refused(client.post("/robots", json={"name": name, **ARM}), problems.Validation)
+
+
+def test_no_more_than_the_service_holds() -> None:
+    with TestClient(create_app(Settings(workers=1, max_robots=0)), raise_server_exceptions=False) as client:
+        refused(client.put("/robots/one_more", json=ARM), problems.TooManyRobots)
+        refused(client.post("/robots", json={"name": "one_more", **ARM}), problems.TooManyRobots)
+
+
+def test_a_robot_of_seven_joints_keeps_its_shape(client: TestClient) -> None:
+    """Every figure over joints has as many entries, whatever the number of joints."""
+    link = (
+        '<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{n}"/>'
+        '<origin xyz="0 0.05 0.15" rpy="{turn} 0 0"/><axis xyz="0 0 1"/>'
+        '<limit lower="-2" upper="2" velocity="2" effort="{effort}"/></joint><link name="l{n}"><inertial>'
+        '<origin xyz="0 0 0.05"/><mass value="1"/>'
+        '<inertia ixx="0.004" ixy="0" ixz="0" iyy="0.004" iyz="0" izz="0.002"/></inertial></link>'
+    )
+    links = "".join(link.format(k=k, n=k + 1, turn=1.2 * (-1) ** k, effort=80 - 9 * k) for k in range(7))
+    arm = {"urdf": f'<robot name="r"><link name="l0"/>{links}</robot>', "tip": "l7", "acceleration": 6.0, "payload": 1}
+    made = client.put("/robots/seven", json=arm).json()
+    assert np.shape(made["limits"]["torque"]["value"]) == np.shape(made["drives"]["copper"]["value"]) == (7,)
+    move = {"start": {"q": [0.3] * 7}, "goal": {"q": [0.8] * 7}, "collisions": False, "robot": "seven", **PATIENT}
+    assert client.post("/optimize", json=move).json()["status"] == "optimal"
+    client.delete("/robots/seven")
