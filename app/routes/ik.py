@@ -38,4 +38,5 @@ def solve(request: Request, body: IKRequest) -> Response:
     kinematics = required_inverse_kinematics(robot, "pose")
     solutions = kinematics.solve(to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal")
     contacts = collision_model(to_collision_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
-    return result_response(TaskResult.of_json(to_ik_response(body, request.state.id, robot, solutions, contacts)))
+    answer = to_ik_response(body, request.state.id, robot, solutions, contacts, kinematics.complete)
+    return result_response(TaskResult.of_json(answer))
