@@ -33,7 +33,7 @@ from optimizer.nlp.clearance_constraint import COUNTED
 from optimizer.optimize import optimize, warm_up
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
-from optimizer.problem.branches import BranchFilter
+from optimizer.problem.branches import BranchFilter, Label
 from optimizer.problem.clouds import Points
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -184,6 +184,7 @@ def _room(rng: np.random.Generator, size: int) -> Array:
 
 def _branch(robot: Robot, T_goal: Array) -> BranchFilter:
     label = required_inverse_kinematics(robot, "goal").branches(T_goal)[0].label
+    assert isinstance(label, Label)
     return BranchFilter(label.shoulder, label.elbow, label.wrist)
 
 

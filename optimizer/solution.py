@@ -252,7 +252,11 @@ class SolverReport:
 
 @dataclass(frozen=True)
 class Solution:
-    """The motion of least energy, with its lower bound and certificate."""
+    """The motion of least energy, with its lower bound and certificate.
+
+    Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or goal. Then `status`
+    is `feasible`, and the lower bound holds for any two configurations.
+    """
 
     status: Literal["optimal", "feasible"]
     start: Branch
@@ -265,6 +269,7 @@ class Solution:
     unreachable: list[UnreachableTarget]
     certificate: Certificate
     solver: SolverReport
+    complete: bool
 
     @property
     def duration(self) -> float:

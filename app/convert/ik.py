@@ -15,7 +15,12 @@ from optimizer.problem.arm import Arm, Payload
 
 
 def to_ik_response(
-    request: IKRequest, request_id: str, robot: Robot, solutions: Sequence[IKSolution], contacts: Sequence[ClosestPair]
+    request: IKRequest,
+    request_id: str,
+    robot: Robot,
+    solutions: Sequence[IKSolution],
+    contacts: Sequence[ClosestPair],
+    complete: bool,
 ) -> dict[str, Any]:
     """The answer of `POST /ik`."""
     return {
@@ -31,6 +36,7 @@ def to_ik_response(
             }
             for solution, contact in zip(solutions, contacts, strict=True)
         ],
+        "complete": complete,
     }
 
 

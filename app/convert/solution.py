@@ -35,7 +35,7 @@ def to_optimize_response(request: asked.OptimizeRequest, request_id: str, soluti
         "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
         "unreachable": [unreachable_fields(target) for target in solution.unreachable],
         "certificate": certificate_fields(solution.certificate),
-        "warnings": certified_warnings(solution.certificate.close_pass),
+        "warnings": certified_warnings(solution),
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
     }
 

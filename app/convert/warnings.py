@@ -4,17 +4,28 @@ from __future__ import annotations
 
 from optimizer.collision.close_pass import CLOSE
 from optimizer.replay.nearest_contact import LeastClearance
-from optimizer.solution import Clearance
+from optimizer.solution import Solution
 
 ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
 
 
-def certified_warnings(close_pass: Clearance | None) -> list[str]:
+MISSED = (
+    "The inverse kinematics of this arm is numeric and may have missed arm configurations: the answer is the best of "
+    "those found, its status is not `optimal`, and its lower bound is that of any motion."
+)
+NO_DEFAULT_MOTION = "No default motion of the robot's controller is known: `controller_default` is left out."
+
+
+def certified_warnings(solution: Solution) -> list[str]:
     """The warnings of a certified motion."""
-    if close_pass is None:
-        return []
-    proven = f"proven: at least {_mm(max(close_pass.min_clearance, 0.0))} mm"
-    return [_close(close_pass.pair, close_pass.sampled, close_pass.time, f" ({proven})")]
+    found = [] if solution.complete else [MISSED]
+    if all(baseline.name != "controller_default" for baseline in solution.baselines):
+        found.append(NO_DEFAULT_MOTION)
+    close_pass = solution.certificate.close_pass
+    if close_pass is not None:
+        proven = f"proven: at least {_mm(max(close_pass.min_clearance, 0.0))} mm"
+        found.append(_close(close_pass.pair, close_pass.sampled, close_pass.time, f" ({proven})"))
+    return found
 
 
 def sampled_warnings(close_pass: LeastClearance | None) -> list[str]:

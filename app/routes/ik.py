@@ -46,4 +46,4 @@ def _answer(body: IKRequest, robot: Robot, request_id: str) -> TaskResult:
     kinematics = required_inverse_kinematics(robot, "pose")
     solutions = kinematics.solve(to_matrix(body.pose), to_matrix(body.tcp), robot.limits, body.windings, "goal")
     contacts = collision_model(to_collision_arm(body, robot)).closest_pairs([solution.q for solution in solutions])
-    return TaskResult.of_json(to_ik_response(body, request_id, robot, solutions, contacts))
+    return TaskResult.of_json(to_ik_response(body, request_id, robot, solutions, contacts, kinematics.complete))

@@ -45,7 +45,12 @@ class IKSolution(Response):
     """One arm configuration that reaches the pose."""
 
     q: list[float] = described("Joint positions.", "rad", HOME)
-    label: str = described("Branch: shoulder/elbow/wrist. Full turns of a joint do not change it.", None, LABEL)
+    label: str = described(
+        "Branch: shoulder/elbow/wrist, or its number for an arm whose branches have no names. Full turns of a joint do "
+        "not change it.",
+        None,
+        LABEL,
+    )
     limit_distance: float = described("Smallest distance of a joint from an end of its range.", "rad", 1.57)
     smallest_singular_value: float = described(
         "Smallest singular value of the Jacobian in metres and radians; near zero, the configuration is nearly "
@@ -72,3 +77,9 @@ class IKResponse(Answer):
     """All arm configurations within the joint range that reach the pose."""
 
     solutions: list[IKSolution] = part("One entry per configuration.")
+    complete: bool = described(
+        "Whether every branch is among them. False for an arm whose inverse kinematics is numeric: some may be "
+        "missing.",
+        None,
+        True,
+    )

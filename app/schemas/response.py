@@ -25,7 +25,8 @@ LOWER_BOUND = (
 GAP = "1 - lower_bound / energy of the objective; 0 if this energy is not positive."
 WARNINGS = (
     "Remarks on the motion, in words; empty if there are none. If two bodies come closer than "
-    f"{CLOSE * 1e3:g} mm, one names them, their distance without margins, and the time."
+    f"{CLOSE * 1e3:g} mm, one names them, their distance without margins, and the time. Others say that arm "
+    "configurations may have been missed, or that a baseline is left out."
 )
 OBJECTIVE = "Energy that was minimised: electrical energy drawn from the supply, or mechanical work."
 
@@ -296,7 +297,7 @@ class OptimizeResponse(Answer):
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: the method converged, and every other candidate was solved, is infeasible, or was ruled out by its "
         "lower bound or its energy. It does not say that no better motion exists: see `optimality_gap`. `feasible`: "
-        "the motion is certified, but the search was not complete.",
+        "the motion is certified, but the search was not complete, or arm configurations may have been missed.",
         None,
         "optimal",
     )

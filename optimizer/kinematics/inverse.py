@@ -3,9 +3,10 @@
 A configuration is singular where two branches meet (shoulder or elbow) or where the arm can move while the pose is
 held (wrist). The first are solutions like any other. The second are members of a self-motion, a curve of solutions.
 
-`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. So far there is
-one, the closed form of Universal Robots' arms in `ur_closed_form`. For any other arm it returns None: such an arm takes
-joint positions as targets, not poses.
+`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. For six joints
+they are the closed form of Universal Robots' arms in `ur_closed_form`, then that of `decomposition` for arms with three
+axes that are parallel or meet, then Newton's method from many starts (`multi_start`), which may miss branches. For an
+arm with another number of joints it returns None: such an arm takes joint positions as targets, not poses.
 """
 
 from __future__ import annotations
@@ -21,12 +22,13 @@ import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.jacobians import geometric_jacobian
+from optimizer.kinematics.chain import Chain
+from optimizer.kinematics.decomposition import DecomposedArm
+from optimizer.kinematics.multi_start import MultiStart
 from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
-from optimizer.problem.branches import Label
+from optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9
@@ -45,7 +47,7 @@ class IKSolution:
     """
 
     q: Array
-    label: Label
+    label: BranchLabel
     smallest_singular_value: float
     limit_distance: float
     singular: tuple[str, ...] = ()
@@ -57,7 +59,7 @@ class PrincipalSolution:
     """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits. See `IKSolution`."""
 
     q: Array
-    label: Label
+    label: BranchLabel
     smallest_singular_value: float
     singular: tuple[str, ...] = ()
     self_motion: SelfMotion | None = None
@@ -66,14 +68,20 @@ class PrincipalSolution:
 class InverseKinematics(Protocol):
     """Inverse kinematics of one robot."""
 
-    def label(self, q: Array) -> Label:
+    @property
+    def complete(self) -> bool:
+        """Whether every branch is found. If not, some may be missed: nothing may be claimed of all of them."""
+        ...
+
+    def label(self, q: Array) -> BranchLabel:
         """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
         ...
 
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
         """Every branch that reaches the flange pose (4, 4), and `members` of every self-motion or a few more.
 
-        An empty list if the pose is out of reach.
+        An empty list if the pose is out of reach. Raises SingularPose if it is reached on a self-motion that this
+        inverse kinematics does not know.
         """
         ...
 
@@ -102,7 +110,7 @@ class InverseKinematics(Protocol):
 @lru_cache(MOST_ROBOTS)
 def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """The robot's inverse kinematics, built once; None for an arm that has none here."""
-    form = URClosedForm.of(robot.model)
+    form = URClosedForm.of(robot.model) or DecomposedArm.of(robot.model) or MultiStart.of(robot.model)
     return None if form is None else ClosedFormInverseKinematics(robot, form)
 
 
@@ -120,14 +128,22 @@ def required_inverse_kinematics(robot: Robot, field: str) -> InverseKinematics:
 
 
 class ClosedForm(Protocol):
-    """All branches of a flange pose as formulas, for one family of arms."""
+    """The branches of a flange pose, for one family of arms."""
 
-    def label(self, q: Array) -> Label:
+    @property
+    def complete(self) -> bool:
+        """Whether every branch is found."""
+        ...
+
+    def label(self, q: Array) -> BranchLabel:
         """The branch of a configuration q (nq,) [rad]."""
         ...
 
-    def solve(self, T: Array) -> tuple[Array, list[Label]]:
-        """Isolated configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their n labels."""
+    def solve(self, T: Array) -> tuple[Array, Sequence[BranchLabel]]:
+        """Isolated configurations (n, nq) [rad] in [-pi, pi] that put the flange at T (4, 4), and their n labels.
+
+        Raises SingularPose if T is reached on a self-motion that is not known.
+        """
         ...
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
@@ -138,8 +154,8 @@ class ClosedForm(Protocol):
         """The self-motions that hold the flange at T (4, 4)."""
         ...
 
-    def distance_to_reach(self, T: Array) -> float:
-        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution."""
+    def distance_to_reach(self, T: Array) -> float | None:
+        """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution; None if unknown."""
         ...
 
 
@@ -149,10 +165,14 @@ class ClosedFormInverseKinematics:
     def __init__(self, robot: Robot, form: ClosedForm) -> None:
         self._limits = robot.limits
         self._form = form
-        self._placements = joint_placements(robot.model)
-        self._T_last_flange = robot.T_last_flange
+        self._chain = Chain.of(robot.model)
 
-    def label(self, q: Array) -> Label:
+    @property
+    def complete(self) -> bool:
+        """Whether every branch is found: `InverseKinematics`."""
+        return self._form.complete
+
+    def label(self, q: Array) -> BranchLabel:
         """The branch of a configuration q (nq,) [rad]. A full turn of a joint does not change it."""
         return self._form.label(q)
 
@@ -160,7 +180,7 @@ class ClosedFormInverseKinematics:
         """Every branch that reaches the flange pose (4, 4), and members of every self-motion: `InverseKinematics`."""
         T = _orthonormal(T_base_flange)
         isolated, labels = self._form.solve(T)
-        found: list[tuple[Array, Label, SelfMotion | None]]
+        found: list[tuple[Array, BranchLabel, SelfMotion | None]]
         found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
         for motion in self._form.self_motions(T):
             curve = None if is_point(motion) else motion
@@ -168,7 +188,7 @@ class ClosedFormInverseKinematics:
         if not found:
             return []
         q = np.array([each for each, _, _ in found])
-        T_reached, jacobian = self._forward(q)
+        T_reached, jacobian = self._chain.flange_and_jacobian(q)
         singular_values = np.linalg.svd(jacobian, compute_uv=False)[:, -1].tolist()
         # never a wrong answer: a solution that forward kinematics does not confirm is dropped
         position = np.linalg.norm(T_reached[:, :3, 3] - T[:3, 3], axis=1)
@@ -192,7 +212,10 @@ class ClosedFormInverseKinematics:
         """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see `InverseKinematics`."""
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
-        branches = self.branches(T, members)
+        try:
+            branches = self.branches(T, members)
+        except SingularPose as error:
+            raise SingularPose(target, error.smallest_singular_value) from None
         if not branches:
             raise self._out_of_reach(T, target)
         solutions = []
@@ -220,6 +243,13 @@ class ClosedFormInverseKinematics:
 
     def _out_of_reach(self, T: Array, target: str) -> UnreachablePose | SingularPose:
         distance = self._form.distance_to_reach(_orthonormal(T))
+        if distance is None:
+            return UnreachablePose(
+                target,
+                None,
+                f"No arm configuration was found for the {target} pose: move the position closer to the robot's "
+                "workspace, or change the orientation.",
+            )
         if distance <= ROUNDING:
             return SingularPose(target, 0.0)
         return UnreachablePose(
@@ -228,12 +258,6 @@ class ClosedFormInverseKinematics:
             f"The {target} pose is {distance:.4g} m out of reach in this orientation: move the position closer to the "
             "robot's workspace, or change the orientation.",
         )
-
-    def _forward(self, q: Array) -> tuple[Array, Array]:
-        """T_base_flange (n, 4, 4) and its geometric Jacobian (n, 6, nq)."""
-        frames = link_frames(self._placements, q)
-        T = frames[:, -1] @ self._T_last_flange
-        return T, geometric_jacobian(frames, T[:, :3, 3])
 
 
 def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[float]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.problem.branches import Label
+from optimizer.problem.branches import BranchLabel, Label
 
 # distance [m] beyond the reach at which the fourth axis may lie by rounding alone
 ROUNDING = 1e-10
@@ -25,7 +25,7 @@ class SelfMotion(Protocol):
     """A curve of configurations that hold one pose, over a parameter on some arcs of the circle."""
 
     @property
-    def label(self) -> Label:
+    def label(self) -> BranchLabel:
         """The branch; the part that is singular has no meaning."""
         ...
 

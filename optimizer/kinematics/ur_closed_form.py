@@ -56,9 +56,15 @@ class URClosedForm:
     d5: float
     d6: float
 
+    complete = True
+
     @classmethod
-    def of(cls, model: pin.Model) -> URClosedForm | None:
-        """The closed form of a Pinocchio model with a frame `flange`; None if the table does not describe the model."""
+    def of(cls, model: pin.Model, tolerance: float = EQUAL) -> URClosedForm | None:
+        """The closed form of a Pinocchio model with a frame `flange`; None if the table does not describe the model.
+
+        `tolerance` [m, 1] is the greatest difference between the poses of both. With more than rounding, the form names
+        the branches of an arm that deviates from it, as a calibrated one does.
+        """
         if model.nq != 6:
             return None
         flange, data = model.getFrameId("flange"), model.createData()
@@ -75,13 +81,13 @@ class URClosedForm:
             d5=d1 - float(end[2]),
             d6=-float(end[1]) - d4,
         )
-        return form if form._describes(model, data, flange) else None
+        return form if form._describes(model, data, flange, tolerance) else None
 
-    def _describes(self, model: pin.Model, data: pin.Data, flange: int) -> bool:
+    def _describes(self, model: pin.Model, data: pin.Data, flange: int, tolerance: float) -> bool:
         """Whether the table gives the forward kinematics of the model, at configurations in general position."""
         for q in np.random.default_rng(0).uniform(-pi, pi, (4, 6)):
             pin.framesForwardKinematics(model, data, q)
-            if np.abs(data.oMf[flange].homogeneous - self._forward(q)).max() > EQUAL:
+            if np.abs(data.oMf[flange].homogeneous - self._forward(q)).max() > tolerance:
                 return False
         return True
 

@@ -19,10 +19,12 @@ class Label:
     inverse kinematics of PUMA robots" (1984).
 
     `shoulder`: side of the first axis on which the plane of the arm lies, seen along the reach. It changes where the
-    origin of the last axis is level with the first axis.
+    origin of the last axis is level with the first axis. If the plane holds the first axis, as with a spherical wrist
+    on an arm without an offset, it is right where the arm reaches forward, and left where it reaches back overhead.
     `elbow`: up if the elbow is above the line from shoulder to wrist of an arm that reaches forward. It changes where
     the elbow is stretched or folded; across the singularity of the shoulder it changes with the shoulder's part.
-    `wrist`: no_flip if sin(q5) < 0, as with the tool down in the everyday posture of a Universal Robots arm.
+    `wrist`: no_flip if sin(q5) < 0, as with the tool down in the everyday posture of a Universal Robots arm. Of a
+    spherical wrist, q5 counts from where the sixth axis is along the fourth.
     """
 
     shoulder: Shoulder
@@ -31,6 +33,22 @@ class Label:
 
     def __str__(self) -> str:
         return f"{self.shoulder}/{self.elbow}/{self.wrist}"
+
+
+@dataclass(frozen=True)
+class NumberedBranch:
+    """A branch of an arm whose branches have no names: its number among those of the same pose, from 1 on.
+
+    They are numbered by their joint positions, those of the first joint first. A number says nothing about other poses.
+    """
+
+    number: int
+
+    def __str__(self) -> str:
+        return f"branch {self.number}"
+
+
+BranchLabel = Label | NumberedBranch
 
 
 @dataclass(frozen=True)

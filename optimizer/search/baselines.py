@@ -4,7 +4,8 @@
 - `quintic`: rest-to-rest quintic, all joints synchronised, in our duration
 - `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021); without torque limits
 - `ruckig_slowed`: the same motion, its time scaled to our duration
-- `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid
+- `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid; left
+  out for a robot whose maker publishes none
 
 All go from the start to the nearest goal and wait there until the end of the cycle, if there is one. The acceleration
 of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
@@ -76,17 +77,16 @@ def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) ->
     The last one is left out for a robot whose controller's default motion is unknown.
     """
     limits = problem.arm.active_limits
-    fastest = time_optimal(limits, q_start, q_goal)
-    default = problem.arm.robot.default_motion
-    known: dict[BaselineName, SampledMotion]
-    known = {} if default is None else {"controller_default": controller_default(limits, default, q_start, q_goal)}
-    return {
+    fastest, default = time_optimal(limits, q_start, q_goal), problem.arm.robot.default_motion
+    motions: dict[BaselineName, SampledMotion] = {
         "trapezoid": trapezoid(limits, q_start, q_goal, duration),
         "quintic": quintic(q_start, q_goal, duration),
         "ruckig": fastest,
         "ruckig_slowed": fastest.scaled_to(duration),
-        **known,
     }
+    if default is not None:
+        motions["controller_default"] = controller_default(limits, default, q_start, q_goal)
+    return motions
 
 
 def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:

@@ -22,6 +22,7 @@ from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.missed_branches import all_known, bound_of_missed
 from optimizer.search.refinement import compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.self_motion_bound import self_motion_bound
@@ -213,8 +214,10 @@ class Run:
         family = min(
             family_bound_of(prepared, candidates, incumbent.deadline, objective),
             self_motion_bound(prepared, candidates, incumbent.deadline),
+            bound_of_missed(prepared, candidates),
         )
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
+        done = done and all_known(candidates)
         assert best.attempt is not None
         return Solution(
             status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
@@ -223,6 +226,7 @@ class Run:
             trajectory=trajectory,
             energy=energy,
             lower_bound=min([family, *(each.lower_bound for each in candidates if not each.sampled)]),
+            complete=all_known(candidates),
             baselines=table,
             candidates=[each.report() for each in candidates],
             unreachable=self.unreachable,

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from models.robot import Array
-from optimizer.exceptions import JoulepathError
+from optimizer.exceptions import JoulepathError, SingularPose
 from optimizer.kinematics.angles import nearest_turn
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.orientation_tolerance import nearest_orientation
@@ -124,7 +124,10 @@ def _branches_of(prepared: PreparedProblem, pose: ConeOrientedPose, q: Array) ->
     arm = prepared.problem.arm
     T_base_tcp = pose.with_orientation(nearest_orientation(pose, tcp_pose(arm, q)[:3, :3])).T
     kinematics = required_inverse_kinematics(arm.robot, "goal")
-    branches = kinematics.branches(flange_pose(T_base_tcp, arm.T_flange_tcp))
+    try:
+        branches = kinematics.branches(flange_pose(T_base_tcp, arm.T_flange_tcp))
+    except SingularPose:
+        return []
     return [each.q for each in branches if prepared.problem.allows(each.label, each.singular)]
 
 

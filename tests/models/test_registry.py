@@ -32,6 +32,21 @@ def robot(request: pytest.FixtureRequest) -> Robot:
     return load_robot(request.param)
 
 
+def flange_by_origins(q: Array, kinematics: dict[str, Any]) -> Array:
+    """T_base_flange (4, 4) by the origins of the joints, each turning about its z axis."""
+    T = np.eye(4)
+    origins = [*kinematics["joint_origin"]["value"], kinematics["flange_origin"]["value"]]
+    for origin, angle in zip(origins, [*q, 0.0], strict=True):
+        (r, p, y), (c, s) = origin[3:], (np.cos(angle), np.sin(angle))
+        about_x = np.array([[1, 0, 0], [0, np.cos(r), -np.sin(r)], [0, np.sin(r), np.cos(r)]])
+        about_y = np.array([[np.cos(p), 0, np.sin(p)], [0, 1, 0], [-np.sin(p), 0, np.cos(p)]])
+        about_z = np.array([[np.cos(y), -np.sin(y), 0], [np.sin(y), np.cos(y), 0], [0, 0, 1]])
+        step = np.eye(4)
+        step[:3, 3], step[:3, :3] = origin[:3], about_z @ about_y @ about_x @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+        T = T @ step
+    return T
+
+
 def dh_flange(q: Array, table: dict[str, Any]) -> Array:
     """T_base_flange by the standard Denavit-Hartenberg table, shape (4, 4)."""
     T = np.eye(4)
@@ -57,7 +72,7 @@ def configurations(count: int = 200) -> Array:
 
 
 def test_names_load_and_others_do_not() -> None:
-    assert robot_names() == ("ur3e", "ur5e")
+    assert {"kr10_r1100", "ur3e", "ur5e"} <= set(robot_names()) and list(robot_names()) == sorted(robot_names())
     assert load_robot("ur5e") is load_robot("ur5e")
     with pytest.raises(LookupError, match="ur5e"):
         load_robot("../ur5e")
@@ -79,11 +94,20 @@ def test_no_figure_without_source_is_trusted(robot_name: str) -> None:
         assert figure["source"].startswith("none") == (figure["trust"] == "E"), name
 
 
-def test_forward_kinematics_is_the_dh_tables(robot: Robot) -> None:
+def test_forward_kinematics_is_that_of_the_figures(robot: Robot) -> None:
+    """By the origins of the joints, and by the Denavit-Hartenberg table where the maker gives one."""
     data, flange = robot.model.createData(), robot.model.getFrameId("flange")
+    kinematics = robot.figures["kinematics"]
+    ways = [flange_by_origins, *([dh_flange] if "dh_a" in kinematics else [])]
     for q in configurations():
         pin.framesForwardKinematics(robot.model, data, q)
-        assert np.abs(data.oMf[flange].homogeneous - dh_flange(q, robot.figures["kinematics"])).max() < ROUNDING
+        for way in ways:
+            assert np.abs(data.oMf[flange].homogeneous - way(q, kinematics)).max() < ROUNDING
+
+
+@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
+def test_arms_of_universal_robots_have_a_table(name: str) -> None:
+    assert {"dh_a", "dh_d", "dh_alpha"} <= set(load_figures(name)["kinematics"])
 
 
 def test_inertias_are_the_figures(robot: Robot) -> None:
@@ -97,8 +121,13 @@ def test_inertias_are_the_figures(robot: Robot) -> None:
         assert body.inertia == pytest.approx(
             R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T, abs=ROUNDING
         )
-    masses = {"ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261, "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365}
-    assert pin.computeTotalMass(robot.model) == pytest.approx(masses[robot.name])
+    masses = {
+        "ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261,
+        "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365,
+        "kr10_r1100": 8.416 + 17.8369 + 6.075 + 5.16238 + 1.6128 + 0.734,
+    }
+    if robot.name in masses:
+        assert pin.computeTotalMass(robot.model) == pytest.approx(masses[robot.name])
 
 
 def test_urdf_states_the_same_limits(robot: Robot) -> None:
@@ -130,15 +159,15 @@ def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
     inertia = np.array([[0.02, 0.001, -0.002], [0.001, 0.03, 0.003], [-0.002, 0.003, 0.025]])
     loaded = robot.loaded_model(mass, com, inertia, gravity)
     by_hand = robot.model.copy()
-    T_wrist_body = pin.SE3(np.eye(3), com)
-    by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_wrist_body)
+    T_last_body = pin.SE3(robot.T_last_flange) * pin.SE3(np.eye(3), com)
+    by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_last_body)
     rng = np.random.default_rng(2)
     data, plain = loaded.createData(), robot.model.createData()
     for q in configurations(20):
         v, a = rng.uniform(-3, 3, (2, robot.nq))
         expected = pin.rnea(by_hand, by_hand.createData(), q, v, a)
         assert pin.rnea(loaded, data, q, v, a) == pytest.approx(expected, abs=TORQUE_ROUNDING)
-        height = (dh_flange(q, robot.figures["kinematics"]) @ np.append(com, 1.0))[2]
+        height = (flange_by_origins(q, robot.figures["kinematics"]) @ np.append(com, 1.0))[2]
         work = pin.computePotentialEnergy(loaded, data, q) - pin.computePotentialEnergy(robot.model, plain, q)
         assert work == pytest.approx(mass * 9.81 * height, abs=TORQUE_ROUNDING)
 
@@ -242,7 +271,28 @@ def test_the_worst_of_several_letters_counts(section: str, name: str, words: str
 
 
 def test_every_link_has_capsules(robot: Robot) -> None:
-    assert robot.link_names == ("base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
-    assert {capsule.link for capsule in robot.capsules} == set(range(7))
-    assert all(0.02 < capsule.radius < 0.1 and not capsule.axis.flags.writeable for capsule in robot.capsules)
+    assert robot.link_names == ("base", *robot.figures["kinematics"]["link_names"]["value"])
+    assert {capsule.link for capsule in robot.capsules} == set(range(robot.nq + 1))
+    assert all(0.01 < capsule.radius < 0.15 and not capsule.axis.flags.writeable for capsule in robot.capsules)
     assert all(first + 1 < second for first, second in robot.never_in_collision)
+
+
+def test_a_robot_may_have_no_default_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert load_robot("kr10_r1100").default_motion is None and load_robot("ur5e").default_motion is not None
+    figures = load_figures("ur5e")
+    del figures["default_motion"]
+    monkeypatch.setattr(registry, "load_figures", lambda _: figures)
+    assert registry._load_robot.__wrapped__("ur5e").default_motion is None
+
+
+def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:
+    """As its maker counts: from above, a positive turn is clockwise. At zero it reaches forward, at its full length."""
+    robot = load_robot("kr10_r1100")
+    assert robot.model.jointPlacements[1].rotation[:, 2] == pytest.approx([0, 0, -1], abs=ROUNDING)
+    q = np.zeros(6)
+    # lengths from the maker's drawing: 25 + 560 + 515 + 90 mm forward, 400 + 25 mm up
+    at_zero = flange_by_origins(q, robot.figures["kinematics"])
+    assert at_zero[:3, 3] == pytest.approx([1.19, 0.0, 0.425], abs=ROUNDING)
+    assert at_zero[:3, 2] == pytest.approx([1, 0, 0], abs=ROUNDING)
+    q[0] = 0.5
+    assert flange_by_origins(q, robot.figures["kinematics"])[1, 3] == pytest.approx(-1.19 * np.sin(0.5), abs=ROUNDING)

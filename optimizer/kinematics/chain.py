@@ -1,0 +1,64 @@
+"""The chain of an arm for its inverse kinematics: flange poses, Jacobians, and the error against a pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from models.robot import Array
+from optimizer.kinematics.forward import joint_placements, link_frames
+from optimizer.kinematics.jacobians import geometric_jacobian
+
+# sine of an angle below which its axis is taken from the sine alone
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Joints about z at `placements` (nq, 4, 4), each in the frame of the link before, and the flange on the last."""
+
+    placements: Array
+    T_last_flange: Array
+
+    @classmethod
+    def of(cls, model: pin.Model) -> Chain:
+        """The chain of a model with a frame `flange`."""
+        flange = model.frames[model.getFrameId("flange")].placement
+        return cls(joint_placements(model), np.asarray(flange.homogeneous))
+
+    @property
+    def nq(self) -> int:
+        """Number of joints."""
+        return len(self.placements)
+
+    def flange(self, q: Array) -> Array:
+        """T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
+        return np.asarray(link_frames(self.placements, q)[:, -1] @ self.T_last_flange)
+
+    def flange_and_jacobian(self, q: Array) -> tuple[Array, Array]:
+        """T_base_flange (n, 4, 4) at q (n, nq) [rad], and its geometric Jacobian (n, 6, nq)."""
+        frames = link_frames(self.placements, q)
+        T = frames[:, -1] @ self.T_last_flange
+        return T, geometric_jacobian(frames, T[:, :3, 3])
+
+
+def pose_error(T_reached: Array, T: Array) -> Array:
+    """Twist (n, 6) [m, rad] in base axes that carries poses T_reached (n, 4, 4) to T (4, 4): to first order in the
+    translation, exactly in the rotation but for half turns."""
+    error = np.empty((len(T_reached), 6))
+    error[:, :3] = T[:3, 3] - T_reached[:, :3, 3]
+    E = T[:3, :3] @ T_reached[:, :3, :3].transpose(0, 2, 1)
+    axis = np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1) / 2
+    sine = np.sqrt((axis * axis).sum(axis=1))
+    cosine = (E[:, 0, 0] + E[:, 1, 1] + E[:, 2, 2] - 1) / 2
+    scale = np.where(sine > _TINY, np.arctan2(sine, cosine) / np.maximum(sine, _TINY), 1.0)
+    error[:, 3:] = axis * scale[:, None]
+    return error
+
+
+def miss(error: Array) -> Array:
+    """The greater (n,) of distance [m] and angle [rad] of twists (n, 6)."""
+    squares = error * error
+    return np.asarray(np.sqrt(np.maximum(squares[:, :3].sum(axis=1), squares[:, 3:].sum(axis=1))))
