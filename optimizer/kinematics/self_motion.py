@@ -65,7 +65,7 @@ def is_point(motion: SelfMotion) -> bool:
 def spread(motion: SelfMotion, count: int) -> Array:
     """At least `count` parameters, evenly spread over the arcs, both ends of each arc among them.
 
-    Of an arc shorter than POINT there is one parameter, its middle.
+    Of an arc shorter than POINT there is one parameter, its middle; of a whole circle, both ends are one.
     """
     length = sum(upper - lower for lower, upper in motion.arcs)
     found = []
@@ -73,7 +73,9 @@ def spread(motion: SelfMotion, count: int) -> Array:
         if upper - lower < POINT:
             found.append(np.array([(lower + upper) / 2]))
         else:
-            found.append(np.linspace(lower, upper, max(2, int(np.ceil(count * (upper - lower) / length))) + 1))
+            pieces = max(2, int(np.ceil(count * (upper - lower) / length)))
+            closed = upper - lower > 2 * np.pi - POINT
+            found.append(np.linspace(lower, upper, pieces + (not closed), endpoint=not closed))
     return np.concatenate(found)
 
 

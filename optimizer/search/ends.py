@@ -40,7 +40,7 @@ class EndConfiguration:
 
     `fixed`: the joint positions are given. `target` is the index of the target that it reaches. `tolerance` is this
     target if its orientation is free in part: then the configuration is a sample of it. Of a pose that is held on a
-    `self_motion`, too, the configuration is a sample. Not `complete`: the target may have branches that were missed.
+    `self_motion`, too, the configuration is a sample.
     """
 
     label: str
@@ -50,7 +50,6 @@ class EndConfiguration:
     target: int = 0
     tolerance: ConeOrientedPose | None = None
     self_motion: SelfMotion | None = None
-    complete: bool = True
 
     @property
     def sampled(self) -> bool:
@@ -115,7 +114,6 @@ def _ends_of(
             fixed=False,
             target=index,
             self_motion=s.self_motion,
-            complete=kinematics.complete,
         )
         for s in solutions
     ]

@@ -6,26 +6,55 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import AnyOf, Target
 from optimizer.search.candidates import Candidate
+from optimizer.search.free_goal_bound import ROUNDS, family_bound
 from optimizer.search.lower_bound import LeastBound
+from optimizer.search.self_motion_bound import EndCurves
 
 
-def all_known(candidates: Sequence[Candidate]) -> bool:
-    """Whether every branch of every target is among the candidates."""
-    return all(each.start.complete and each.goal.complete for each in candidates)
+def all_known(problem: Problem) -> bool:
+    """Whether every branch of every pose among the targets is found, if it is reached at all."""
+    kinematics = inverse_kinematics_for(problem.arm.robot)
+    return (kinematics is None or kinematics.complete) or not (_poses(problem.start) + _poses(problem.goal))
 
 
-def bound_of_missed(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> float:
+def bound_of_missed(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
     """Lower bound [J] on the motions from or to branches that may have been missed; inf if all are known.
 
-    It is that of the motions between any two configurations, whatever the targets.
+    From given joint positions it is that of the motions to the goal poses with any rotation about their z axes, by
+    boxes of joint positions that need no inverse kinematics. From poses it is that of the motions between any two
+    configurations.
+    """
+    problem = prepared.problem
+    if all_known(problem):
+        return np.inf
+    if _poses(problem.start):
+        return _bound_of_any(prepared)
+    poses = [ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)]
+    curves = EndCurves.of([each.start for each in candidates])
+    starts, half = curves.boxes(curves.first())
+    rounds = max(1, ROUNDS // len(poses))
+    return min(family_bound(prepared, pose, starts, rounds, deadline, half) for pose in poses)
+
+
+def _bound_of_any(prepared: PreparedProblem) -> float:
+    """Lower bound [J] on the motions between any two configurations.
 
     Between two configurations no joint need move. But for full turns, which change no potential energy, they differ by
     at most half a turn in each joint: the potential energy falls by at most its greatest rate over that.
     """
-    if all_known(candidates):
-        return np.inf
     fall = np.pi * float(potential_rates(prepared.model, prepared.arm.gravity).sum())
     return float(LeastBound(prepared).of(np.zeros((1, prepared.arm.robot.nq)), np.array([-fall]))[0])
+
+
+def _poses(target: Target) -> list[Pose]:
+    """The poses among targets. Of a pose whose orientation is free in part, only samples are solved in any case."""
+    return [each for each in (target.targets if isinstance(target, AnyOf) else (target,)) if isinstance(each, Pose)]

@@ -214,10 +214,10 @@ class Run:
         family = min(
             family_bound_of(prepared, candidates, incumbent.deadline, objective),
             self_motion_bound(prepared, candidates, incumbent.deadline),
-            bound_of_missed(prepared, candidates),
+            bound_of_missed(prepared, candidates, incumbent.deadline),
         )
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
-        done = done and all_known(candidates)
+        done = done and all_known(self.problem)
         assert best.attempt is not None
         return Solution(
             status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
@@ -226,7 +226,7 @@ class Run:
             trajectory=trajectory,
             energy=energy,
             lower_bound=min([family, *(each.lower_bound for each in candidates if not each.sampled)]),
-            complete=all_known(candidates),
+            complete=all_known(self.problem),
             baselines=table,
             candidates=[each.report() for each in candidates],
             unreachable=self.unreachable,

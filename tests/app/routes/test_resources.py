@@ -13,7 +13,7 @@ from app.convert.pose import to_matrix
 from app.schemas.common import QuaternionPose
 from app.schemas.ik import IKResponse
 from app.schemas.robots import RobotDetail, RobotList
-from models.registry import load_robot
+from models.registry import load_robot, robot_names
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from tests.app.requests import PATIENT
 
@@ -23,11 +23,30 @@ POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 def test_robots(client: TestClient) -> None:
     answer = client.get("/robots")
     robots = RobotList.model_validate_json(answer.content).robots
-    assert [robot.name for robot in robots] == ["ur3e", "ur5e"]
+    assert [robot.name for robot in robots] == list(robot_names())
     assert all(len(robot.joints) == 6 for robot in robots)
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
-    assert "engineering defaults without a source (copper loss" in robots[0].energy_trust
-    assert "transferred from a sister robot (copper loss" in robots[1].energy_trust
+    trust = {robot.name: robot.energy_trust for robot in robots}
+    assert "engineering defaults without a source (copper loss" in trust["ur3e"]
+    assert "transferred from a sister robot (copper loss" in trust["ur5e"]
+    assert "engineering defaults without a source (torque constants, rotor inertia" in trust["kr10_r1100"]
+
+
+def test_a_robot_without_a_default_motion_says_so(client: TestClient) -> None:
+    assert client.get("/robots/kr10_r1100").json()["default_motion"] is None
+    ends = {"start": {"q": [0.0, -1.57, 1.57, 0.0, 0.9, 0.0]}, "goal": {"q": [0.2, -1.4, 1.4, 0.1, 0.8, 0.2]}}
+    answer = client.post("/optimize", json=ends | PATIENT | {"robot": "kr10_r1100"}).json()
+    assert "controller_default" not in {baseline["name"] for baseline in answer["baselines"]}
+    assert any("`controller_default` is left out" in warning for warning in answer["warnings"])
+
+
+def test_ik_of_a_spherical_wrist(client: TestClient) -> None:
+    pose = {"position": [0.6, -0.2, 0.5], "rpy": [3.0, 0.1, 0.4]}
+    answer = IKResponse.model_validate_json(client.post("/ik", json={"robot": "kr10_r1100", "pose": pose}).content)
+    assert answer.complete and {solution.label for solution in answer.solutions} >= {
+        "right/up/flip",
+        "right/up/no_flip",
+    }
 
 
 def test_another_robot_is_asked_for_by_name(client: TestClient) -> None:

@@ -1,0 +1,71 @@
+"""Six-joint arms of other forms than Universal Robots', and what their inverse kinematics finds of a configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.inverse import PrincipalSolution, required_inverse_kinematics
+
+# m and rad: what an answer may miss its pose by, and a configuration itself; and what two of them differ by at least
+ACCURACY, FOUND, SAME = 1e-9, 1e-6, 1e-6
+KUKA, UR5E = load_robot("kr10_r1100"), load_robot("ur5e")
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The branches of the pose of a configuration, their worst error [m, rad], and how far they are from it [rad]."""
+
+    branches: list[PrincipalSolution]
+    error: float
+    away: float
+    twice: bool
+
+
+def flange(robot: Robot, q: Array) -> Array:
+    """T_base_flange (4, 4) by Pinocchio."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
+
+
+def solved(robot: Robot, q: Array) -> Solved:
+    """What the inverse kinematics finds of the pose of q (6,); a self-motion counts as all its members."""
+    T = pin.SE3(flange(robot, q))
+    branches = required_inverse_kinematics(robot, "goal").branches(T.homogeneous)
+    errors = [pin.log6(T.actInv(pin.SE3(flange(robot, each.q)))).vector for each in branches]
+    members = [each.q if each.self_motion is None else _member(each, q) for each in branches]
+    isolated = np.array([each.q for each in branches if each.self_motion is None]).reshape(-1, 6)
+    apart = np.abs(wrapped(isolated[:, None] - isolated)).max(axis=2) + np.eye(len(isolated))
+    return Solved(
+        branches,
+        max((max(np.linalg.norm(each[:3]), np.linalg.norm(each[3:])) for each in errors), default=0.0),
+        min((float(np.abs(wrapped(each - q)).max()) for each in members), default=np.inf),
+        bool((apart < SAME).any()),
+    )
+
+
+def _member(branch: PrincipalSolution, q: Array) -> Array:
+    motion = branch.self_motion
+    assert motion is not None
+    return motion.at(np.array([motion.parameter(q)]))[0]
+
+
+def inside(robot: Robot, rng: np.random.Generator) -> Array:
+    """A random configuration (6,) within the limits and one turn."""
+    return rng.uniform(np.maximum(robot.limits.q_min, -np.pi), np.minimum(robot.limits.q_max, np.pi))
+
+
+def calibrated(robot: Robot, off: float, seed: int = 0) -> Robot:
+    """The robot with each joint's frame off by up to so many metres and radians along and about each axis."""
+    rng, model = np.random.default_rng(seed), robot.model.copy()
+    for j in range(1, 7):
+        M = model.jointPlacements[j]
+        turn, shift = pin.exp3(rng.uniform(-off, off, 3)), rng.uniform(-off, off, 3)
+        model.jointPlacements[j] = pin.SE3(M.rotation @ turn, M.translation + shift)
+    return replace(robot, model=model)

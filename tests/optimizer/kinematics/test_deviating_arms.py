@@ -1,0 +1,60 @@
+"""Arms whose axes meet, or are parallel, but for little: calibrated arms and descriptions with rounded angles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.robot import Robot
+from optimizer.kinematics.decomposition import DecomposedArm
+from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.kinematics.ur_closed_form import URClosedForm
+from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, KUKA, UR5E, calibrated, inside, solved
+from tests.selection import long_but
+
+# m and rad, of each joint's frame: that of a factory calibration
+OFF = 1e-4
+
+
+@pytest.mark.parametrize("count", long_but((25,), (25, 2000)))
+@pytest.mark.parametrize("robot", [KUKA, UR5E], ids=lambda robot: robot.name)
+def test_every_configuration_of_a_calibrated_arm_is_found(robot: Robot, count: int) -> None:
+    arm, nominal = calibrated(robot, OFF), required_inverse_kinematics(robot, "goal")
+    inverse, rng = required_inverse_kinematics(arm, "goal"), np.random.default_rng(21)
+    assert URClosedForm.of(arm.model) is None and isinstance(DecomposedArm.of(arm.model), DecomposedArm)
+    assert not inverse.complete, "next to a singularity it may have branches that the simplest arm has not"
+    for _ in range(count):
+        q = inside(arm, rng)
+        found = solved(arm, q)
+        assert found.away < FOUND and found.error < ACCURACY and not found.twice
+        assert inverse.label(q) == nominal.label(q)
+
+
+def test_rounded_angles_are_no_hindrance() -> None:
+    """Quarter turns written as 1.5708: no axes are parallel any more, and none meet."""
+    model = KUKA.model.copy()
+    for j in range(1, 7):
+        M = model.jointPlacements[j]
+        model.jointPlacements[j] = pin.SE3(
+            pin.rpy.rpyToMatrix(np.round(pin.rpy.matrixToRpy(M.rotation), 4)), M.translation
+        )
+    arm, rng = replace(KUKA, model=model), np.random.default_rng(22)
+    assert isinstance(DecomposedArm.of(model), DecomposedArm)
+    for _ in range(20):
+        found = solved(arm, inside(arm, rng))
+        assert found.away < FOUND and found.error < ACCURACY and not found.twice
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-4, 1e-3])
+def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: float) -> None:
+    """Where the nominal wrist is aligned: they are somewhere along the curve on which it would turn."""
+    arm, rng = calibrated(KUKA, OFF), np.random.default_rng(23)
+    for _ in range(4):
+        q = inside(arm, rng)
+        q[4] = off
+        found = solved(arm, q)
+        assert found.away < FOUND and found.error < ACCURACY and not found.twice
+        assert all(each.self_motion is None for each in found.branches)
