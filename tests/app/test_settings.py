@@ -6,6 +6,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.settings import Settings, WrongSettings, read_settings
+from models.registry import robot_names
 
 
 def test_robots_are_names_separated_by_commas(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,7 +20,7 @@ def test_robots_are_names_separated_by_commas(monkeypatch: pytest.MonkeyPatch) -
 
 def test_an_unknown_robot_stops_the_start_with_the_known_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("JOULEPATH_ROBOTS", "ur5e,r2d2")
-    with pytest.raises(ValidationError, match="'r2d2': use some of ur3e, ur5e"):
+    with pytest.raises(ValidationError, match="'r2d2': use some of ur10e, ur12e, ur15"):
         Settings()
 
 
@@ -30,4 +31,4 @@ def test_every_wrong_variable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
         read_settings()
     port, workers, robots = str(found.value).splitlines()
     assert port.startswith("JOULEPATH_PORT='http': ") and workers.startswith("JOULEPATH_WORKERS='0': ")
-    assert robots.endswith("'r2d2': use some of ur3e, ur5e")
+    assert robots.endswith(f"'r2d2': use some of {', '.join(robot_names())}")

@@ -13,7 +13,7 @@ from app.convert.pose import to_matrix
 from app.schemas.common import QuaternionPose
 from app.schemas.ik import IKResponse
 from app.schemas.robots import RobotDetail, RobotList
-from models.registry import load_robot
+from models.registry import load_robot, robot_names
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from tests.app.requests import PATIENT
 
@@ -23,11 +23,12 @@ POSE = {"position": [-0.35, 0.4, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 def test_robots(client: TestClient) -> None:
     answer = client.get("/robots")
     robots = RobotList.model_validate_json(answer.content).robots
-    assert [robot.name for robot in robots] == ["ur3e", "ur5e"]
+    assert tuple(robot.name for robot in robots) == robot_names()
     assert all(len(robot.joints) == 6 for robot in robots)
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
-    assert "engineering defaults without a source (copper loss" in robots[0].energy_trust
-    assert "transferred from a sister robot (copper loss" in robots[1].energy_trust
+    told = {robot.name: robot.energy_trust for robot in robots}
+    assert "engineering defaults without a source (copper loss" in told["ur3e"]
+    assert "transferred from a sister robot (copper loss" in told["ur5e"]
 
 
 def test_another_robot_is_asked_for_by_name(client: TestClient) -> None:
