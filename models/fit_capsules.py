@@ -35,7 +35,7 @@ STAGES = ((0.004, 1e-2, 40), (0.002, 5e-2, 40), (0.001, 3e-1, 60), (0.001, 3e-1,
 INSIDE = 3e-4
 # unit of the variables [m]: the first step of the solver is of length 1
 UNIT = 0.004
-LEAST_RADIUS, GREATEST_RADIUS = 0.015, 0.09
+LEAST_RADIUS, GREATEST_RADIUS = 0.015, 0.15
 SURFACE_SAMPLES, CHECKED_SAMPLES, CELLS, TURNS = 1500, 100_000, 6000, 36
 # the last digit of the figures [m]
 DIGIT = 1e-4

@@ -17,7 +17,12 @@ from models.robot import Array
 KINDS = ("visual", "collision")
 # where the meshes stand: of upper arm, forearm and wrists the shift [m] along the joint's axis, which is all that
 # differs between arms of one maker. From github.com/UniversalRobots/Universal_Robots_ROS2_Description
-SHIFTS = {"ur3e": (0.12, 0.027, -0.104, -0.08535, -0.0921), "ur5e": (0.138, 0.007, -0.127, -0.0997, -0.0989)}
+SHIFTS = {
+    "ur3e": (0.12, 0.027, -0.104, -0.08535, -0.0921),
+    "ur5e": (0.138, 0.007, -0.127, -0.0997, -0.0989),
+    "ur10e": (0.1762, 0.0393, -0.135, -0.12, -0.1168),
+    "ur16e": (0.176, 0.04, -0.135, -0.12, -0.1168),
+}
 # file of each link, from the base on, and roll, pitch, yaw [rad] of its mesh in the link frame
 _ALONG, _UPRIGHT = (np.pi / 2, 0.0, -np.pi / 2), (np.pi / 2, 0.0, 0.0)
 _FILES = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3")

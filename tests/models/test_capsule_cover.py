@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from models.capsule_cover import SMALLEST, not_held, outside
-from models.meshes import KINDS, SHIFTS, link_surfaces, sampled
+from models.meshes import KINDS, link_surfaces, sampled
 from models.registry import load_robot
 from models.robot import Array, LinkCapsule, Robot
+from tests.mesh_folders import FOUND, meshes
 
 # m; double precision of sums of a few squares of lengths below 1 m
 ROUNDING = 1e-12
-ROBOTS = [load_robot(name) for name in SHIFTS]
-
-
-def meshes(robot: str) -> Path:
-    """The folder of a robot's meshes in the package that ships them, which need not be imported."""
-    package = find_spec("airo_models")
-    assert package is not None and package.origin is not None, "a development dependency: `make test` installs it"
-    return Path(package.origin).parent / "arms" / robot
+ROBOTS = [load_robot(name) for name in FOUND]
 
 
 def label(value: object) -> str:

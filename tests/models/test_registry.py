@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +18,8 @@ from models.registry import load_figures, load_robot, robot_names
 from models.robot import Array, Robot
 from models.trust import energy_trust
 from models.urdf import urdf_of
-from tests.models.test_capsule_cover import meshes as arm_folder
+from tests.mesh_folders import SHIPPED
+from tests.mesh_folders import meshes as arm_folder
 
 # double precision over a product of seven matrices of entries about 1
 ROUNDING = 1e-14
@@ -25,6 +27,19 @@ ROUNDING = 1e-14
 NINE_DIGITS, THREE_DIGITS = 1e-8, 1e-3
 # the same relative to torques of up to 150 N·m
 TORQUE_ROUNDING = 1e-11
+# kg, of the moving links together, by the maker's list of each arm
+MASSES = {
+    "kr10_r1100": 8.416 + 17.8369 + 6.075 + 5.16238 + 1.6128 + 0.734,
+    "ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261,
+    "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365,
+    "ur7e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365,
+    "ur10e": 7.369 + 13.051 + 3.989 + 2.1 + 1.98 + 0.615,
+    "ur12e": 7.369 + 13.051 + 3.989 + 2.1 + 1.98 + 0.615,
+    "ur15": 9.9883 + 14.9255 + 6.1015 + 2.089 + 2.0869 + 1.0666,
+    "ur16e": 7.369 + 10.45 + 4.321 + 2.18 + 2.033 + 0.907,
+    "ur20": 16.343 + 29.632 + 7.879 + 3.054 + 3.126 + 0.926,
+    "ur30": 16.343 + 28.542 + 7.156 + 3.054 + 3.126 + 0.926,
+}
 
 
 @pytest.fixture(params=robot_names())
@@ -72,7 +87,7 @@ def configurations(count: int = 200) -> Array:
 
 
 def test_names_load_and_others_do_not() -> None:
-    assert {"kr10_r1100", "ur3e", "ur5e"} <= set(robot_names()) and list(robot_names()) == sorted(robot_names())
+    assert {"kr10_r1100", "ur3e", "ur5e", "ur30"} <= set(robot_names()) and list(robot_names()) == sorted(robot_names())
     assert load_robot("ur5e") is load_robot("ur5e")
     with pytest.raises(LookupError, match="ur5e"):
         load_robot("../ur5e")
@@ -121,13 +136,7 @@ def test_inertias_are_the_figures(robot: Robot) -> None:
         assert body.inertia == pytest.approx(
             R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T, abs=ROUNDING
         )
-    masses = {
-        "ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261,
-        "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365,
-        "kr10_r1100": 8.416 + 17.8369 + 6.075 + 5.16238 + 1.6128 + 0.734,
-    }
-    if robot.name in masses:
-        assert pin.computeTotalMass(robot.model) == pytest.approx(masses[robot.name])
+    assert pin.computeTotalMass(robot.model) == pytest.approx(MASSES[robot.name])
 
 
 def test_urdf_states_the_same_limits(robot: Robot) -> None:
@@ -214,7 +223,7 @@ def test_figures_of_another_number_of_joints_are_refused(part: str) -> None:
         urdf_of("ur5e", figures)
 
 
-@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
+@pytest.mark.parametrize("name", SHIPPED)
 def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
     """The maker's description as another package has it, whose numbers are rounded."""
     robot, model = load_robot(name), pin.buildModelFromUrdf(str(arm_folder(name) / f"{name}.urdf"))
@@ -239,10 +248,20 @@ def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_p
     assert registry._load_robot.__wrapped__("other").model.name == "other"
 
 
-def test_the_sentence_on_energies_is_made_from_the_letters(robot: Robot) -> None:
-    assert energy_trust(robot.figures).startswith(
-        "Energies rest on the maker's own figures (link masses, centres of mass, link inertias"
-    )
+def test_the_sentence_on_energies_says_what_each_robot_rests_on(robot: Robot) -> None:
+    told = energy_trust(robot.figures)
+    assert told.startswith("Energies rest on the maker's own figures (link masses, centres of mass")
+    # inertias, friction, and rotor inertias: who has them from where
+    assert ("own figures (link masses, centres of mass, link inertias" in told) == (robot.name != "ur30")
+    groups = {part: group for group, parts in re.findall(r"([^(),]+) \(([^)]+)\)", told) for part in parts.split(", ")}
+    source = {"ur5e": "measured", "ur3e": "measured", "ur10e": "measured"}
+    source |= dict.fromkeys(("ur7e", "ur12e", "ur16e"), "sister robot")
+    source |= dict.fromkeys(("kr10_r1100", "ur15", "ur20", "ur30"), "without a source")
+    for part in ("friction", "rotor inertias"):
+        assert source[robot.name] in groups[part]
+
+
+def test_the_sentence_on_energies_is_made_from_the_letters() -> None:
     figures = load_figures("ur5e")
     told = energy_trust(figures)
     assert "transferred from a sister robot (copper loss, idle power" in told and told.count(".") == 1

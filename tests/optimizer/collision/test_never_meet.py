@@ -4,13 +4,20 @@ Forearm and wrist 2, wrist 1 and wrist 3: for the convex hulls of both of the ma
 distance of two hulls changes by no more than Σ lever_j |Δq_j|, where lever_j is the largest distance of a point of the
 second hull from the axis of joint j, at any angle. A cell of angles is proven by the distance in its middle, or cut.
 
-Forearm and wrist 2 of a UR3e: in the same way, for the visual meshes. Their hulls overlap by 3 mm.
+Forearm and wrist 2 of a UR3e, a UR10e or a UR16e: in the same way, for the visual meshes. Their hulls overlap by 3 mm
+and 12 mm.
 
 Base and upper arm: for the surface of the upper arm as the visual mesh has it, which is not convex, and a cylinder that
 holds the base. The collision mesh of the upper arm, its convex hull, fills the hollow in which the base stands.
+
+Arms without meshes that may be used: by their capsules, in the same way as by hulls.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import product
 
 import coal
 import numpy as np
@@ -20,20 +27,36 @@ from scipy.spatial import ConvexHull
 from models.capsule_cover import cut
 from models.meshes import link_surfaces
 from models.registry import load_robot, robot_names
-from models.robot import Array, Robot
+from models.robot import Array, LinkCapsule, Robot
 from optimizer.collision.coal_distance import coal_shape
 from optimizer.collision.cores import Core
 from optimizer.kinematics.forward import joint_placements, link_frames
-from tests.models.test_capsule_cover import meshes
+from tests.mesh_folders import FOUND, meshes
+from tests.selection import long_but
 
 # distances [m] that the links keep, as figures.yaml states them
-BY_HULLS = {("ur5e", 3, 5): 0.005, ("ur5e", 4, 6): 0.010, ("ur3e", 4, 6): 0.010}
-BY_MESHES = {("ur3e", 3, 5): 0.005}
-BY_SURFACE = {("ur5e", 0, 2): 0.005, ("ur3e", 0, 2): 0.005}
+BY_HULLS = {
+    ("ur5e", 3, 5): 0.005,
+    ("ur5e", 4, 6): 0.010,
+    ("ur3e", 4, 6): 0.010,
+    ("ur10e", 4, 6): 0.020,
+    ("ur16e", 4, 6): 0.020,
+}
+BY_MESHES = {("ur3e", 3, 5): 0.005, ("ur10e", 3, 5): 0.005, ("ur16e", 3, 5): 0.005}
+BY_SURFACE = {("ur5e", 0, 2): 0.005, ("ur3e", 0, 2): 0.005, ("ur10e", 0, 2): 0.010, ("ur16e", 0, 2): 0.010}
+# the same of capsules: pairs that are compared, and the comparison refuses nothing
+BY_CAPSULES = {(name, *pair): 0.005 for name in ("ur15", "ur20", "ur30") for pair in ((0, 2), (4, 6))}
+# arms of the same kinematics and capsules as another
+TWINS = {"ur7e": "ur5e", "ur12e": "ur10e"}
 # largest edge of a piece of a surface [m], and range of an angle that is looked at first [rad]
 EDGE, FIRST_STEP = 4e-3, np.deg2rad(8.0)
 # height [m] of the base below which it is widest
-FOOT = {"ur5e": 0.074, "ur3e": 0.03}
+FOOT = {"ur5e": 0.074, "ur3e": 0.03, "ur10e": 0.074, "ur16e": 0.074}
+
+
+def here(pairs: Iterable[tuple[str, int, int]]) -> list[tuple[str, int, int]]:
+    """The pairs of robots whose meshes are here."""
+    return sorted(pair for pair in pairs if pair[0] in FOUND)
 
 
 def hull(robot: Robot, link: int) -> Array:
@@ -75,9 +98,25 @@ def distances(robot: Robot, first: int, second: int, angles: Array, by_meshes: b
     return np.array(result)
 
 
-def levers(robot: Robot, second: int) -> tuple[float, float]:
-    """Bounds [m] on how far the second hull reaches from the axes of the last two joints that move it."""
-    points, T = hull(robot, second), joint_placements(robot.model)[second - 1]
+def capsule_distances(robot: Robot, capsules: tuple[LinkCapsule, LinkCapsule], angles: Array) -> Array:
+    """Distances (k,) [m] of two capsules at angles (k, 2) [rad] of the two joints between their links."""
+    links = [capsule.link for capsule in capsules]
+    q = np.zeros((len(angles), robot.nq))
+    q[:, links[0] : links[1]] = angles
+    frames = link_frames(joint_placements(robot.model), q)
+    parts = [coal_shape(Core(capsule.axis)) for capsule in capsules]
+    (one, own, T_one), (other, others, T_other) = parts
+    request, result = coal.DistanceRequest(True, True), []
+    for T in frames[:, links]:
+        first, second = (coal.Transform3s(np.ascontiguousarray(P[:3, :3]), np.ascontiguousarray(P[:3, 3])) for P in T)
+        result.append(coal.distance(one, first * T_one, other, second * T_other, request, coal.DistanceResult()))
+    # of the axes, which coal grows a little, less both radii
+    return np.array(result) + own + others - sum(capsule.radius for capsule in capsules)
+
+
+def levers(robot: Robot, second: int, points: Array) -> tuple[float, float]:
+    """Bounds [m] on how far points (k, 3) [m] of the second link are from the axes of the last two joints."""
+    T = joint_placements(robot.model)[second - 1]
     own = float(np.linalg.norm(points[:, :2], axis=1).max())
     # at any angle of the last joint, a point stays on a circle about its axis
     centre = np.outer(points[:, 2], T[:3, 2]) + T[:3, 3]
@@ -86,24 +125,49 @@ def levers(robot: Robot, second: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    "pair", [*BY_HULLS, *(pytest.param(pair, marks=pytest.mark.long) for pair in BY_MESHES)], ids=str
+    "pair", [*here(BY_HULLS), *(pytest.param(pair, marks=pytest.mark.long) for pair in here(BY_MESHES))], ids=str
 )
 def test_links_that_never_meet(pair: tuple[str, int, int]) -> None:
     name, first, second = pair
-    robot, kept = load_robot(name), (BY_HULLS | BY_MESHES)[pair]
-    reach = sum(levers(robot, second))
+    robot = load_robot(name)
+    reach = sum(levers(robot, second, hull(robot, second)))
+    assert_apart(
+        lambda cells: distances(robot, first, second, cells, by_meshes=pair in BY_MESHES),
+        reach,
+        (BY_HULLS | BY_MESHES)[pair],
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "second"), long_but([pair for pair in BY_CAPSULES if pair[0] == "ur20"], BY_CAPSULES)
+)
+def test_capsules_that_never_meet(name: str, first: int, second: int) -> None:
+    robot = load_robot(name)
+    assert (first, second) not in robot.never_in_collision
+    sides = [[capsule for capsule in robot.capsules if capsule.link == link] for link in (first, second)]
+    for one, other in product(*sides):
+        # by that of their axes: the radii do not turn
+        assert_apart(
+            partial(capsule_distances, robot, (one, other)),
+            sum(levers(robot, second, other.axis)),
+            BY_CAPSULES[name, first, second],
+        )
+
+
+def assert_apart(distance: Callable[[Array], Array], reach: float, kept: float) -> None:
+    """Distances (k,) [m] at angles (k, 2) [rad] exceed `kept` at every angle; `reach` [m] bounds both slopes' sum."""
     half = np.pi / 24
     grid = np.arange(-np.pi + half, np.pi, 2 * half)
     cells = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     while len(cells):
-        found = distances(robot, first, second, cells, by_meshes=pair in BY_MESHES)
+        found = distance(cells)
         assert found.min() > kept
         cells = cells[found - reach * half < kept]
         half /= 2
         cells = (cells[:, None] + half * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("pair", sorted(BY_SURFACE), ids=str)
+@pytest.mark.parametrize("pair", here(BY_SURFACE), ids=str)
 def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
     """The pan joint turns about the axis of the cylinder: only the lift joint changes the distance."""
     name, foot = pair[0], FOOT[pair[0]]
@@ -149,5 +213,17 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
-    proven = {(first, second) for robot, first, second in (*BY_HULLS, *BY_MESHES, *BY_SURFACE) if robot == name}
+    """By meshes that are not always here for some: `tests.mesh_folders`."""
+    known = (*BY_HULLS, *BY_MESHES, *BY_SURFACE)
+    proven = {(first, second) for robot, first, second in known if robot == TWINS.get(name, name)}
     assert load_robot(name).never_in_collision == proven
+
+
+@pytest.mark.parametrize("name", TWINS)
+def test_a_twin_has_the_same_shape(name: str) -> None:
+    """So what is proven of the one holds for the other."""
+    robot, twin = load_robot(name), load_robot(TWINS[name])
+    own, same = (np.array([[*each.axis.ravel(), each.radius, each.link] for each in r.capsules]) for r in (robot, twin))
+    assert (own == same).all()
+    placements = zip(robot.model.jointPlacements, twin.model.jointPlacements, strict=True)
+    assert all((one.homogeneous == other.homogeneous).all() for one, other in placements)

@@ -1,0 +1,30 @@
+"""Where the meshes of the robots are: in a package that tests install, or in a folder that the environment names.
+
+The package `airo-models` ships those of UR3e and UR5e. No package ships those of UR10e and UR16e: tests of theirs run
+where ROBOT_MESHES names a folder with `ur10e` and `ur16e`, each as in `models.meshes`: the maker's files, as OBJ. Parts
+that a UR16e shares with the UR10e are in both.
+"""
+
+from __future__ import annotations
+
+import os
+from importlib.util import find_spec
+from pathlib import Path
+
+from models.meshes import SHIFTS
+
+# robots whose meshes the package ships
+SHIPPED = ("ur3e", "ur5e")
+
+
+def meshes(robot: str) -> Path:
+    """The folder of a robot's meshes. The package that ships them need not be imported."""
+    if robot not in SHIPPED:
+        return Path(os.environ["ROBOT_MESHES"]) / robot
+    package = find_spec("airo_models")
+    assert package is not None and package.origin is not None, "a development dependency: `make test` installs it"
+    return Path(package.origin).parent / "arms" / robot
+
+
+# robots whose meshes are here
+FOUND = tuple(robot for robot in SHIFTS if robot in SHIPPED or "ROBOT_MESHES" in os.environ)

@@ -1,0 +1,38 @@
+"""The table of robots in docs/robots.md, against the figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from models.registry import load_figures, load_robot, robot_names
+from models.trust import worst_letter
+
+PAGE = Path(__file__).parents[2] / "docs" / "robots.md"
+
+
+def columns(name: str) -> dict[str, Any]:
+    """The figures that each column of the table is about."""
+    figures = load_figures(name)
+    inertials, drives = figures["inertials"], figures["drives"]
+    return {
+        "kinematics": figures["kinematics"],
+        "link masses": inertials["mass"],
+        "link inertias": inertials,
+        "torque limits": figures["limits"]["torque"],
+        "rotor inertias": drives["rotor_inertia"],
+        "friction": next(iter(figures["friction_laws"].values())),
+        "copper loss": drives["copper"],
+        "idle power": figures["electronics"]["idle_power"],
+        "capsules": {link: figures["collision"][link] for link in load_robot(name).link_names},
+    }
+
+
+def test_the_table_has_the_worst_letters_of_every_robot() -> None:
+    rows = [line.strip("| ").split(" | ") for line in PAGE.read_text(encoding="utf-8").splitlines() if "|" in line]
+    head, _, *body = rows
+    assert sorted(row[0].strip("`") for row in body) == sorted(robot_names())
+    for name, payload, *letters in body:
+        figures = columns(name.strip("`"))
+        assert float(payload) == load_robot(name.strip("`")).rated_payload
+        assert dict(zip(head[2:], letters, strict=True)) == {column: worst_letter(of) for column, of in figures.items()}
