@@ -42,7 +42,7 @@ def _load_robot(name: str) -> Robot:
     model = pin.buildModelFromXML(urdf_of(name, figures))
     drives = Drives(**{part: _joints(figures["drives"][part], model.nq) for part in Drives.__dataclass_fields__})
     model.armature = drives.rotor_inertia
-    limits, electronics, motion = figures["limits"], figures["electronics"], figures["default_motion"]
+    limits, electronics = figures["limits"], figures["electronics"]
     capsules = _capsules(figures, model)
     return Robot(
         name=name,
@@ -62,7 +62,7 @@ def _load_robot(name: str) -> Robot:
             **{part: float(electronics[part]["value"]) for part in Electronics.__dataclass_fields__}
         ),
         friction_laws=_friction_laws(figures, model.nq),
-        default_motion=DefaultMotion(float(motion["velocity"]["value"]), float(motion["acceleration"]["value"])),
+        default_motion=_default_motion(figures),
         capsules=capsules,
         never_in_collision=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
         figures=figures,
@@ -102,6 +102,14 @@ def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCa
         return None
     link = figures["collision"]["elbow"]["value"]
     return [capsule for capsule in capsules if capsule.link == link][-1]
+
+
+def _default_motion(figures: dict[str, Any]) -> DefaultMotion | None:
+    """The section `default_motion`; None for a robot without it."""
+    if "default_motion" not in figures:
+        return None
+    motion = figures["default_motion"]
+    return DefaultMotion(float(motion["velocity"]["value"]), float(motion["acceleration"]["value"]))
 
 
 def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:

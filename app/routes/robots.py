@@ -43,7 +43,8 @@ def show_robot(
 @cache
 def _detail(name: str) -> RobotDetail:
     robot = load_robot(name)
-    sections = {section: robot.figures[section] for section in _SECTIONS}
+    # a robot whose maker publishes no default motion has none
+    sections = {section: robot.figures.get(section, {}) for section in _SECTIONS}
     return RobotDetail(**_summary(robot), trust=TRUST, friction=_friction(robot), **sections)
 
 

@@ -80,4 +80,4 @@ class RobotDetail(RobotSummary):
     drives: Parameters = part("Motors, gears and inverters.")
     electronics: Parameters = part("Power that the electronics draw, and what the supply takes back.")
     friction: Friction = part("Joint friction.")
-    default_motion: Parameters = part("Default speed and acceleration of the robot's own controller.")
+    default_motion: Parameters = part("Default speed and acceleration of the robot's own controller; empty if unknown.")

@@ -4,7 +4,8 @@
 - `quintic`: rest-to-rest quintic, all joints synchronised, in our duration
 - `ruckig`: time-optimal under limits of speed, acceleration and jerk (Berscheid, Kröger 2021); without torque limits
 - `ruckig_slowed`: the same motion, its time scaled to our duration
-- `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid
+- `controller_default`: the robot's own controller at its default speed and acceleration, a leading-axis trapezoid;
+  left out for a robot whose maker publishes no default
 
 All go from the start to the nearest goal and wait there until the end of the cycle, if there is one. The acceleration
 of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
@@ -71,16 +72,21 @@ def baselines(
 
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
-    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s]."""
-    limits = problem.arm.active_limits
+    """The motions behind the baselines; all but `ruckig` and `controller_default` take `duration` [s].
+
+    A robot without a default motion has no `controller_default`.
+    """
+    limits, default = problem.arm.active_limits, problem.arm.robot.default_motion
     fastest = time_optimal(limits, q_start, q_goal)
-    return {
+    found: dict[BaselineName, SampledMotion] = {
         "trapezoid": trapezoid(limits, q_start, q_goal, duration),
         "quintic": quintic(q_start, q_goal, duration),
         "ruckig": fastest,
         "ruckig_slowed": fastest.scaled_to(duration),
-        "controller_default": controller_default(limits, problem.arm.robot.default_motion, q_start, q_goal),
     }
+    if default is not None:
+        found["controller_default"] = controller_default(limits, default, q_start, q_goal)
+    return found
 
 
 def nearest(problem: Problem, q_start: Array, q_goals: Array) -> Array:

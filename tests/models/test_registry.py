@@ -52,12 +52,30 @@ def leaves(figures: Any, path: str = "") -> Iterator[tuple[str, dict[str, Any]]]
                 yield from leaves(content, f"{path}{name}.")
 
 
-def configurations(count: int = 200) -> Array:
-    return np.random.default_rng(5).uniform(-2 * np.pi, 2 * np.pi, (count, 6))
+def craig_flange(q: Array, figures: dict[str, Any]) -> Array:
+    """T_base_flange by the Denavit-Hartenberg table as Craig has it, with the flange along the last z axis, (4, 4)."""
+    T = np.eye(4)
+    table = (figures[f"modified_dh_{part}"]["value"] for part in ("d", "a", "alpha"))
+    for theta, d, a, alpha in zip(q, *table, strict=True):
+        c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        T = T @ np.array([[c, -s, 0, a], [s * ca, c * ca, -sa, -sa * d], [s * sa, c * sa, ca, ca * d], [0, 0, 0, 1]])
+    T[:3, 3] += figures["flange_origin"]["value"][2] * T[:3, 2]
+    return T
+
+
+def flange(robot: Robot, q: Array) -> Array:
+    """T_base_flange (4, 4) by Pinocchio."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
+
+
+def configurations(nq: int, count: int = 200) -> Array:
+    return np.random.default_rng(5).uniform(-2 * np.pi, 2 * np.pi, (count, nq))
 
 
 def test_names_load_and_others_do_not() -> None:
-    assert robot_names() == ("ur3e", "ur5e")
+    assert robot_names() == ("iiwa14", "panda", "ur3e", "ur5e")
     assert load_robot("ur5e") is load_robot("ur5e")
     with pytest.raises(LookupError, match="ur5e"):
         load_robot("../ur5e")
@@ -79,11 +97,17 @@ def test_no_figure_without_source_is_trusted(robot_name: str) -> None:
         assert figure["source"].startswith("none") == (figure["trust"] == "E"), name
 
 
-def test_forward_kinematics_is_the_dh_tables(robot: Robot) -> None:
-    data, flange = robot.model.createData(), robot.model.getFrameId("flange")
-    for q in configurations():
-        pin.framesForwardKinematics(robot.model, data, q)
-        assert np.abs(data.oMf[flange].homogeneous - dh_flange(q, robot.figures["kinematics"])).max() < ROUNDING
+# the makers' tables: of Universal Robots and of Franka; none is known of KUKA's
+TABLES = {"dh_a": dh_flange, "modified_dh_a": craig_flange}
+
+
+@pytest.mark.parametrize("name", [each for each in robot_names() if TABLES.keys() & load_figures(each)["kinematics"]])
+def test_forward_kinematics_is_the_dh_tables(name: str) -> None:
+    robot = load_robot(name)
+    kinematics = robot.figures["kinematics"]
+    by_table = next(form for key, form in TABLES.items() if key in kinematics)
+    for q in configurations(robot.nq):
+        assert np.abs(flange(robot, q) - by_table(q, kinematics)).max() < ROUNDING
 
 
 def test_inertias_are_the_figures(robot: Robot) -> None:
@@ -97,7 +121,12 @@ def test_inertias_are_the_figures(robot: Robot) -> None:
         assert body.inertia == pytest.approx(
             R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T, abs=ROUNDING
         )
-    masses = {"ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261, "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365}
+    masses = {
+        "iiwa14": 5.76 + 6.35 + 3 * 3.5 + 1.8 + 1.2,
+        "panda": 2.7907 + 2.542 + 2.2513 + 2.2037 + 2.2855 + 1.353 + 0.35973,
+        "ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261,
+        "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365,
+    }
     assert pin.computeTotalMass(robot.model) == pytest.approx(masses[robot.name])
 
 
@@ -113,7 +142,7 @@ def test_inverse_dynamics_includes_the_rotors(robot: Robot) -> None:
     bare = robot.model.copy()
     bare.armature = np.zeros(robot.nq)
     rng = np.random.default_rng(1)
-    for q in configurations(20):
+    for q in configurations(robot.nq, 20):
         v, a = rng.uniform(-3, 3, (2, robot.nq))
         extra = pin.rnea(robot.model, robot.model.createData(), q, v, a) - pin.rnea(bare, bare.createData(), q, v, a)
         assert extra == pytest.approx(robot.drives.rotor_inertia * a, abs=TORQUE_ROUNDING)
@@ -130,15 +159,15 @@ def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
     inertia = np.array([[0.02, 0.001, -0.002], [0.001, 0.03, 0.003], [-0.002, 0.003, 0.025]])
     loaded = robot.loaded_model(mass, com, inertia, gravity)
     by_hand = robot.model.copy()
-    T_wrist_body = pin.SE3(np.eye(3), com)
-    by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_wrist_body)
+    T_last_body = pin.SE3(robot.T_last_flange) * pin.SE3(np.eye(3), com)
+    by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_last_body)
     rng = np.random.default_rng(2)
     data, plain = loaded.createData(), robot.model.createData()
-    for q in configurations(20):
+    for q in configurations(robot.nq, 20):
         v, a = rng.uniform(-3, 3, (2, robot.nq))
         expected = pin.rnea(by_hand, by_hand.createData(), q, v, a)
         assert pin.rnea(loaded, data, q, v, a) == pytest.approx(expected, abs=TORQUE_ROUNDING)
-        height = (dh_flange(q, robot.figures["kinematics"]) @ np.append(com, 1.0))[2]
+        height = (flange(robot, q) @ np.append(com, 1.0))[2]
         work = pin.computePotentialEnergy(loaded, data, q) - pin.computePotentialEnergy(robot.model, plain, q)
         assert work == pytest.approx(mass * 9.81 * height, abs=TORQUE_ROUNDING)
 
@@ -153,7 +182,7 @@ def test_tilted_gravity_is_the_gradient_of_potential_along_it(robot: Robot) -> N
     gravity = np.array([3.0, -8.0, 4.5])
     tilted = robot.loaded_model(2.0, np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)), gravity)
     data = tilted.createData()
-    for q in configurations(20):
+    for q in configurations(robot.nq, 20):
         pin.centerOfMass(tilted, data, q)
         expected = -pin.computeTotalMass(tilted) * pin.jacobianCenterOfMass(tilted, data, q).T @ gravity
         assert pin.computeGeneralizedGravity(tilted, data, q) == pytest.approx(expected, abs=TORQUE_ROUNDING)
@@ -164,8 +193,10 @@ def test_shared_arrays_are_read_only(robot: Robot) -> None:
         robot.limits.q_max[0] = 7.0
 
 
-def test_the_elbow_is_a_figure(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
+def test_the_elbow_is_a_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The capsule about the third axis, at the far end of the upper arm; a robot without the figure has no elbow."""
+    robot = load_robot(name)
     assert robot.elbow is not None
     assert robot.elbow.link == robot.figures["collision"]["elbow"]["value"] == 2
     placement = robot.model.jointPlacements[3].translation
@@ -193,7 +224,7 @@ def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
     assert model.upperPositionLimit == pytest.approx(robot.limits.q_max, rel=THREE_DIGITS)
     assert model.upperVelocityLimit == pytest.approx(robot.limits.v_max, rel=THREE_DIGITS)
     data, (base, tool) = model.createData(), (model.getFrameId(frame) for frame in ("base", "tool0"))
-    for q in configurations():
+    for q in configurations(robot.nq):
         pin.framesForwardKinematics(model, data, q)
         T = data.oMf[base].actInv(data.oMf[tool]).homogeneous
         assert np.abs(T - dh_flange(q, robot.figures["kinematics"])).max() < NINE_DIGITS
@@ -211,8 +242,9 @@ def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 
 def test_the_sentence_on_energies_is_made_from_the_letters(robot: Robot) -> None:
+    source = "second-hand figures from papers" if robot.name == "iiwa14" else "the maker's own figures"
     assert energy_trust(robot.figures).startswith(
-        "Energies rest on the maker's own figures (link masses, centres of mass, link inertias"
+        f"Energies rest on {source} (link masses, centres of mass, link inertias"
     )
     figures = load_figures("ur5e")
     told = energy_trust(figures)
@@ -242,7 +274,11 @@ def test_the_worst_of_several_letters_counts(section: str, name: str, words: str
 
 
 def test_every_link_has_capsules(robot: Robot) -> None:
-    assert robot.link_names == ("base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
-    assert {capsule.link for capsule in robot.capsules} == set(range(7))
-    assert all(0.02 < capsule.radius < 0.1 and not capsule.axis.flags.writeable for capsule in robot.capsules)
+    assert robot.link_names == ("base", *robot.figures["kinematics"]["link_names"]["value"])
+    assert {capsule.link for capsule in robot.capsules} == set(range(robot.nq + 1))
+    assert all(0.01 < capsule.radius < 0.15 and not capsule.axis.flags.writeable for capsule in robot.capsules)
     assert all(first + 1 < second for first, second in robot.never_in_collision)
+
+
+def test_a_robot_without_a_default_motion_has_none() -> None:
+    assert {name for name in robot_names() if load_robot(name).default_motion is None} == {"iiwa14", "panda"}

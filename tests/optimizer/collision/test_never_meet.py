@@ -149,5 +149,8 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
+    """Or their figure says that they are another's, second-hand."""
     proven = {(first, second) for robot, first, second in (*BY_HULLS, *BY_MESHES, *BY_SURFACE) if robot == name}
-    assert load_robot(name).never_in_collision == proven
+    robot = load_robot(name)
+    figure = robot.figures["collision"]["never_meet"]
+    assert robot.never_in_collision == proven or (figure["trust"] == "C" and "Not proven" in figure["note"])
