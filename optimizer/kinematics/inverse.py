@@ -3,9 +3,10 @@
 A configuration is singular where two branches meet (shoulder or elbow) or where the arm can move while the pose is
 held (wrist). The first are solutions like any other. The second are members of a self-motion, a curve of solutions.
 
-`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. So far there is
-one, the closed form of Universal Robots' arms in `ur_closed_form`. For any other arm it returns None: such an arm takes
-joint positions as targets, not poses.
+`InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot: the closed form
+of Universal Robots' arms in `ur_closed_form`, or that of arms of seven joints with a spherical shoulder, which hold
+every pose on self-motions, in `redundant_arm`. For any other arm it returns None: such an arm takes joint positions as
+targets, not poses.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from models.robot import Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.jacobians import geometric_jacobian
+from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
@@ -30,8 +32,9 @@ from optimizer.problem.branches import Label
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9
-# members of a self-motion that stand for it
-MEMBERS = 8
+# members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
+# least so many
+MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,8 @@ class InverseKinematics(Protocol):
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
         """Every branch that reaches the flange pose (4, 4), and `members` of every self-motion or a few more.
 
-        An empty list if the pose is out of reach.
+        Of more than four self-motions, as a redundant arm has them, `members` times four in all. An empty list if the
+        pose is out of reach.
         """
         ...
 
@@ -91,7 +95,8 @@ class InverseKinematics(Protocol):
         `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity. With `windings` there
         is one solution for each combination of full turns that the position limits allow. Without, there is one per
         branch, the one whose joints are nearest to zero. The solutions of a branch are together, nearest to zero first.
-        Of a self-motion there are `members` solutions or a few more, evenly spread, without full turns.
+        Of a self-motion there are `members` solutions or a few more, evenly spread, without full turns; of more than
+        four self-motions, `members` times four in all. The self-motions of a redundant arm are cut to the limits.
 
         Raises UnreachablePose, which names `target`, if there is no solution; SingularPose if the pose is only reached
         on a self-motion that this inverse kinematics does not know.
@@ -102,7 +107,7 @@ class InverseKinematics(Protocol):
 @cache
 def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """The robot's inverse kinematics, built once; None for an arm that has none here."""
-    form = URClosedForm.of(robot.model)
+    form = URClosedForm.of(robot.model) or RedundantArm.of(robot.model)
     return None if form is None else ClosedFormInverseKinematics(robot, form)
 
 
@@ -134,8 +139,8 @@ class ClosedForm(Protocol):
         """The parts of the label that are singular at q (nq,) [rad]."""
         ...
 
-    def self_motions(self, T: Array) -> Sequence[SelfMotion]:
-        """The self-motions that hold the flange at T (4, 4)."""
+    def self_motions(self, T: Array, limits: Limits | None = None) -> Sequence[SelfMotion]:
+        """The self-motions that hold the flange at T (4, 4); arcs that are outside the limits may be left out."""
         ...
 
     def distance_to_reach(self, T: Array) -> float:
@@ -158,13 +163,19 @@ class ClosedFormInverseKinematics:
 
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
         """Every branch that reaches the flange pose (4, 4), and members of every self-motion: `InverseKinematics`."""
+        return self._branches(T_base_flange, members, None)
+
+    def _branches(self, T_base_flange: Array, members: int, limits: Limits | None) -> list[PrincipalSolution]:
+        """`branches`, less the arcs of self-motions that are outside the limits."""
         T = _orthonormal(T_base_flange)
         isolated, labels = self._form.solve(T)
         found: list[tuple[Array, Label, SelfMotion | None]]
         found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
-        for motion in self._form.self_motions(T):
+        motions = self._form.self_motions(T, limits)
+        each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // max(len(motions), 1)))
+        for motion in motions:
             curve = None if is_point(motion) else motion
-            found += [(q, motion.label, curve) for q in motion.at(spread(motion, members))]
+            found += [(q, motion.label, curve) for q in motion.at(spread(motion, each))]
         if not found:
             return []
         q = np.array([each for each, _, _ in found])
@@ -192,8 +203,8 @@ class ClosedFormInverseKinematics:
         """Every configuration inside the limits that puts the TCP at T_base_tcp (4, 4): see `InverseKinematics`."""
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
-        branches = self.branches(T, members)
-        if not branches:
+        branches = self._branches(T, members, limits)
+        if not branches and not self.branches(T, members):
             raise self._out_of_reach(T, target)
         solutions = []
         for branch in branches:
