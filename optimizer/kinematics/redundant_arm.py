@@ -11,6 +11,7 @@ import pinocchio as pin
 from scipy.optimize import minimize
 
 from models.robot import Array, Limits
+from optimizer.kinematics.free_turn import FreeTurn, crossing, stretched
 from optimizer.kinematics.redundant_curve import RedundantCurve, within
 from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.kinematics.spherical_shoulder import SphericalShoulder
@@ -47,8 +48,9 @@ class RedundantArm:
         """No configuration: all are on self-motions."""
         return np.zeros((0, 7)), []
 
-    def self_motions(self, T: Array, limits: Limits | None = None) -> Sequence[RedundantCurve]:
-        """All curves that hold the flange at T (4, 4), cut to arcs that hold every member within the limits."""
+    def self_motions(self, T: Array, limits: Limits | None = None) -> Sequence[RedundantCurve | FreeTurn]:
+        """All curves that hold the flange at T (4, 4), cut to arcs that hold every member within the limits, then what
+        turns freely on a singularity."""
         pose = RedundantPose(self.form, T)
         curves = [
             RedundantCurve.of(pose, sheet, interval, label_of(sheet))
@@ -56,7 +58,8 @@ class RedundantArm:
             for interval in pose.intervals(elbow)
             for sheet in (np.array([shoulder, elbow, wrist]) for shoulder, wrist in product((1.0, -1.0), repeat=2))
         ]
-        return curves if limits is None else within(curves, limits.q_min, limits.q_max)
+        turns = [*crossing(curves), *stretched(pose, label_of(np.ones(3)))]
+        return [*(curves if limits is None else within(curves, limits.q_min, limits.q_max)), *turns]
 
     def distance_to_reach(self, T: Array) -> float:
         """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution; 0 if it has one."""
@@ -92,8 +95,7 @@ class RedundantArm:
     def _angles(self, q: Array) -> tuple[float, float, float]:
         """χ, θ and ψ [rad] of a configuration (7,)."""
         form, P = self.form, self.form.placements
-        first, third = P[1][2], P[2][:, 2]
-        chi = q[1] + np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0])
+        chi = form.lean(q[1])
         theta = form.q4_at_zero - q[3]
         x, y, z = form.shoulder_about_fifth(np.array([theta]))[0]
         c, s = np.cos(q[4]), np.sin(q[4])

@@ -62,14 +62,13 @@ def boxes_of(pose: RedundantPose, cells: Cells) -> tuple[Array, Array]:
     q5_half = _turned(form.rho * theta_half, np.hypot(S[:, 0], S[:, 1])) + _turned(far, np.hypot(seen[0], seen[1]))
     sides = np.zeros((len(low), 7))
     sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, q5_half, q6_half, half
-    return centre, _with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
+    return centre, with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
 
 
-def _with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
-    """The half sides with those of the first three joints, which the others' bound."""
+def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
+    """The half sides (n, 7) [rad] with those of the first three joints, which those of the others bound."""
     turn = sides[:, 3:].sum(axis=1)
-    first, third = pose.form.placements[1][2], pose.form.placements[2][:, 2]
-    chi = np.abs(centre[:, 1] + np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0]))
+    chi = pose.form.lean(centre[:, 1])
     sides[:, 1] = np.minimum(turn, np.pi)
     sides[:, 0] = sides[:, 2] = _turned(np.sin(np.minimum(turn, np.pi / 2)), np.abs(np.sin(chi))) + ROUNDING
     sides[:, [0, 2]] = np.where(turn[:, None] < np.pi / 2, np.minimum(sides[:, [0, 2]], np.pi), np.pi)

@@ -89,23 +89,28 @@ class RedundantPose:
         theta, psi = self.angles(q7, sheet[:, 1], sheet[:, 2])
         return self.at_angles(q7, theta, psi, sheet[:, 0])
 
-    def at_angles(self, q7: Array, theta: Array, psi: Array, shoulder: Array, q5: Array | None = None) -> Array:
-        """Configurations (n, 7) [rad] with the given angles (n,); the fifth is solved for unless given."""
+    def at_angles(
+        self, q7: Array, theta: Array, psi: Array, shoulder: Array, free: dict[int, Array] | None = None
+    ) -> Array:
+        """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint (0) or the fifth (4)
+        may have any angle (n,): that in `free`."""
         form, P = self.form, self.form.placements[:, :3, :3]
         v, fifth = self.from_wrist(q7), form.fifth_in_6
         q = np.empty((len(q7), 7))
         q[:, 6], q[:, 3] = q7, form.q4_at_zero - theta
         q[:, 5] = psi - np.arctan2(v[:, 1], v[:, 0]) + np.arctan2(fifth[1], fifth[0])
         wrist = P[5] @ _about_z(q[:, 5])
-        if q5 is None:
+        free = {} if free is None else free
+        if 4 in free:
+            q[:, 4] = free[4]
+        else:
             seen, S = np.einsum("nxy,ny->nx", wrist, v), form.shoulder_about_fifth(theta)
-            q5 = np.arctan2(S[:, 1], S[:, 0]) - np.arctan2(seen[:, 1], seen[:, 0])
-        q[:, 4] = q5
+            q[:, 4] = np.arctan2(S[:, 1], S[:, 0]) - np.arctan2(seen[:, 1], seen[:, 0])
         rest = P[3] @ _about_z(q[:, 3]) @ (P[4] @ _about_z(q[:, 4])) @ wrist @ (P[6] @ _about_z(q[:, 6]))
-        q[:, :3] = self._shoulder_angles(self.orientation @ rest.transpose(0, 2, 1), shoulder)
+        q[:, :3] = self._shoulder_angles(self.orientation @ rest.transpose(0, 2, 1), shoulder, free.get(0))
         return np.clip(wrapped(q), -np.pi, np.pi)
 
-    def _shoulder_angles(self, R: Array, side: Array) -> Array:
+    def _shoulder_angles(self, R: Array, side: Array, q1: Array | None) -> Array:
         """The first three angles (n, 3) [rad] that give link 3 the orientation R (n, 3, 3)."""
         P = self.form.placements[:, :3, :3]
         u = P[0].T @ R
@@ -115,7 +120,7 @@ class RedundantPose:
         q[:, 1] = chi - np.arctan2(third[1], third[0]) + np.arctan2(first[1], first[0])
         # the third axis leans towards this direction of the first joint's frame if χ > 0
         lean = P[1] @ [-first[1], first[0], 0.0]
-        q[:, 0] = np.arctan2(side * u[:, 1, 2], side * u[:, 0, 2]) - np.arctan2(lean[1], lean[0])
+        q[:, 0] = np.arctan2(side * u[:, 1, 2], side * u[:, 0, 2]) - np.arctan2(lean[1], lean[0]) if q1 is None else q1
         first_two = _about_z(q[:, 0]) @ P[1] @ _about_z(q[:, 1]) @ P[2]
         turn = first_two.transpose(0, 2, 1) @ u
         q[:, 2] = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])

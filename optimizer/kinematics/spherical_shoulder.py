@@ -32,6 +32,8 @@ from optimizer.kinematics.forward import joint_placements
 
 # greatest distance [m] of axes that meet, and cosine of axes at right angles
 EQUAL = 1e-9
+# distance [m] from the fifth axis at which the shoulder is on it; angles from which it is sought there, and steps
+ALIGNED, ALIGNED_STARTS, ALIGNED_STEPS = 1e-12, 8, 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +133,27 @@ class SphericalShoulder:
         T7[:3, :3] = T[:3, :3] @ R.T
         T7[:3, 3] = T[:3, 3] - T7[:3, :3] @ p
         return T7
+
+    def lean(self, q2: Array) -> Array:
+        """χ (n,) [rad], the angle of the third axis from the first, at the second angle q2 (n,)."""
+        first, third = self.placements[1][2], self.placements[2][:, 2]
+        return np.asarray(q2 + np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0]))
+
+    @cached_property
+    def aligned(self) -> tuple[float, ...]:
+        """The angles θ [rad] at which the fifth axis meets the shoulder, as it does where an arm without offsets is
+        stretched or folded."""
+        found: list[float] = []
+        for theta in np.linspace(-np.pi, np.pi, ALIGNED_STARTS, endpoint=False):
+            for _ in range(ALIGNED_STEPS):
+                across, ahead = self.shoulder_about_fifth(np.array([theta, theta + np.pi / 2]))[:, :2]
+                # a turn by a right angle gives the derivative, but for what does not turn
+                slope = ahead - self.shoulder_about_fifth(np.array([theta - np.pi / 2]))[0, :2]
+                theta -= 2 * float(across @ slope) / max(float(slope @ slope), EQUAL)
+            away = np.abs(np.angle(np.exp(1j * (np.array(found) - theta))))
+            if float(np.hypot(*across)) < ALIGNED and away.min(initial=np.inf) > np.sqrt(ALIGNED):
+                found.append(float(theta))
+        return tuple(found)
 
     def shoulder_about_fifth(self, theta: Array) -> Array:
         """S (n, 3) [m] from W, in the frame of joint 5 at q5 = 0, at θ (n,) [rad]."""
