@@ -133,7 +133,7 @@ class Robot:
 
     `model` holds link inertias and rotor inertia (as armature), but neither payload nor tilted gravity: `loaded_model`
     adds them. `friction_laws` are named; the first one is the default. `figures` is what `GET /robots/{name}` shows:
-    every figure with its unit, source and trust letter.
+    every figure with its unit, source and trust letter. `default_motion` is None where the maker publishes none.
 
     Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of links that cannot
     touch at any joint positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be

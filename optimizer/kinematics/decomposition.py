@@ -18,7 +18,7 @@ import eaik.pybindings.EAIK as eaik
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.exceptions import SingularPose
 from optimizer.kinematics.aligned_wrist import AlignedWrist
 from optimizer.kinematics.angles import wrapped
@@ -114,7 +114,7 @@ class DecomposedArm:
         found = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
         return found.q, found.labels
 
-    def self_motions(self, T: Array) -> list[AlignedWrist]:
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[AlignedWrist]:
         """The self-motions that hold the flange at T (4, 4): one for each position of the arm that aligns the wrist."""
         return self._found(np.ascontiguousarray(T, dtype=float).tobytes()).motions
 

@@ -5,8 +5,9 @@ held (wrist). The first are solutions like any other. The second are members of 
 
 `InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. For six joints
 they are the closed form of Universal Robots' arms in `ur_closed_form`, then that of `decomposition` for arms with three
-axes that are parallel or meet, then Newton's method from many starts (`multi_start`), which may miss branches. For an
-arm with another number of joints it returns None: such an arm takes joint positions as targets, not poses.
+axes that are parallel or meet, then Newton's method from many starts (`multi_start`), which may miss branches. For
+seven joints it is that of arms with a spherical shoulder, which hold every pose on self-motions, in `redundant_arm`.
+For any other arm it returns None: such an arm takes joint positions as targets, not poses.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.decomposition import DecomposedArm
 from optimizer.kinematics.multi_start import MultiStart
+from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
@@ -32,8 +34,9 @@ from optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
 ACCURACY = 1e-9
-# members of a self-motion that stand for it
-MEMBERS = 8
+# members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
+# least so many
+MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +83,9 @@ class InverseKinematics(Protocol):
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
         """Every branch that reaches the flange pose (4, 4), and `members` of every self-motion or a few more.
 
-        An empty list if the pose is out of reach. Raises SingularPose if it is reached on a self-motion that this
-        inverse kinematics does not know.
+        Of more than four self-motions, as a redundant arm has them, `members` times four in all. An empty list if the
+        pose is out of reach. Raises SingularPose if it is reached on a self-motion that this inverse kinematics does
+        not know.
         """
         ...
 
@@ -99,7 +103,8 @@ class InverseKinematics(Protocol):
         `T_flange_tcp` (4, 4) is the pose of the TCP in the flange frame, by default the identity. With `windings` there
         is one solution for each combination of full turns that the position limits allow. Without, there is one per
         branch, the one whose joints are nearest to zero. The solutions of a branch are together, nearest to zero first.
-        Of a self-motion there are `members` solutions or a few more, evenly spread, without full turns.
+        Of a self-motion there are `members` solutions or a few more, evenly spread, without full turns; of more than
+        four self-motions, `members` times four in all. The self-motions of a redundant arm are cut to the limits.
 
         Raises UnreachablePose, which names `target`, if there is no solution; SingularPose if the pose is only reached
         on a self-motion that this inverse kinematics does not know.
@@ -110,7 +115,8 @@ class InverseKinematics(Protocol):
 @lru_cache(MOST_ROBOTS)
 def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """The robot's inverse kinematics, built once; None for an arm that has none here."""
-    form = URClosedForm.of(robot.model) or DecomposedArm.of(robot.model) or MultiStart.of(robot.model)
+    model = robot.model
+    form = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model) or MultiStart.of(model)
     return None if form is None else ClosedFormInverseKinematics(robot, form)
 
 
@@ -150,8 +156,8 @@ class ClosedForm(Protocol):
         """The parts of the label that are singular at q (nq,) [rad]."""
         ...
 
-    def self_motions(self, T: Array) -> Sequence[SelfMotion]:
-        """The self-motions that hold the flange at T (4, 4)."""
+    def self_motions(self, T: Array, limits: Limits | None = None) -> Sequence[SelfMotion]:
+        """The self-motions that hold the flange at T (4, 4); arcs that are outside the limits may be left out."""
         ...
 
     def distance_to_reach(self, T: Array) -> float | None:
@@ -178,13 +184,19 @@ class ClosedFormInverseKinematics:
 
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
         """Every branch that reaches the flange pose (4, 4), and members of every self-motion: `InverseKinematics`."""
+        return self._branches(T_base_flange, members, None)
+
+    def _branches(self, T_base_flange: Array, members: int, limits: Limits | None) -> list[PrincipalSolution]:
+        """`branches`, less the arcs of self-motions that are outside the limits."""
         T = _orthonormal(T_base_flange)
         isolated, labels = self._form.solve(T)
         found: list[tuple[Array, BranchLabel, SelfMotion | None]]
         found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
-        for motion in self._form.self_motions(T):
+        motions = self._form.self_motions(T, limits)
+        each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // max(len(motions), 1)))
+        for motion in motions:
             curve = None if is_point(motion) else motion
-            found += [(q, motion.label, curve) for q in motion.at(spread(motion, members))]
+            found += [(q, motion.label, curve) for q in motion.at(spread(motion, each))]
         if not found:
             return []
         q = np.array([each for each, _, _ in found])
@@ -213,10 +225,11 @@ class ClosedFormInverseKinematics:
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
         try:
-            branches = self.branches(T, members)
+            branches = self._branches(T, members, limits)
+            reachable = bool(branches) or bool(self.branches(T, members))
         except SingularPose as error:
             raise SingularPose(target, error.smallest_singular_value) from None
-        if not branches:
+        if not reachable:
             raise self._out_of_reach(T, target)
         solutions = []
         for branch in branches:

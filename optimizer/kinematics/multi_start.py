@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import SingularPose
 from optimizer.kinematics.angles import wrapped
@@ -69,7 +69,7 @@ class MultiStart:
         q = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
         return q, [numbered(each, q) for each in q]
 
-    def self_motions(self, T: Array) -> list[SelfMotion]:
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[SelfMotion]:
         """None is known."""
         return []
 

@@ -18,7 +18,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import minimize_scalar
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.kinematics.self_motion import StretchedWrist, is_point
 from optimizer.problem.branches import Label
 
@@ -232,10 +232,10 @@ class URClosedForm:
             found.append((q2, q3, s3))
         return found
 
-    def self_motions(self, T: Array) -> list[StretchedWrist]:
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[StretchedWrist]:
         """The self-motions that hold the flange at T (4, 4): one for each shoulder that stretches the wrist, and elbow.
 
-        They are empty if no member is in reach.
+        They are empty if no member is in reach. None is cut to the limits.
         """
         found = []
         R = T[:3, :3]

@@ -29,6 +29,8 @@ NINE_DIGITS, THREE_DIGITS = 1e-8, 1e-3
 TORQUE_ROUNDING = 1e-11
 # kg, of the moving links together, by the maker's list of each arm
 MASSES = {
+    "iiwa14": 5.76 + 6.35 + 3 * 3.5 + 1.8 + 1.2,
+    "panda": 2.7907 + 2.542 + 2.2513 + 2.2037 + 2.2855 + 1.353 + 0.35973,
     "kr10_r1100": 8.416 + 17.8369 + 6.075 + 5.16238 + 1.6128 + 0.734,
     "ur3e": 1.98 + 3.4445 + 1.437 + 0.871 + 0.805 + 0.261,
     "ur5e": 3.761 + 8.058 + 2.846 + 1.37 + 1.3 + 0.365,
@@ -82,12 +84,32 @@ def leaves(figures: Any, path: str = "") -> Iterator[tuple[str, dict[str, Any]]]
                 yield from leaves(content, f"{path}{name}.")
 
 
-def configurations(count: int = 200) -> Array:
-    return np.random.default_rng(5).uniform(-2 * np.pi, 2 * np.pi, (count, 6))
+def craig_flange(q: Array, figures: dict[str, Any]) -> Array:
+    """T_base_flange by the Denavit-Hartenberg table as Craig has it, with the flange along the last z axis, (4, 4)."""
+    T = np.eye(4)
+    table = (figures[f"modified_dh_{part}"]["value"] for part in ("d", "a", "alpha"))
+    for theta, d, a, alpha in zip(q, *table, strict=True):
+        c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+        T = T @ np.array([[c, -s, 0, a], [s * ca, c * ca, -sa, -sa * d], [s * sa, c * sa, ca, ca * d], [0, 0, 0, 1]])
+    T[:3, 3] += figures["flange_origin"]["value"][2] * T[:3, 2]
+    return T
+
+
+def flange(robot: Robot, q: Array) -> Array:
+    """T_base_flange (4, 4) by Pinocchio."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return np.asarray(data.oMf[robot.model.getFrameId("flange")].homogeneous)
+
+
+def configurations(nq: int, count: int = 200) -> Array:
+    return np.random.default_rng(5).uniform(-2 * np.pi, 2 * np.pi, (count, nq))
 
 
 def test_names_load_and_others_do_not() -> None:
-    assert {"kr10_r1100", "ur3e", "ur5e", "ur30"} <= set(robot_names()) and list(robot_names()) == sorted(robot_names())
+    assert {"kr10_r1100", "panda", "ur3e", "ur5e"} <= set(robot_names()) and list(robot_names()) == sorted(
+        robot_names()
+    )
     assert load_robot("ur5e") is load_robot("ur5e")
     with pytest.raises(LookupError, match="ur5e"):
         load_robot("../ur5e")
@@ -109,20 +131,22 @@ def test_no_figure_without_source_is_trusted(robot_name: str) -> None:
         assert figure["source"].startswith("none") == (figure["trust"] == "E"), name
 
 
+# makers' tables: of Universal Robots and of Franka; none is known of KUKA's
+TABLES = {"dh_a": dh_flange, "modified_dh_a": craig_flange}
+
+
 def test_forward_kinematics_is_that_of_the_figures(robot: Robot) -> None:
     """By the origins of the joints, and by the Denavit-Hartenberg table where the maker gives one."""
-    data, flange = robot.model.createData(), robot.model.getFrameId("flange")
     kinematics = robot.figures["kinematics"]
-    ways = [flange_by_origins, *([dh_flange] if "dh_a" in kinematics else [])]
-    for q in configurations():
-        pin.framesForwardKinematics(robot.model, data, q)
+    ways = [flange_by_origins, *(way for key, way in TABLES.items() if key in kinematics)]
+    for q in configurations(robot.nq):
         for way in ways:
-            assert np.abs(data.oMf[flange].homogeneous - way(q, kinematics)).max() < ROUNDING
+            assert np.abs(flange(robot, q) - way(q, kinematics)).max() < ROUNDING
 
 
-@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
-def test_arms_of_universal_robots_have_a_table(name: str) -> None:
-    assert {"dh_a", "dh_d", "dh_alpha"} <= set(load_figures(name)["kinematics"])
+@pytest.mark.parametrize("name", ["ur3e", "ur5e", "panda"])
+def test_arms_with_a_table_of_their_maker(name: str) -> None:
+    assert TABLES.keys() & load_figures(name)["kinematics"].keys()
 
 
 def test_inertias_are_the_figures(robot: Robot) -> None:
@@ -151,7 +175,7 @@ def test_inverse_dynamics_includes_the_rotors(robot: Robot) -> None:
     bare = robot.model.copy()
     bare.armature = np.zeros(robot.nq)
     rng = np.random.default_rng(1)
-    for q in configurations(20):
+    for q in configurations(robot.nq, 20):
         v, a = rng.uniform(-3, 3, (2, robot.nq))
         extra = pin.rnea(robot.model, robot.model.createData(), q, v, a) - pin.rnea(bare, bare.createData(), q, v, a)
         assert extra == pytest.approx(robot.drives.rotor_inertia * a, abs=TORQUE_ROUNDING)
@@ -172,7 +196,7 @@ def test_payload_torque_is_that_of_the_body_added_by_hand(robot: Robot) -> None:
     by_hand.appendBodyToJoint(by_hand.njoints - 1, pin.Inertia(mass, np.zeros(3), inertia), T_last_body)
     rng = np.random.default_rng(2)
     data, plain = loaded.createData(), robot.model.createData()
-    for q in configurations(20):
+    for q in configurations(robot.nq, 20):
         v, a = rng.uniform(-3, 3, (2, robot.nq))
         expected = pin.rnea(by_hand, by_hand.createData(), q, v, a)
         assert pin.rnea(loaded, data, q, v, a) == pytest.approx(expected, abs=TORQUE_ROUNDING)
@@ -191,7 +215,7 @@ def test_tilted_gravity_is_the_gradient_of_potential_along_it(robot: Robot) -> N
     gravity = np.array([3.0, -8.0, 4.5])
     tilted = robot.loaded_model(2.0, np.array([0.0, 0.0, 0.1]), np.zeros((3, 3)), gravity)
     data = tilted.createData()
-    for q in configurations(20):
+    for q in configurations(robot.nq, 20):
         pin.centerOfMass(tilted, data, q)
         expected = -pin.computeTotalMass(tilted) * pin.jacobianCenterOfMass(tilted, data, q).T @ gravity
         assert pin.computeGeneralizedGravity(tilted, data, q) == pytest.approx(expected, abs=TORQUE_ROUNDING)
@@ -202,8 +226,10 @@ def test_shared_arrays_are_read_only(robot: Robot) -> None:
         robot.limits.q_max[0] = 7.0
 
 
-def test_the_elbow_is_a_figure(robot: Robot, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", ["ur3e", "ur5e"])
+def test_the_elbow_is_a_figure(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The capsule about the third axis, at the far end of the upper arm; a robot without the figure has no elbow."""
+    robot = load_robot(name)
     assert robot.elbow is not None
     assert robot.elbow.link == robot.figures["collision"]["elbow"]["value"] == 2
     placement = robot.model.jointPlacements[3].translation
@@ -231,7 +257,7 @@ def test_kinematics_and_limits_are_those_of_a_urdf_of_others(name: str) -> None:
     assert model.upperPositionLimit == pytest.approx(robot.limits.q_max, rel=THREE_DIGITS)
     assert model.upperVelocityLimit == pytest.approx(robot.limits.v_max, rel=THREE_DIGITS)
     data, (base, tool) = model.createData(), (model.getFrameId(frame) for frame in ("base", "tool0"))
-    for q in configurations():
+    for q in configurations(robot.nq):
         pin.framesForwardKinematics(model, data, q)
         T = data.oMf[base].actInv(data.oMf[tool]).homogeneous
         assert np.abs(T - dh_flange(q, robot.figures["kinematics"])).max() < NINE_DIGITS
@@ -250,15 +276,16 @@ def test_a_folder_with_figures_is_a_robot(monkeypatch: pytest.MonkeyPatch, tmp_p
 
 def test_the_sentence_on_energies_says_what_each_robot_rests_on(robot: Robot) -> None:
     told = energy_trust(robot.figures)
-    assert told.startswith("Energies rest on the maker's own figures (link masses, centres of mass")
+    source = "second-hand figures" if robot.name == "iiwa14" else "the maker's own figures"
+    assert told.startswith(f"Energies rest on {source} (link masses, centres of mass")
     # inertias, friction, and rotor inertias: who has them from where
-    assert ("own figures (link masses, centres of mass, link inertias" in told) == (robot.name != "ur30")
+    together = re.search(r"\(link masses, centres of mass, link inertias", told) is not None
+    assert together == (robot.name != "ur30")
     groups = {part: group for group, parts in re.findall(r"([^(),]+) \(([^)]+)\)", told) for part in parts.split(", ")}
-    source = {"ur5e": "measured", "ur3e": "measured", "ur10e": "measured"}
+    source = {"ur5e": "measured", "ur3e": "measured", "ur10e": "measured", "panda": "sister robot"}
     source |= dict.fromkeys(("ur7e", "ur12e", "ur16e"), "sister robot")
-    source |= dict.fromkeys(("kr10_r1100", "ur15", "ur20", "ur30"), "without a source")
-    for part in ("friction", "rotor inertias"):
-        assert source[robot.name] in groups[part]
+    assert source.get(robot.name, "without a source") in groups["rotor inertias"]
+    assert source.get(robot.name.replace("panda", ""), "without a source") in groups["friction"]
 
 
 def test_the_sentence_on_energies_is_made_from_the_letters() -> None:
@@ -296,12 +323,9 @@ def test_every_link_has_capsules(robot: Robot) -> None:
     assert all(first + 1 < second for first, second in robot.never_in_collision)
 
 
-def test_a_robot_may_have_no_default_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert load_robot("kr10_r1100").default_motion is None and load_robot("ur5e").default_motion is not None
-    figures = load_figures("ur5e")
-    del figures["default_motion"]
-    monkeypatch.setattr(registry, "load_figures", lambda _: figures)
-    assert registry._load_robot.__wrapped__("ur5e").default_motion is None
+def test_a_robot_may_have_no_default_motion() -> None:
+    without = {name for name in robot_names() if load_robot(name).default_motion is None}
+    assert without >= {"iiwa14", "kr10_r1100", "panda"} and "ur5e" not in without
 
 
 def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:

@@ -24,7 +24,7 @@ def test_robots(client: TestClient) -> None:
     answer = client.get("/robots")
     robots = RobotList.model_validate_json(answer.content).robots
     assert [robot.name for robot in robots] == list(robot_names())
-    assert all(len(robot.joints) == 6 for robot in robots)
+    assert {robot.name for robot in robots if len(robot.joints) == 7} == {"iiwa14", "panda"}
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
     trust = {robot.name: robot.energy_trust for robot in robots}
     assert "engineering defaults without a source (copper loss" in trust["ur3e"]
@@ -70,6 +70,18 @@ def test_robot_shows_every_figure(client: TestClient) -> None:
     for law in robot.friction.laws:
         assert "asinh" in law.formula
         assert law.coefficients["viscous"].unit == "N·m·s/rad"
+
+
+def test_a_robot_without_a_default_motion_shows_none(client: TestClient) -> None:
+    assert client.get("/robots/panda").json()["default_motion"] is None
+
+
+def test_ik_gives_members_of_every_curve_of_a_redundant_arm(client: TestClient) -> None:
+    pose = {"position": [0.45, 0.1, 0.4], "quaternion": [1.0, 0.0, 0.0, 0.0]}
+    answer = client.post("/ik", json={"robot": "panda", "pose": pose})
+    solutions = IKResponse.model_validate_json(answer.content).solutions
+    assert len(solutions) > 8
+    assert all(each.free == [f"joint{k}" for k in range(1, 8)] and len(each.q) == 7 for each in solutions)
 
 
 def test_ik_gives_every_solution(client: TestClient) -> None:

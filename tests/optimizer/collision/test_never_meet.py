@@ -213,10 +213,12 @@ def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
 
 @pytest.mark.parametrize("name", robot_names())
 def test_all_pairs_that_are_left_out_are_proven(name: str) -> None:
-    """By meshes that are not always here for some: `tests.mesh_folders`."""
+    """By meshes that are not always here for some: `tests.mesh_folders`. Or the figure says that they are others'."""
     known = (*BY_HULLS, *BY_MESHES, *BY_SURFACE)
     proven = {(first, second) for robot, first, second in known if robot == TWINS.get(name, name)}
-    assert load_robot(name).never_in_collision == proven
+    robot = load_robot(name)
+    figure = robot.figures["collision"]["never_meet"]
+    assert robot.never_in_collision == proven or (figure["trust"] == "C" and "Not proven" in figure["note"])
 
 
 @pytest.mark.parametrize("name", TWINS)

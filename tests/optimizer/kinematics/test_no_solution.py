@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import ClosedFormInverseKinematics, required_inverse_kinematics
 from optimizer.kinematics.self_motion import SelfMotion
@@ -124,7 +124,7 @@ class NothingKnown:
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         return ()
 
-    def self_motions(self, T: Array) -> list[SelfMotion]:
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[SelfMotion]:
         return []
 
     def distance_to_reach(self, T: Array) -> float:

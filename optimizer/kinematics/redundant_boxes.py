@@ -1,0 +1,115 @@
+"""Boxes of joint positions that hold every configuration of a sheet of `RedundantPose` over an interval of q7.
+
+All bounds are of one kind: a vector that is moved by at most m from its place at a radius r about an axis has its
+azimuth changed by at most asin(m / r), or by anything once m reaches r. In order:
+
+- |v|² and v_z are waves over q7, with exact ranges. |v|² gives the range of cos θ and so of θ, exactly; θ that of c(θ).
+- ψ: the range of its cosine from those of c, v_z and r. v moves by at most its radius about the last axis times the
+  half interval; this bounds its azimuth about the sixth axis, and so q6.
+- q5: the azimuth of S about the fifth axis seen from both sides; S moves by ρ times the half range of θ on one side,
+  and by that of v and r times the half range of q6 on the other.
+- The orientation of link 3 is turned by at most H, the sum of the half ranges of q4 … q7. So is the third axis, seen
+  from the first, and the first, seen from the third: this bounds q2, q1 and q3. Where the third axis is within H of
+  the first, q1 and q3 may be anything: a box on a singularity holds the configurations that turn freely there, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.kinematics.redundant_pose import RedundantPose
+
+# what cosines [1] and half sides [rad] are widened by, for rounding; the former is a root's
+COSINE, ROUNDING = 1e-14, 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Intervals `low` … `high` (n,) [rad] of q7 on sheets (n, 3)."""
+
+    low: Array
+    high: Array
+    sheet: Array
+
+
+def boxes_of(pose: RedundantPose, cells: Cells) -> tuple[Array, Array]:
+    """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells."""
+    form, (square, height) = pose.form, pose.waves
+    low, high, (side, elbow, wrist) = cells.low, cells.high, cells.sheet.T
+    middle, half = (low + high) / 2, (high - low) / 2
+    distance = _wave_range(square, low, high)
+    cos = [np.clip((form.squares - d) / (2 * form.rho * form.nu), -1.0, 1.0) for d in reversed(distance)]
+    # an angle at most this much beyond its cosine's: arccos is steepest, as a root, at 1
+    theta_low, theta_high = (np.arccos(np.clip(c + s, -1.0, 1.0)) for c, s in ((cos[1], COSINE), (cos[0], -COSINE)))
+    theta, theta_half = elbow * (theta_low + theta_high) / 2, (theta_high - theta_low) / 2
+    v_z = _wave_range(height, low, high)
+    along = _wave_range(np.array(form.along_fifth), theta - theta_half, theta + theta_half)
+    radius = _radii(distance, v_z)
+    psi, psi_half = _wrist_angle(form.fifth_in_6[2], form.inclined, along, v_z, radius)
+    v = pose.from_wrist(middle)
+    moved = 2 * np.hypot(*pose.shoulder[:2]) * np.sin(np.minimum(half, np.pi) / 2)
+    q6_half = psi_half + _turned(moved, np.hypot(v[:, 0], v[:, 1]))
+    centre = pose.at_angles(middle, theta, wrist * psi, side)
+    q6 = centre[:, 5]
+    S = form.shoulder_about_fifth(theta)
+    axis = form.placements[5][:3, :3]
+    seen = np.stack([np.cos(q6) * v[:, 0] - np.sin(q6) * v[:, 1], np.sin(q6) * v[:, 0] + np.cos(q6) * v[:, 1], v[:, 2]])
+    seen = axis[:2] @ seen
+    far = moved + 2 * radius[1] * np.sin(np.minimum(q6_half, np.pi) / 2)
+    q5_half = _turned(form.rho * theta_half, np.hypot(S[:, 0], S[:, 1])) + _turned(far, np.hypot(seen[0], seen[1]))
+    sides = np.zeros((len(low), 7))
+    sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, q5_half, q6_half, half
+    return centre, with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
+
+
+def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
+    """The half sides (n, 7) [rad] with those of the first three joints, which those of the others bound."""
+    turn = sides[:, 3:].sum(axis=1)
+    chi = pose.form.lean(centre[:, 1])
+    sides[:, 1] = np.minimum(turn, np.pi)
+    sides[:, 0] = sides[:, 2] = _turned(np.sin(np.minimum(turn, np.pi / 2)), np.abs(np.sin(chi))) + ROUNDING
+    sides[:, [0, 2]] = np.where(turn[:, None] < np.pi / 2, np.minimum(sides[:, [0, 2]], np.pi), np.pi)
+    return sides
+
+
+def _wave_range(wave: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Least and greatest (n,) of a + b cos x + c sin x over [low, high] (n,); widened for rounding."""
+    a, b, c = wave
+    size, phase = float(np.hypot(b, c)), float(np.arctan2(c, b))
+    start, length = (low - phase) % (2 * np.pi), high - low
+    ends = np.cos(start), np.cos(start + length)
+    most = np.where(start + length >= 2 * np.pi, 1.0, np.maximum(*ends))
+    opposite = (start <= np.pi) & (start + length >= np.pi) | (start + length >= 3 * np.pi)
+    least = np.where(opposite, -1.0, np.minimum(*ends))
+    return a + size * least - COSINE, a + size * most + COSINE
+
+
+def _radii(distance: tuple[Array, Array], v_z: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Range of r = sqrt(|v|² - v_z²) [m]."""
+    largest = np.maximum(np.abs(v_z[0]), np.abs(v_z[1]))
+    smallest = np.where(v_z[0] * v_z[1] <= 0, 0.0, np.minimum(np.abs(v_z[0]), np.abs(v_z[1])))
+    return (
+        np.sqrt(np.maximum(distance[0] - largest**2, 0.0)),
+        np.sqrt(np.maximum(distance[1] - smallest**2, 0.0)),
+    )
+
+
+def _wrist_angle(
+    cosine: float, sine: float, along: tuple[Array, Array], v_z: tuple[Array, Array], radius: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Middle and half range (n,) [rad] of |ψ|, whose cosine is (c - e v_z) / (r sine), e the given cosine."""
+    ends = [cosine * v_z[0], cosine * v_z[1]]
+    least, most = along[0] - np.maximum(*ends), along[1] - np.minimum(*ends)
+    near, far = (np.maximum(each * sine, 1e-300) for each in radius)
+    low = np.where(least < 0, least / near, least / far)
+    high = np.where(most > 0, most / near, most / far)
+    wide, narrow = (np.arccos(np.clip(x, -1.0, 1.0)) for x in (low - COSINE, high + COSINE))
+    return (wide + narrow) / 2, (wide - narrow) / 2
+
+
+def _turned(moved: Array, radius: Array) -> Array:
+    """Half range (n,) [rad] of the azimuth of what is moved by at most `moved` (n,) from `radius` (n,)."""
+    return np.where(moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, 1e-300), 1.0)), np.pi)

@@ -1,0 +1,164 @@
+"""Curves of configurations on which an arm of the form `SphericalShoulder` holds a pose.
+
+A curve is one branch over one interval of the last angle. At an end of the interval two branches meet, and the angles
+change with the root of the distance from it. With q7 = middle - half cos u they change evenly with the parameter u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from models.robot import Array, Mask
+from optimizer.kinematics.angles import nearest_turn, wrapped
+from optimizer.kinematics.redundant_boxes import Cells, boxes_of
+from optimizer.kinematics.redundant_pose import RedundantPose
+from optimizer.problem.branches import Label
+
+# parts that a curve is cut into to find where it is within the limits, then parts of what is not decided, and again
+PARTS = (32, 4, 4)
+# a configuration is sought along the tangent if it is farther than NEAREST from the member with its last angle, and
+# nearer than FAR [rad]; steps, and the difference of parameters for the tangent
+NEAREST, FAR, STEPS, STEP = 1e-9, 1e-2, 3, 1e-6
+# rounding of an angle on a limit [rad]
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RedundantCurve:
+    """`SelfMotion` on one sheet, signs (3,), over one interval [rad] of q7; a `whole` turn has q7 itself as parameter.
+
+    `arcs` are the intervals of the parameter: all of it, or what may be within limits.
+    """
+
+    pose: RedundantPose
+    sheet: Array
+    interval: tuple[float, float]
+    label: Label
+    arcs: list[tuple[float, float]]
+
+    @classmethod
+    def of(cls, pose: RedundantPose, sheet: Array, interval: tuple[float, float], label: Label) -> RedundantCurve:
+        """The whole curve."""
+        full = interval == (-np.pi, np.pi)
+        return cls(pose, sheet, interval, label, [(-np.pi, np.pi) if full else (0.0, np.pi)])
+
+    @property
+    def whole(self) -> bool:
+        """Whether the curve is closed over q7."""
+        return self.interval == (-np.pi, np.pi)
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """Indices of the joints that move: all but the fourth where the last axis meets the wrist."""
+        square = self.pose.waves[0]
+        still = np.hypot(square[1], square[2]) < 1e-12
+        return tuple(j for j in range(7) if j != 3 or not still)
+
+    def last_angle(self, parameter: Array) -> Array:
+        """q7 (n,) [rad] at parameters (n,)."""
+        if self.whole:
+            return np.asarray(parameter, dtype=float)
+        a, b = self.interval
+        return np.asarray((a + b) / 2 - (b - a) / 2 * np.cos(parameter))
+
+    def parameter(self, q: Array) -> float:
+        """The parameter of the member nearest to q (7,), nearly: that with its last angle, then on along the tangent.
+
+        Next to a singularity the other angles change by far more than the last one.
+        """
+        a, b = self.interval
+        u = float(nearest_turn(np.asarray(q[6]), np.asarray((a + b) / 2)))
+        if not self.whole:
+            u = float(np.arccos(np.clip(((a + b) / 2 - u) / max((b - a) / 2, 1e-300), -1.0, 1.0)))
+        u = self.clipped(u)
+        gap = wrapped(q - self.at(np.array([u]))[0])
+        for _ in range(STEPS):
+            if not NEAREST < np.abs(gap).max() < FAR:
+                break
+            tangent = wrapped(np.diff(self.at(np.array([u - STEP, u + STEP])), axis=0)[0]) / (2 * STEP)
+            near = self.clipped(u + float(tangent @ gap / max(float(tangent @ tangent), 1e-300)))
+            fresh = wrapped(q - self.at(np.array([near]))[0])
+            if np.abs(fresh).max() >= np.abs(gap).max():
+                break
+            u, gap = near, fresh
+        return u
+
+    def clipped(self, parameter: float) -> float:
+        """The nearest parameter on an arc."""
+        found = []
+        for lower, upper in self.arcs:
+            near = parameter
+            if self.whole:
+                near = float(nearest_turn(np.asarray(parameter), np.asarray((lower + upper) / 2)))
+            on_arc = float(np.clip(near, lower, upper))
+            found.append((abs(near - on_arc), on_arc))
+        return min(found)[1]
+
+    def at(self, parameter: Array) -> Array:
+        """The configurations (n, 7) [rad] at parameters (n,) on the arcs."""
+        q7 = self.last_angle(parameter)
+        return self.pose.configurations(q7, np.tile(self.sheet, (len(q7), 1)))
+
+    def cells(self, parameter: Array, half: Array) -> Cells:
+        """What is within `half` (n,) of parameters (n,)."""
+        lower, upper = np.asarray(parameter - half), np.asarray(parameter + half)
+        if not self.whole:
+            lower, upper = np.clip(lower, 0.0, np.pi), np.clip(upper, 0.0, np.pi)
+        sheet = np.tile(self.sheet, (len(lower), 1))
+        return Cells(self.last_angle(lower), self.last_angle(upper), sheet)
+
+    def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
+        """See `SelfMotion` and `redundant_boxes`."""
+        return boxes_of(self.pose, self.cells(np.asarray(parameter, dtype=float), np.asarray(half, dtype=float)))
+
+
+def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list[RedundantCurve]:
+    """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every member that is.
+
+    What is left out is proven to be outside by its box. The arcs reach beyond the limits by some thousandths.
+    """
+    if not curves:
+        return []
+    # curve, lower and upper end of parts that may be within the limits, and of those that are
+    arcs = [(k, lower, upper) for k, curve in enumerate(curves) for lower, upper in curve.arcs]
+    part = np.array(arcs)
+    done: list[Array] = []
+    for count in PARTS:
+        step = (part[:, 2] - part[:, 1]) / count
+        lower = (part[:, 1, None] + step[:, None] * np.arange(count)).ravel()
+        upper = np.append(lower[1:], 0.0)
+        upper[count - 1 :: count] = part[:, 2]
+        part = np.column_stack([np.repeat(part[:, 0], count), lower, upper])
+        held, inside = _judged(curves, part, q_min, q_max)
+        done.append(part[inside])
+        part = part[held & ~inside]
+        if not len(part):
+            break
+    rows = np.concatenate([*done, part])
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    found: list[list[tuple[float, float]]] = [[] for _ in curves]
+    for k, low, high in rows.tolist():
+        own = found[int(k)]
+        if own and own[-1][1] == low:
+            own[-1] = (own[-1][0], high)
+        else:
+            own.append((low, high))
+    return [replace(curve, arcs=own) for curve, own in zip(curves, found, strict=True) if own]
+
+
+def _judged(curves: Sequence[RedundantCurve], part: Array, q_min: Array, q_max: Array) -> tuple[Mask, Mask]:
+    """Which parts (n, 3) may have members within the limits, and which have no others."""
+    owner = part[:, 0].astype(int)
+    a, b = np.array([curve.interval for curve in curves])[owner].T
+    whole = np.array([curve.whole for curve in curves])[owner]
+    low, high = (np.where(whole, u, (a + b) / 2 - (b - a) / 2 * np.cos(u)) for u in (part[:, 1], part[:, 2]))
+    centre, half = boxes_of(curves[0].pose, Cells(low, high, np.array([curve.sheet for curve in curves])[owner]))
+    middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
+    away = np.abs(wrapped(centre - middle))
+    held = (away <= width + half).all(axis=1)
+    inside = ((away + half <= width) | (width >= np.pi)).all(axis=1)
+    return np.asarray(held), np.asarray(inside)

@@ -1,0 +1,218 @@
+"""One pose of an arm of the form `SphericalShoulder`: its configurations over the last angle, and where there are any.
+
+A `sheet` is one of the eight branches: the signs (shoulder, elbow, wrist), 1 or -1, of the angle χ between the third
+axis and the first, of θ and of ψ. The module's text of `spherical_shoulder` has the formulas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.spherical_shoulder import SphericalShoulder
+
+# zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART [rad] they are one
+NEAR_CIRCLE, APART = 1e-4, 1e-9
+# coefficients of less than this share of the greatest are rounding
+NEGLIGIBLE = 1e-14
+# a squared sine counts as zero from this below [1]: cosines are clipped to 1
+ROUNDING = 1e-12
+# a squared sine is zero at an edge to this: an angle where it has a double zero is found to some 1e-8 rad
+ZERO = 1e-7
+# a squared distance [m²] that is none
+TINY = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class RedundantPose:
+    """The flange of an arm of this form at T (4, 4)."""
+
+    form: SphericalShoulder
+    T: Array
+
+    @cached_property
+    def orientation(self) -> Array:
+        """Rotation (3, 3) of the last link."""
+        return self.form.last_link(self.T)[:3, :3]
+
+    @cached_property
+    def shoulder(self) -> Array:
+        """S (3,) in the frame of the last link."""
+        return self.form.shoulder_in_7(self.T)
+
+    def from_wrist(self, q7: Array) -> Array:
+        """v (n, 3) [m] at q7 (n,) [rad]."""
+        x, y, z = self.shoulder
+        c, s = np.cos(q7), np.sin(q7)
+        turned = np.stack([c * x - s * y, s * x + c * y, np.full_like(c, z)], axis=-1)
+        P = self.form.placements[6]
+        return np.asarray(turned @ P[:3, :3].T + (P[:3, 3] - [0.0, 0.0, self.form.sixth]))
+
+    @cached_property
+    def waves(self) -> tuple[Array, Array]:
+        """Coefficients (3,) of 1, cos q7 and sin q7 in |v|² [m²] and in v_z [m]."""
+        x, y, z = self.shoulder
+        P = self.form.placements[6]
+        R, p = P[:3, :3], P[:3, 3] - [0.0, 0.0, self.form.sixth]
+        still, cos, sin = p + R[:, 2] * z, R[:, 0] * x + R[:, 1] * y, R[:, 1] * x - R[:, 0] * y
+        # cos and sin are at right angles, and as long as each other
+        square = np.array([still @ still + cos @ cos, 2 * still @ cos, 2 * still @ sin])
+        return square, np.array([still[2], cos[2], sin[2]])
+
+    def cosines(self, q7: Array, elbow: Array) -> tuple[Array, Array, Array]:
+        """cos θ (n,), and of cos ψ the numerator and the denominator [m] (n,), at q7 (n,) and signs of the elbow (n,).
+
+        The first is clipped to [-1, 1].
+        """
+        form, (square, height) = self.form, self.waves
+        c, s = np.cos(q7), np.sin(q7)
+        distance = square[0] + square[1] * c + square[2] * s
+        v_z = height[0] + height[1] * c + height[2] * s
+        cos = np.clip((form.squares - distance) / (2 * form.rho * form.nu), -1.0, 1.0)
+        k0, kc, ks = form.along_fifth
+        along = k0 + kc * cos + ks * elbow * np.sqrt((1 - cos) * (1 + cos))
+        radius = np.sqrt(np.maximum(distance - v_z**2, 0.0))
+        return cos, along - form.fifth_in_6[2] * v_z, form.inclined * radius
+
+    def angles(self, q7: Array, elbow: Array, wrist: Array) -> tuple[Array, Array]:
+        """θ and ψ (n,) [rad] at q7 (n,) on sheets of these signs (n,); cosines beyond 1 count as 1."""
+        cos, along, reach = self.cosines(q7, elbow)
+        theta = elbow * np.arccos(cos)
+        return theta, wrist * np.arctan2(np.sqrt(np.maximum((reach - along) * (reach + along), 0.0)), along)
+
+    def configurations(self, q7: Array, sheet: Array) -> Array:
+        """Configurations (n, 7) [rad] in [-π, π] at q7 (n,) on sheets (n, 3)."""
+        theta, psi = self.angles(q7, sheet[:, 1], sheet[:, 2])
+        return self.at_angles(q7, theta, psi, sheet[:, 0])
+
+    def at_angles(
+        self, q7: Array, theta: Array, psi: Array, shoulder: Array, free: dict[int, Array] | None = None
+    ) -> Array:
+        """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint (0) or the fifth (4)
+        may have any angle (n,): that in `free`."""
+        form, P = self.form, self.form.placements[:, :3, :3]
+        v, fifth = self.from_wrist(q7), form.fifth_in_6
+        q = np.empty((len(q7), 7))
+        q[:, 6], q[:, 3] = q7, form.q4_at_zero - theta
+        q[:, 5] = psi - np.arctan2(v[:, 1], v[:, 0]) + np.arctan2(fifth[1], fifth[0])
+        wrist = P[5] @ _about_z(q[:, 5])
+        free = {} if free is None else free
+        if 4 in free:
+            q[:, 4] = free[4]
+        else:
+            seen, S = np.einsum("nxy,ny->nx", wrist, v), form.shoulder_about_fifth(theta)
+            q[:, 4] = np.arctan2(S[:, 1], S[:, 0]) - np.arctan2(seen[:, 1], seen[:, 0])
+        rest = P[3] @ _about_z(q[:, 3]) @ (P[4] @ _about_z(q[:, 4])) @ wrist @ (P[6] @ _about_z(q[:, 6]))
+        q[:, :3] = self._shoulder_angles(self.orientation @ rest.transpose(0, 2, 1), shoulder, free.get(0))
+        return np.clip(wrapped(q), -np.pi, np.pi)
+
+    def _shoulder_angles(self, R: Array, side: Array, q1: Array | None) -> Array:
+        """The first three angles (n, 3) [rad] that give link 3 the orientation R (n, 3, 3)."""
+        P = self.form.placements[:, :3, :3]
+        u = P[0].T @ R
+        third, first = P[2][:, 2], P[1][2]
+        chi = side * np.arctan2(np.hypot(u[:, 0, 2], u[:, 1, 2]), u[:, 2, 2])
+        q = np.empty((len(R), 3))
+        q[:, 1] = chi - np.arctan2(third[1], third[0]) + np.arctan2(first[1], first[0])
+        # the third axis leans towards this direction of the first joint's frame if χ > 0
+        lean = P[1] @ [-first[1], first[0], 0.0]
+        q[:, 0] = np.arctan2(side * u[:, 1, 2], side * u[:, 0, 2]) - np.arctan2(lean[1], lean[0]) if q1 is None else q1
+        first_two = _about_z(q[:, 0]) @ P[1] @ _about_z(q[:, 1]) @ P[2]
+        turn = first_two.transpose(0, 2, 1) @ u
+        q[:, 2] = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+        return q
+
+    def intervals(self, elbow: float) -> list[tuple[float, float]]:
+        """The intervals [rad] of q7, each within a turn, in which both sheets of this elbow are; (-π, π) if nothing
+        bounds them. An interval may be one angle."""
+        edges = self._edges()
+        if not len(edges):
+            return [(-np.pi, np.pi)] if self._excess(np.array([0.0]), elbow)[0] >= -ROUNDING else []
+        ends = np.append(edges, edges[0] + 2 * np.pi)
+        inside = (self._excess((ends[1:] + ends[:-1]) / 2, elbow) >= -ROUNDING).tolist()
+        at = self._excess(edges, elbow)
+        # an edge of the other elbow's sheets is none here
+        bounds = np.abs(at) < ZERO
+        if all(inside) and not bounds.any():
+            return [(-np.pi, np.pi)]
+        found = [(float(q7), float(q7)) for k, q7 in enumerate(edges) if bounds[k] and not inside[k - 1] | inside[k]]
+        # from an edge on, so that no interval starts before the first one
+        first = int(bounds.argmax())
+        start: float | None = None
+        for k in [*range(first, len(edges)), *range(first)]:
+            if start is not None and (bounds[k] or not inside[k]):
+                found.append((start, float(edges[k] if edges[k] >= start else edges[k] + 2 * np.pi)))
+                start = None
+            if inside[k] and start is None:
+                start = float(edges[k])
+        if start is not None:
+            end = float(edges[first])
+            found.append((start, end if end > start else end + 2 * np.pi))
+        return found
+
+    def _excess(self, q7: Array, elbow: float) -> Array:
+        """The lesser of sin²θ and of sin²ψ r²/|v|² at q7 (n,); negative off the sheets of this elbow."""
+        form, square = self.form, self.waves[0]
+        c, s = np.cos(q7), np.sin(q7)
+        distance = square[0] + square[1] * c + square[2] * s
+        cos = (form.squares - distance) / (2 * form.rho * form.nu)
+        _, along, reach = self.cosines(q7, np.full_like(q7, elbow))
+        return np.asarray(np.minimum(1 - cos**2, (reach**2 - along**2) / np.maximum(distance, TINY)))
+
+    def _edges(self) -> Array:
+        """Angles (k,) [rad] in [-π, π), sorted, at which a sheet of any sign may end."""
+        form, (square, height) = self.form, self.waves
+        scale = 2 * form.rho * form.nu
+        cos = _wave(np.array([(form.squares - square[0]) / scale, -square[1] / scale, -square[2] / scale]))
+        v_z, d2 = _wave(height), _wave(square)
+        k0, kc, ks = form.along_fifth
+        flat = _sum(_wave(np.array([k0, 0, 0])), kc * cos, -form.fifth_in_6[2] * v_z)
+        one = np.array([1.0])
+        sin2 = _sum(one, -np.convolve(cos, cos))
+        P = _sum(form.inclined**2 * _sum(d2, -np.convolve(v_z, v_z)), -np.convolve(flat, flat), -(ks**2) * sin2)
+        if abs(ks) > ROUNDING:
+            P = _sum(np.convolve(P, P), -4 * ks**2 * np.convolve(np.convolve(flat, flat), sin2))
+        found = np.sort(np.concatenate([_angles(P), _angles(sin2)]))
+        if not len(found):
+            return found
+        return np.asarray(found[np.append(True, np.diff(found) > APART)])
+
+
+def _about_z(angle: Array) -> Array:
+    """Rotations (n, 3, 3) about z."""
+    R = np.zeros((len(angle), 3, 3))
+    R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
+    R[:, 1, 0] = np.sin(angle)
+    R[:, 0, 1], R[:, 2, 2] = -R[:, 1, 0], 1.0
+    return R
+
+
+def _wave(coefficients: Array) -> Array:
+    """Of a + b cos q + c sin q, the coefficients (3,) of the powers -1, 0, 1 of exp(iq)."""
+    a, b, c = coefficients
+    return np.array([(b + 1j * c) / 2, a, (b - 1j * c) / 2])
+
+
+def _sum(*polynomials: Array) -> Array:
+    """The sum of polynomials in exp(iq) and exp(-iq), each with its constant in the middle."""
+    size = max(map(len, polynomials))
+    total = np.zeros(size, dtype=complex)
+    for each in polynomials:
+        start = (size - len(each)) // 2
+        total[start : start + len(each)] += each
+    return total
+
+
+def _angles(polynomial: Array) -> Array:
+    """The angles q (k,) [rad] at which a polynomial in exp(iq) and exp(-iq) is zero, or nearly."""
+    least = NEGLIGIBLE * np.abs(polynomial).max()
+    while len(polynomial) > 1 and abs(polynomial[-1]) <= least:
+        polynomial = polynomial[1:-1]
+    if len(polynomial) < 3:
+        return np.zeros(0)
+    roots = np.roots(polynomial[::-1])
+    return np.asarray(np.angle(roots[np.abs(np.abs(roots) - 1) < NEAR_CIRCLE]))

@@ -1,0 +1,178 @@
+"""Closed form of arms of seven joints whose first three axes meet in one point, the shoulder S, at right angles, and
+whose fifth and sixth axes meet in another, the wrist W.
+
+Franka's arms are of this form, KUKA's LBR iiwa and UFACTORY's xArm 7, too. With the last angle given, six joints are
+left, and the pose leaves them eight configurations at most:
+
+- Seen from link 6, S is at v(q7) from W: it turns about the last axis. Its distance from W depends on the fourth angle
+  alone: |v|² = E - 2 ρ ν cos θ with θ = const - q4. The two signs of θ are the two parts of the `elbow`.
+- Along the fifth axis, S is at c(θ) from W. This axis turns about the sixth, which it makes an angle with whose cosine
+  is e: r cos ψ = (c - e v_z) / sqrt(1 - e²), with ψ = q6 + const + the azimuth of v, and r its distance from the sixth
+  axis. The two signs of ψ are the two parts of the `wrist`.
+- The azimuth of S about the fifth axis gives q5; what is left of the orientation gives the first three angles, in two
+  ways: with the second angle on either side of the singularity of the `shoulder`.
+
+So a pose is reached on curves over q7, one for each of the eight branches and for each interval in which the cosines
+are at most 1 (`intervals`). These are exact: no curve is missed. With f(q7) = a + b cos q7 + c sin q7 for |v|² and v_z,
+cos θ is of this kind, and sin²θ and sin²ψ, times r², are trigonometric polynomials but for the sign of sin θ; their
+zeros are those of a polynomial of degree 8. The idea of locking q7 for Franka's arms is that of Y. He and S. Liu,
+"Analytical inverse kinematics for Franka Emika Panda" (2021); here for the whole family, and over all of q7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from models.robot import Array
+from optimizer.kinematics.forward import joint_placements
+
+# greatest distance [m] of axes that meet, and cosine of axes at right angles
+EQUAL = 1e-9
+# distance [m] from the fifth axis at which the shoulder is on it; angles from which it is sought there, and steps
+ALIGNED, ALIGNED_STARTS, ALIGNED_STEPS = 1e-12, 8, 20
+
+
+@dataclass(frozen=True, eq=False)
+class SphericalShoulder:
+    """The lengths and angles of the module's text, of one arm.
+
+    `placements` (7, 4, 4): each joint in the frame of the link before. `shoulder` (3,): S in the base frame. `upper`,
+    `fifth`, `sixth` [m]: where S lies on the third axis, W on the fifth and on the sixth.
+    """
+
+    placements: Array
+    T_last_flange: Array
+    shoulder: Array
+    upper: float
+    fifth: float
+    sixth: float
+
+    @classmethod
+    def of(cls, model: pin.Model) -> SphericalShoulder | None:
+        """The form of a Pinocchio model with a frame `flange`; None if its axes do not meet in this way."""
+        if model.nq != 7 or model.nv != 7:
+            return None
+        P = joint_placements(model)
+        first, second, third = (_meeting(P[k]) for k in (1, 2, 5))
+        square = max(abs(P[1][2, 2]), abs(P[2][2, 2]))
+        if first is None or second is None or third is None or square > EQUAL or abs(first[1] - second[0]) > EQUAL:
+            return None
+        shoulder = P[0] @ [0.0, 0.0, first[0], 1.0]
+        flange = model.frames[model.getFrameId("flange")].placement.homogeneous
+        form = cls(P, np.asarray(flange), shoulder[:3], second[1], third[0], third[1])
+        return form if min(form.rho * form.nu, form.inclined) > EQUAL else None
+
+    @cached_property
+    def _wrist_in_4(self) -> Array:
+        """W in the frame of link 4."""
+        return np.asarray(self.placements[4][:3, 3] + self.fifth * self.placements[4][:3, 2])
+
+    @cached_property
+    def _shoulder_in_3(self) -> Array:
+        """S in the frame of joint 4 at q4 = 0."""
+        P = self.placements[3]
+        return np.asarray(P[:3, :3].T @ ([0.0, 0.0, self.upper] - P[:3, 3]))
+
+    @cached_property
+    def rho(self) -> float:
+        """Distance [m] of S from the fourth axis."""
+        return float(np.hypot(*self._shoulder_in_3[:2]))
+
+    @cached_property
+    def nu(self) -> float:
+        """Distance [m] of W from the fourth axis."""
+        return float(np.hypot(*self._wrist_in_4[:2]))
+
+    @cached_property
+    def q4_at_zero(self) -> float:
+        """The fourth angle [rad] at θ = 0, where S and W are nearest."""
+        m, n = self._shoulder_in_3, self._wrist_in_4
+        return float(np.arctan2(m[1], m[0]) - np.arctan2(n[1], n[0]))
+
+    @cached_property
+    def squares(self) -> float:
+        """E [m²]."""
+        along = self._shoulder_in_3[2] - self._wrist_in_4[2]
+        return float(self.rho**2 + self.nu**2 + along**2)
+
+    @cached_property
+    def along_fifth(self) -> tuple[float, float, float]:
+        """k0, kc, ks [m] of c(θ) = k0 + kc cos θ + ks sin θ."""
+        axis, m, n = self.placements[4][:3, 2], self._shoulder_in_3, self._wrist_in_4
+        turned = np.arctan2(n[1], n[0])
+        cos, sin = np.cos(turned), np.sin(turned)
+        return (
+            float(axis[2] * m[2] - axis @ n),
+            float(self.rho * (axis[0] * cos + axis[1] * sin)),
+            float(self.rho * (axis[1] * cos - axis[0] * sin)),
+        )
+
+    @cached_property
+    def fifth_in_6(self) -> Array:
+        """Direction (3,) of the fifth axis in the frame of link 6 at q6 = 0."""
+        return np.asarray(self.placements[5][2, :3])
+
+    @cached_property
+    def inclined(self) -> float:
+        """Sine of the angle between the fifth and the sixth axis."""
+        return float(np.hypot(*self.fifth_in_6[:2]))
+
+    def shoulder_in_7(self, T: Array) -> Array:
+        """S (3,) in the frame of the last link with the flange at T (4, 4)."""
+        T7 = self.last_link(T)
+        return np.asarray(T7[:3, :3].T @ (self.shoulder - T7[:3, 3]))
+
+    def last_link(self, T: Array) -> Array:
+        """Pose (4, 4) of the last link with the flange at T (4, 4)."""
+        R, p = self.T_last_flange[:3, :3], self.T_last_flange[:3, 3]
+        T7 = np.eye(4)
+        T7[:3, :3] = T[:3, :3] @ R.T
+        T7[:3, 3] = T[:3, 3] - T7[:3, :3] @ p
+        return T7
+
+    def lean(self, q2: Array) -> Array:
+        """χ (n,) [rad], the angle of the third axis from the first, at the second angle q2 (n,)."""
+        first, third = self.placements[1][2], self.placements[2][:, 2]
+        return np.asarray(q2 + np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0]))
+
+    @cached_property
+    def aligned(self) -> tuple[float, ...]:
+        """The angles θ [rad] at which the fifth axis meets the shoulder, as it does where an arm without offsets is
+        stretched or folded."""
+        found: list[float] = []
+        for theta in np.linspace(-np.pi, np.pi, ALIGNED_STARTS, endpoint=False):
+            for _ in range(ALIGNED_STEPS):
+                across, ahead = self.shoulder_about_fifth(np.array([theta, theta + np.pi / 2]))[:, :2]
+                # a turn by a right angle gives the derivative, but for what does not turn
+                slope = ahead - self.shoulder_about_fifth(np.array([theta - np.pi / 2]))[0, :2]
+                theta -= 2 * float(across @ slope) / max(float(slope @ slope), EQUAL)
+            away = np.abs(np.angle(np.exp(1j * (np.array(found) - theta))))
+            if float(np.hypot(*across)) < ALIGNED and away.min(initial=np.inf) > np.sqrt(ALIGNED):
+                found.append(float(theta))
+        return tuple(found)
+
+    def shoulder_about_fifth(self, theta: Array) -> Array:
+        """S (n, 3) [m] from W, in the frame of joint 5 at q5 = 0, at θ (n,) [rad]."""
+        n = self._wrist_in_4
+        turned = theta + np.arctan2(n[1], n[0])
+        height = np.full_like(turned, self._shoulder_in_3[2])
+        S = np.stack([self.rho * np.cos(turned), self.rho * np.sin(turned), height], axis=-1)
+        return np.asarray((S - n) @ self.placements[4][:3, :3])
+
+
+def _meeting(P: Array) -> tuple[float, float] | None:
+    """Where [m] two successive joint axes meet, on the first and on the second of them; None if they do not.
+
+    P (4, 4) is the second joint in the frame of the first one's link.
+    """
+    p, z = P[:3, 3], P[:3, 2]
+    across = float(np.hypot(z[0], z[1]))
+    if across < EQUAL:
+        return None
+    second = -float(p[:2] @ z[:2]) / across**2
+    point = p + second * z
+    return (float(point[2]), second) if float(np.hypot(*point[:2])) < EQUAL else None

@@ -1,0 +1,122 @@
+"""Poses of an arm with seven joints: answers need no more than to any configuration of the pose, the bound no more."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer.collision.model import collision_model
+from optimizer.exceptions import JoulepathError
+from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.kinematics.self_motion import SelfMotion
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.search.candidates import bound, pairs
+from optimizer.search.ends import ends
+from optimizer.search.self_motion_bound import self_motion_bound
+from tests.selection import long_but
+
+# relative: the least step along a curve and the solver's tolerance
+REFINED = 1e-3
+# relative
+ROUNDING = 1e-12
+# s: no search comes near it, however busy the machine
+AMPLE = 300.0
+# m that links keep from each other at the ends of a task
+CLEAR = 0.01
+
+
+@cache
+def tasks(name: str, count: int) -> list[tuple[Array, Array]]:
+    """Start and goal configurations in which no links meet, drawn at random."""
+    robot = load_robot(name)
+    drawn = np.random.default_rng(61).uniform(robot.limits.q_min, robot.limits.q_max, (4 * count + 8, robot.nq))
+    clear = drawn[collision_model(Arm(robot=robot)).signed_distances(drawn)[0].min(axis=1) > CLEAR]
+    return [(clear[2 * k], clear[2 * k + 1]) for k in range(count)]
+
+
+def asked(robot: Robot, start: Any, goal: Any, **given: Any) -> Problem:
+    return Problem(arm=Arm(robot=robot), start=start, goal=goal, deadline=AMPLE, **given)
+
+
+def pose_of(robot: Robot, q: Array) -> Pose:
+    return Pose(tcp_pose(Arm(robot=robot), q))
+
+
+def members(robot: Robot, q: Array, count: int, seed: int) -> list[Array]:
+    """So many configurations of the pose of q, within the limits, drawn evenly from its curves."""
+    inverse, rng = required_inverse_kinematics(robot, "goal"), np.random.default_rng(seed)
+    curves: dict[int, SelfMotion] = {}
+    for each in inverse.solve(pose_of(robot, q).T):
+        if each.self_motion is not None:
+            curves[id(each.self_motion)] = each.self_motion
+    arcs = [(curve, *arc) for curve in curves.values() for arc in curve.arcs]
+    lengths = np.array([upper - lower for _, lower, upper in arcs])
+    found: list[Array] = []
+    while len(found) < count:
+        curve, lower, upper = arcs[rng.choice(len(arcs), p=lengths / lengths.sum())]
+        member = curve.at(rng.uniform(lower, upper, 1))[0]
+        middle = (robot.limits.q_min + robot.limits.q_max) / 2
+        member = member + 2 * np.pi * np.round((middle - member) / (2 * np.pi))
+        if ((member >= robot.limits.q_min) & (member <= robot.limits.q_max)).all():
+            found.append(member)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "count", "fixed"),
+    long_but((("panda", 1, 3),), [("panda", 1, 3), ("panda", 20, 100), ("iiwa14", 20, 100)]),
+)
+def test_a_pose_needs_no_more_than_any_of_its_configurations(name: str, count: int, fixed: int) -> None:
+    robot = load_robot(name)
+    for start, goal in tasks(name, count):
+        answer = optimize(asked(robot, start, pose_of(robot, goal)))
+        assert answer.certificate.valid and answer.status == "feasible"
+        energy = answer.energy.electrical.total
+        assert answer.lower_bound <= energy
+        for member in members(robot, goal, fixed, seed=62):
+            try:
+                other = optimize(asked(robot, start, member)).energy.electrical.total
+            except JoulepathError:
+                continue  # in collision there
+            assert energy <= other * (1 + REFINED)
+            assert answer.lower_bound <= other
+
+
+@pytest.mark.parametrize("name", ["panda", "iiwa14"])
+@pytest.mark.parametrize("at_start", [False, True])
+def test_no_member_has_a_lower_bound_below_the_curves(name: str, at_start: bool) -> None:
+    robot = load_robot(name)
+    for start, goal in tasks(name, 3):
+        one = (pose_of(robot, goal), start) if at_start else (start, pose_of(robot, goal))
+        prepared = PreparedProblem.of(asked(robot, *one))
+        whole = self_motion_bound(prepared, pairs(prepared, ends(prepared, "start")[0], ends(prepared, "goal")[0]))
+        assert 0 < whole < np.inf
+        for member in members(robot, goal, 30, seed=63):
+            alone = PreparedProblem.of(asked(robot, *((member, start) if at_start else (start, member))))
+            candidates = pairs(alone, ends(alone, "start")[0], ends(alone, "goal")[0])
+            try:
+                bound(alone, candidates)
+            except JoulepathError:
+                continue
+            assert min(each.lower_bound for each in candidates) >= whole * (1 - ROUNDING)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["panda", "iiwa14"])
+def test_between_two_poses(name: str) -> None:
+    robot = load_robot(name)
+    for start, goal in tasks(name, 3):
+        answer = optimize(asked(robot, pose_of(robot, start), pose_of(robot, goal)))
+        assert answer.certificate.valid
+        fixed = optimize(asked(robot, start, goal)).energy.electrical.total
+        assert answer.lower_bound <= answer.energy.electrical.total <= fixed * (1 + REFINED)
