@@ -83,6 +83,8 @@ def test_links_keep_apart_where_arms_are_used(name: str) -> None:
     assert model.signed_distances(np.array(EVERYDAY[robot.nq]))[0].min() > 0
 
 
+# 200 requests take some minutes, and more beside other work
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("count", long_but((4,), (4, 200)))
 def test_poses_are_answered_with_a_proof(robot: Robot, count: int) -> None:
     """From a random configuration to the pose of another, neither of which makes links meet."""

@@ -43,7 +43,7 @@ BY_HULLS = {
     ("ur16e", 4, 6): 0.020,
 }
 BY_MESHES = {("ur3e", 3, 5): 0.005, ("ur10e", 3, 5): 0.005, ("ur16e", 3, 5): 0.005}
-BY_SURFACE = {("ur5e", 0, 2): 0.005, ("ur3e", 0, 2): 0.005, ("ur10e", 0, 2): 0.010, ("ur16e", 0, 2): 0.010}
+BY_SURFACE = {("ur5e", 0, 2): 0.005, ("ur3e", 0, 2): 0.005, ("ur10e", 0, 2): 0.005, ("ur16e", 0, 2): 0.005}
 # the same of capsules: pairs that are compared, and the comparison refuses nothing
 BY_CAPSULES = {(name, *pair): 0.005 for name in ("ur15", "ur20", "ur30") for pair in ((0, 2), (4, 6))}
 # arms of the same kinematics and capsules as another

@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from models.registry import load_robot, robot_names
+from models.registry import robot_names
 from models.robot import Robot
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
@@ -30,7 +30,7 @@ from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
 from tests.selection import long_but
 
 SWAP = 60.0  # s; a compilation without optimisation takes one to three
-ALL_COMPILED = 300.0  # s; of every robot, beside other work
+ALL_COMPILED = 400.0  # s; of every robot, beside other work
 
 
 @pytest.fixture(scope="module")
@@ -195,10 +195,8 @@ def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, na
     processes = [subprocess.Popen(command, stdout=subprocess.PIPE, text=True) for _ in range(3)]
     printed = [process.communicate(timeout=ALL_COMPILED)[0].splitlines() for process in processes]
     assert [process.returncode for process in processes] == [0, 0, 0]
-    # arms of the same links share one
-    assert [sorted(set(each)) for each in printed] == [workshop.libraries] * 3
-    chains = {digest(load_robot(name)) for name in names or robot_names()}
-    assert workshop.compilations == len(workshop.libraries) == len(chains)
+    assert [sorted(each) for each in printed] == [workshop.libraries] * 3
+    assert workshop.compilations == len(workshop.libraries) == len(names or robot_names())
     assert workshop.leftovers() == []
     assert kernel_for(workshop.robot).compiled
 
