@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.robot import Array
 from optimizer.kinematics.angles import wrapped
@@ -23,8 +24,9 @@ from optimizer.problem.branches import Label
 # sine of the angle between first and third axis, and error [m] of the distance from shoulder to wrist, below which a
 # pose is on the singularity: every member reaches it to a part of what is promised of a solution
 IN_LINE, STRETCHED = 1e-10, 1e-10
-# points of a curve from which a crossing is sought, steps of the search, and the difference of parameters in it
-POINTS, STEPS, STEP = 32, 12, 1e-6
+# points of a curve from which a crossing is sought, steps of the search, the difference of parameters in it, and how
+# many steps it has before it is given up, if one leaves more than a ratio of the lean
+POINTS, STEPS, STEP, FIRST_STEPS, SLOW = 32, 20, 1e-6, 3, 0.7
 # rounding of a box [rad]
 ROUNDING = 1e-8
 
@@ -92,42 +94,52 @@ def stretched(pose: RedundantPose, label: Label) -> list[FreeTurn]:
 
 
 def crossing(curves: Sequence[RedundantCurve]) -> list[FreeTurn]:
-    """The motions with the third axis in line with the first, where these curves of one pose pass that singularity."""
+    """The motions with the third axis in line with the first, where these whole curves of one pose pass that
+    singularity.
+
+    A pass may be overlooked next to an end of a curve, where the lean hardly changes (1 of 300 poses drawn on the
+    singularity). The boxes of the curves hold its configurations all the same, so that bounds cover them.
+    """
+    # those of the other shoulder pass it at the same points
+    curves = [curve for curve in curves if curve.sheet[0] > 0]
+    if not curves:
+        return []
+    pose = curves[0].pose
+    lower, upper = np.array([curve.arcs[0] for curve in curves]).T
+    u = lower[:, None] + (upper - lower)[:, None] * (np.arange(POINTS) + 0.5) / POINTS
+    q7 = np.array([curve.last_angle(each) for curve, each in zip(curves, u, strict=True)])
+    sheet = np.repeat([curve.sheet for curve in curves], POINTS, axis=0)
+    lean = _lean(pose, pose.configurations(q7.ravel(), sheet)).reshape(u.shape)
+    size, step = np.abs(lean), np.abs(np.diff(lean, axis=1))
+    reach = 2 * np.maximum(np.pad(step, ((0, 0), (0, 1)), "edge"), np.pad(step, ((0, 0), (1, 0)), "edge"))
+    beside = np.pad(size, ((0, 0), (1, 1)), constant_values=np.inf)
     found = []
-    for curve in curves:
-        if curve.sheet[0] < 0:
-            continue  # the same points as those of the other shoulder
-        (lower, upper), *_ = curve.arcs
-        u = lower + (upper - lower) * (np.arange(POINTS) + 0.5) / POINTS
-        lean = _lean(curve, u)
-        size, step = np.abs(lean), np.abs(np.diff(lean))
-        reach = 2 * np.maximum(np.append(step, step[-1]), np.append(step[0], step))
-        beside = np.pad(size, 1, constant_values=np.inf)
-        for k in np.flatnonzero((size <= reach) & (size <= beside[:-2]) & (size <= beside[2:])):
-            at = _zero(curve, float(u[k]))
-            if at is None:
-                continue
-            q7 = curve.last_angle(np.array([at]))
-            theta, psi = curve.pose.angles(q7, curve.sheet[1:2], curve.sheet[2:3])
-            found.append(FreeTurn(curve.pose, (float(q7[0]), float(theta[0]), float(psi[0])), 1.0, 0, curve.label))
+    for row, k in np.argwhere((size <= reach) & (size <= beside[:, :-2]) & (size <= beside[:, 2:])).tolist():
+        curve = curves[row]
+        at = _zero(curve, float(u[row, k]))
+        if at is not None:
+            last = curve.last_angle(np.array([at]))
+            theta, psi = pose.angles(last, curve.sheet[1:2], curve.sheet[2:3])
+            found.append(FreeTurn(pose, (float(last[0]), float(theta[0]), float(psi[0])), 1.0, 0, curve.label))
     return found
 
 
-def _lean(curve: RedundantCurve, u: Array) -> Array:
-    """How the third axis leans (n,) from the first one, its two components as a complex number."""
-    q = curve.at(u)
-    return np.asarray(np.sin(curve.pose.form.lean(q[:, 1])) * np.exp(1j * q[:, 0]))
+def _lean(pose: RedundantPose, q: Array) -> NDArray[np.complex128]:
+    """How the third axis leans (n,) from the first at q (n, 7), its two components as a complex number."""
+    return np.asarray(np.sin(pose.form.lean(q[:, 1])) * np.exp(1j * q[:, 0]))
 
 
 def _zero(curve: RedundantCurve, u: float) -> float | None:
     """The parameter next to u at which the third axis is in line, by Gauss and Newton; None if there is none."""
-    for _ in range(STEPS):
-        before, here, after = _lean(curve, np.array([u - STEP, u, u + STEP]))
+    (lower, upper), best = curve.arcs[0], np.inf
+    for n in range(STEPS):
+        before, here, after = _lean(curve.pose, curve.at(np.array([u - STEP, u, u + STEP])))
         if abs(here) < IN_LINE:
             return u
         slope = (after - before) / (2 * STEP)
-        if abs(slope) == 0:
+        # next to a zero the steps converge quadratically; elsewhere they end where the lean is least
+        if abs(slope) == 0 or (n > FIRST_STEPS and abs(here) > SLOW * best):
             return None
-        lower, upper = curve.arcs[0]
+        best = abs(here)
         u = float(np.clip(u - (np.conj(slope) * here).real / abs(slope) ** 2, lower, upper))
     return None
