@@ -5,8 +5,9 @@ reduces such an arm to subproblems with closed forms. Its arm here is the simple
 itself, or the one that a calibrated arm deviates from. What it returns, its least-squares approaches included where
 they come near the pose, are starts on the exact arm.
 
-They tell all branches of the simplest arm. Of an arm that deviates from it they may miss a branch next to a
-singularity: that arm's solutions are not `complete`.
+They tell all branches but next to a singularity, where EAIK loses rows and an arm that deviates has other branches than
+the simplest one. More starts are tried there. Only of an arm with a spherical wrist on an ortho-parallel base, whose
+singularities are treated by formulas, are the solutions `complete`.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import eaik.pybindings.EAIK as eaik
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Limits
+from models.robot import Array, Limits, Mask
 from optimizer.exceptions import SingularPose
 from optimizer.kinematics.aligned_wrist import AlignedWrist
 from optimizer.kinematics.angles import wrapped
@@ -27,13 +28,13 @@ from optimizer.kinematics.forward import link_frames
 from optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
 from optimizer.kinematics.jacobians import geometric_jacobian
 from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.named_branches import NamedBranches, numbered
+from optimizer.kinematics.named_branches import NamedBranches, in_order, numbered
 from optimizer.kinematics.newton import EXACT, solved
 from optimizer.kinematics.spherical_wrist import ALIGNED, SphericalWrist
 from optimizer.kinematics.ur_closed_form import URClosedForm
 from optimizer.kinematics.valley import along_valleys
 from optimizer.kinematics.wrist_angles import WristAngles
-from optimizer.problem.branches import BranchLabel
+from optimizer.problem.branches import BranchLabel, NumberedBranch
 
 # greatest difference [m, rad] of an arm from the simplest one nearby by which it counts as this one: that of angles
 # written with ten digits
@@ -44,17 +45,18 @@ NEAR_UR = 5e-3
 NEAR, NEAR_DEVIATING = 1e-5, 0.03
 # error [m, rad] of a solution, and that from which on it is improved: both are far below what is promised
 SOLVED, IMPROVED = 1e-11, 2e-12
-# smallest singular value below which more starts are tried: of the arm itself, and of one that deviates, where a branch
-# of the simplest arm need not be near one
-WEAK, WEAK_DEVIATING = 1e-3, 0.1
+# smallest singular value below which more starts are tried: a branch of the simplest arm need not be near one there
+WEAK = 0.1
 # there, the pose is moved by these [m, rad], and solutions along their weakest direction by these [rad]
 SHIFTS, STRIDES = (1e-6, 1e-3), (1e-5, 1e-3, 0.03, 0.2, 0.7, 1.4, 2.1, 2.8, 3.1)
-# smallest singular value of an arm that deviates below which the curve is followed on which the pose nearly holds
+# smallest singular value below which the curve is followed on which the pose nearly holds
 VALLEY = 0.01
 # sine of elbow and wrist, and distance [m] from the shoulder's singularity, beyond which a spherical wrist is regular
 REGULAR = 1e-4
 # step [rad] of the elbow beside its singularity, and the sine below which it is taken
 BESIDE_FOLD = 4e-6
+# sines, and distance [m] from the shoulder's singularity, below which two of them are refused
+TWICE_SINGULAR = 5e-6
 # sine of the wrist angle below which a spherical wrist's angles are computed here: EAIK takes 1e-6 for aligned
 NEARLY_ALIGNED = 1e-4
 
@@ -74,10 +76,9 @@ class DecomposedArm:
     def __init__(self, chain: Chain, axes: JointAxes, names: NamedBranches | None, decomposition: eaik.Robot) -> None:
         self._chain, self._names, self._decomposition = chain, names, decomposition
         self._R_zero = axes.T_zero[:3, :3]
-        self.complete = self._deviation() < ONE_AND_THE_SAME
-        exact_wrist = isinstance(names, SphericalWrist) and self.complete
+        self.complete = isinstance(names, SphericalWrist) and self._deviation() < ONE_AND_THE_SAME
         self._near = NEAR if self.complete else NEAR_DEVIATING
-        self._wrist = WristAngles(chain, names) if exact_wrist and isinstance(names, SphericalWrist) else None
+        self._wrist = WristAngles(chain, names) if isinstance(names, SphericalWrist) and self.complete else None
         # both the isolated configurations and the self-motions of a pose are asked for
         self._found = lru_cache(maxsize=4)(self._solve)
 
@@ -97,10 +98,13 @@ class DecomposedArm:
         return cls(chain, axes, names, decomposition)
 
     def label(self, q: Array) -> BranchLabel:
-        """The branch of a configuration (6,) [rad]."""
+        """The branch of a configuration (6,) [rad]; a number is that of the nearest solution, 1 on a self-motion."""
         if self._names is not None:
             return self._names.label(q)
-        return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
+        try:
+            return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
+        except SingularPose:
+            return NumberedBranch(1)
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """The parts of the label that are singular at a configuration (6,) [rad]."""
@@ -129,7 +133,10 @@ class DecomposedArm:
         rows = self._rows(T)
         motions, q, frames = list[AlignedWrist](), rows, link_frames(self._chain.placements, rows)
         if self._wrist is not None and len(rows):
-            near = self._wrist.sines(frames, T) < NEARLY_ALIGNED
+            sines = self._wrist.sines(frames, T)
+            if self._is_twice_singular(rows, sines):
+                raise SingularPose("goal", 0.0)
+            near = sines < NEARLY_ALIGNED
             if near.any():
                 motions, wrists = self._aligned(rows[near], T)
                 rows = np.vstack([rows[~near], *wrists])
@@ -141,13 +148,22 @@ class DecomposedArm:
             if lies_on_a_curve(self._chain, q[k], T):
                 raise SingularPose("goal", float(smallest[k]))
         if self._names is None:
-            q = q[np.lexsort(q.T[::-1])]
+            q = in_order(q)
             labels: list[BranchLabel] = [numbered(each, q) for each in q]
         else:
             names = [self._names.label(each) for each in q]
             order = sorted(range(len(q)), key=lambda k: (str(names[k]), *q[k].tolist()))
             q, labels = q[order], [names[k] for k in order]
         return _Found(q, labels, motions)
+
+    def _is_twice_singular(self, rows: Array, sines: Array) -> bool:
+        """Whether two singularities meet in one of rows (n, 6), whose wrist angles have the sines (n,).
+
+        There the formulas for each alone lose branches.
+        """
+        assert self._wrist is not None
+        arms = np.array([self._wrist.wrist.measures(q)[:2] for q in rows])
+        return bool((np.column_stack([np.abs(arms), sines]) < TWICE_SINGULAR).sum(axis=1).max() > 1)
 
     def _rows(self, T: Array) -> Array:
         """Configurations (n, 6) [rad] of the simplest arm, least-squares approaches included; none out of reach."""
@@ -182,10 +198,10 @@ class DecomposedArm:
         """The distinct solutions (n, 6) in [-pi, pi] near starts q (m, 6), and their smallest singular values (n,)."""
         q, missed, smallest = self._improved(q, frames, T)
         near = missed < self._near
+        # of an aligned wrist EAIK's rows are far from the pose, but singular
+        more = self._more_starts(q, smallest, near, T)
         q, missed, smallest = q[near], missed[near], smallest[near]
-        weak = WEAK if self.complete else WEAK_DEVIATING
-        if self._wrist is None and (smallest < weak).any():
-            more = self._more_starts(q, smallest, T)
+        if len(more):
             q_more, missed_more, smallest_more = self._improved(more, link_frames(self._chain.placements, more), T)
             q, missed = np.vstack([q, q_more]), np.append(missed, missed_more)
             smallest = np.append(smallest, smallest_more)
@@ -216,12 +232,16 @@ class DecomposedArm:
         """False where the parts of a spherical wrist's label say that q (6,) is not; the singular value tells more."""
         return self._wrist is None or min(map(abs, self._wrist.wrist.measures(q))) < REGULAR
 
-    def _more_starts(self, q: Array, smallest: Array, T: Array) -> Array:
-        """Starts (n, 6) around nearly singular ones of q (m, 6): of poses nearby, and along their weakest direction."""
-        weak = q[smallest < (WEAK if self.complete else WEAK_DEVIATING)]
-        starts = [weak]
-        if not self.complete and (smallest < VALLEY).any():
-            floor = q[smallest < VALLEY]
+    def _more_starts(self, q: Array, smallest: Array, near: Mask, T: Array) -> Array:
+        """Starts (n, 6) around nearly singular ones of q (m, 6): of poses nearby, and along their weakest direction.
+
+        None for a spherical wrist, which needs none.
+        """
+        weak = q[smallest < WEAK]
+        if self._wrist is not None or not len(weak):
+            return np.zeros((0, 6))
+        starts, floor = [weak], q[near & (smallest < VALLEY)]
+        if len(floor):
             starts.append(along_valleys(self._chain, floor[distinct(floor, np.zeros(len(floor)))], T))
         for shift in SHIFTS:
             for axis in range(6):

@@ -19,10 +19,10 @@ from optimizer.exceptions import SingularPose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.isolated import SINGULAR_VALUE, distinct, lies_on_a_curve
-from optimizer.kinematics.named_branches import numbered
+from optimizer.kinematics.named_branches import in_order, numbered
 from optimizer.kinematics.newton import solved
 from optimizer.kinematics.self_motion import SelfMotion
-from optimizer.problem.branches import BranchLabel
+from optimizer.problem.branches import BranchLabel, NumberedBranch
 
 JOINTS, MOST_BRANCHES = 6, 16
 # starts of a round; rounds at most, and rounds without anything new that end the search
@@ -54,8 +54,11 @@ class MultiStart:
         return cls(Chain.of(model)) if model.nq == JOINTS else None
 
     def label(self, q: Array) -> BranchLabel:
-        """The branch of a configuration (6,) [rad], by the nearest solution of its pose."""
-        return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
+        """The branch of a configuration (6,) [rad], by the nearest solution of its pose: the first on a self-motion."""
+        try:
+            return numbered(q, self.solve(self._chain.flange(q[None])[0])[0])
+        except SingularPose:
+            return NumberedBranch(1)
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """None: the branches have no parts."""
@@ -94,7 +97,7 @@ class MultiStart:
         for k in np.flatnonzero(singular < SINGULAR_VALUE):
             if lies_on_a_curve(self._chain, found[k], T):
                 raise SingularPose("goal", float(singular[k]))
-        found = found[np.lexsort(found.T[::-1])]
+        found = in_order(found)
         found.setflags(write=False)
         return found
 

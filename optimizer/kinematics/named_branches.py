@@ -10,6 +10,9 @@ from models.robot import Array
 from optimizer.kinematics.angles import wrapped
 from optimizer.problem.branches import Label, NumberedBranch
 
+# digits of joint positions [rad] that order branches
+DIGITS = 6
+
 
 class NamedBranches(Protocol):
     """The geometry of an arm, as far as it names branches."""
@@ -21,6 +24,16 @@ class NamedBranches(Protocol):
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """The parts of the label that are singular at q (nq,) [rad]."""
         ...
+
+
+def in_order(q: Array) -> Array:
+    """Solutions (n, nq) [rad] in the order of their numbers.
+
+    Joints of branches that share them differ by rounding, and half a turn may have either sign: neither counts.
+    """
+    keys = np.round(q, DIGITS)
+    keys[keys <= np.round(-np.pi, DIGITS)] = np.round(np.pi, DIGITS)
+    return np.asarray(q[np.lexsort(keys.T[::-1])])
 
 
 def numbered(q: Array, solutions: Array) -> NumberedBranch:

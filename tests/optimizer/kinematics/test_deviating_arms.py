@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from models.robot import Robot
+from optimizer.exceptions import SingularPose
 from optimizer.kinematics.decomposition import DecomposedArm
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.ur_closed_form import URClosedForm
@@ -58,3 +59,35 @@ def test_a_calibrated_wrist_has_no_self_motion_but_single_configurations(off: fl
         found = solved(arm, q)
         assert found.away < FOUND and found.error < ACCURACY and not found.twice
         assert all(each.self_motion is None for each in found.branches)
+
+
+def skewed() -> Robot:
+    """A spherical wrist on a base whose second axis is not at right angles to the first: its branches have no names."""
+    model = KUKA.model.copy()
+    M = model.jointPlacements[2]
+    model.jointPlacements[2] = pin.SE3(M.rotation @ pin.rpy.rpyToMatrix(0.3, 0.2, 0.0), M.translation)
+    return replace(KUKA, model=model)
+
+
+def test_branches_without_names_are_numbered() -> None:
+    arm, rng = skewed(), np.random.default_rng(24)
+    inverse = required_inverse_kinematics(arm, "goal")
+    assert not inverse.complete
+    for _ in range(20):
+        q = inside(arm, rng)
+        found = solved(arm, q)
+        assert found.away < FOUND and found.error < ACCURACY and not found.twice
+        assert [str(each.label) for each in found.branches] == [f"branch {k + 1}" for k in range(len(found.branches))]
+        own = min(found.branches, key=lambda each: np.abs(np.sin((each.q - q) / 2)).max())
+        assert inverse.label(q) == own.label
+
+
+def test_a_self_motion_of_an_arm_without_names_is_refused() -> None:
+    arm, rng = skewed(), np.random.default_rng(25)
+    for _ in range(5):
+        q = inside(arm, rng)
+        q[4] = 0.0
+        with pytest.raises(SingularPose):
+            solved(arm, q)
+        # joint positions need no branch
+        assert str(required_inverse_kinematics(arm, "goal").label(q)) == "branch 1"

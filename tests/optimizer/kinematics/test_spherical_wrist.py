@@ -187,3 +187,39 @@ def test_the_distance_out_of_reach_is_that_of_the_wrist() -> None:
             moved = T.copy()
             moved[:3, 3] += share * distance * outward
             assert bool(IK.branches(moved)) == reached
+
+
+@pytest.mark.parametrize("off", [1e-5, 1e-4])
+@pytest.mark.parametrize("other", ["elbow", "shoulder"])
+def test_next_to_two_singularities_only_the_rounding_of_the_pose_is_missed(other: str, off: float) -> None:
+    """With the wrist nearly aligned, too, a configuration is found as well as a pose in double precision tells it."""
+    rng, edge = np.random.default_rng(19), stretched()
+    for _ in range(20):
+        q = inside(KUKA, rng)
+        if other == "shoulder":
+            q = overhead(q)
+            q[1] += off
+        else:
+            q[2] = edge + off
+        q[4] = off
+        J = pin.computeFrameJacobian(KUKA.model, KUKA.model.createData(), q, KUKA.model.getFrameId("flange"))
+        found = solved(KUKA, q)
+        assert found.error < ACCURACY and not found.twice
+        assert found.away < max(FOUND, ROUNDING / np.linalg.svd(J, compute_uv=False)[-1])
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-7, 1e-6])
+@pytest.mark.parametrize("parts", ["elbow wrist", "shoulder wrist", "elbow shoulder"])
+def test_on_two_singularities_at_once_no_branch_is_lost_in_silence(parts: str, off: float) -> None:
+    """The formulas for each alone lose branches there."""
+    rng = np.random.default_rng(8)
+    for _ in range(10):
+        q = inside(KUKA, rng)
+        if "elbow" in parts:
+            q[2] = stretched() + off
+        if "shoulder" in parts:
+            q = overhead(q) + np.array([0, off, 0, 0, 0, 0])
+        if "wrist" in parts:
+            q[4] = off
+        with pytest.raises(SingularPose):
+            IK.branches(flange(KUKA, q))
