@@ -18,7 +18,7 @@ _PLAIN = "Behind the gear."
 def drives(description: Description, joints: tuple[str, ...], tau_max: Array) -> dict[str, Any]:
     """Figures of the drives; `tau_max` (nq,) [N·m]."""
     given, ones = description.drives, np.ones(len(joints))
-    inertia = per_joint("drives.rotor_inertia", given.rotor_inertia, joints)
+    inertia = per_joint("drives.rotor_inertia", given.rotor_inertia, joints, zero=True)
     copper = per_joint("drives.copper", given.copper, joints)
     # the loss in W/(N·m)² is that of the current, over the square of the torque constant
     scale, constant = rules.TORQUE_CONSTANT**2, rules.TORQUE_CONSTANT * ones
@@ -66,8 +66,8 @@ def electronics(description: Description, nq: int) -> dict[str, Any]:
 def friction(description: Description, joints: tuple[str, ...], tau_max: Array) -> dict[str, Any]:
     """The friction law: Coulomb and viscous."""
     given = description.drives
-    coulomb = per_joint("drives.coulomb", given.coulomb, joints)
-    viscous = per_joint("drives.viscous", given.viscous, joints)
+    coulomb = per_joint("drives.coulomb", given.coulomb, joints, zero=True)
+    viscous = per_joint("drives.viscous", given.viscous, joints, zero=True)
     zeros, ones = np.zeros(len(joints)), np.ones(len(joints))
     is_given = coulomb is not None and viscous is not None
     return {

@@ -27,8 +27,11 @@ def either(description: Description, given: Any, default: Any, unit: str, notes:
     return stated(description, given, unit, notes[0])
 
 
-def per_joint(field: str, given: PerJoint | None, joints: tuple[str, ...], least: float = 0.0) -> Array | None:
-    """One value (nq,) for each joint. Raises InvalidArm unless all are above `least`; None stays None."""
+def per_joint(field: str, given: PerJoint | None, joints: tuple[str, ...], zero: bool = False) -> Array | None:
+    """One value (nq,) for each joint; None stays None.
+
+    Raises InvalidArm, which names the joint, unless all are above 0, or 0 where `zero` allows it.
+    """
     if given is None:
         return None
     values = np.array(given, dtype=float)
@@ -38,13 +41,9 @@ def per_joint(field: str, given: PerJoint | None, joints: tuple[str, ...], least
         )
     values = np.broadcast_to(values, len(joints))
     for value, joint in zip(values, joints, strict=True):
-        if not np.isfinite(value) or value < least or (least == 0 and field in POSITIVE and value == 0):
-            raise InvalidArm(field, f"{field} of joint {joint!r} must be a number above {least:g}.")
+        if not (np.isfinite(value) and (value > 0 or (zero and value == 0))):
+            raise InvalidArm(field, f"{field} of joint {joint!r} must be a number above 0{' or 0' if zero else ''}.")
     return np.asarray(values)
-
-
-# limits, of which none may be zero
-POSITIVE = ("acceleration", "velocity", "torque", "jerk")
 
 
 def _figure(value: Any, unit: str, source: str, trust: str, note: str) -> dict[str, Any]:

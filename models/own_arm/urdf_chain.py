@@ -21,6 +21,8 @@ MOST_JOINTS, MOST_ELEMENTS = 16, 5_000
 MOST_NAMES = 12
 # a continuous joint turns without end; it is planned over one turn to either side [rad]
 CONTINUOUS = 2 * math.pi
+# angle [rad] from a quarter turn, and length [m], that are rounding: five digits of an angle, eleven of a length
+ROUNDED_ANGLE, ROUNDED_LENGTH, QUARTER = 5e-6, 1e-9, math.pi / 2
 TURNING, FIXED = ("revolute", "continuous"), "fixed"
 
 
@@ -187,6 +189,7 @@ def _merged(
     ranges, bare = [_range(joint) for joint in moving], copy.deepcopy(root)
     for joint in bare.findall("joint"):
         # Pinocchio gives a continuous joint two coordinates, and reads no limits that lack a part
+        _snap(joint)
         limit = joint.find("limit")
         if joint.get("type") in (FIXED, "floating", "planar"):
             continue
@@ -223,6 +226,31 @@ def _merged(
     )  # fmt: skip
 
 
+def _snap(joint: Element) -> None:
+    """Take the digits that a description lacks: a quarter turn written as 1.5708, a zero as 2e-11.
+
+    An arm whose axes are off by rounding alone would not be of the form that its closed inverse kinematics needs.
+    """
+    origin = joint.find("origin")
+    for part, unit, near in (("rpy", QUARTER, ROUNDED_ANGLE), ("xyz", math.inf, ROUNDED_LENGTH)):
+        if origin is None or part not in origin.attrib:
+            continue
+        values = [_finite(text, f"Joint {_name(joint)!r} has an <origin>") for text in origin.get(part, "").split()]
+        snapped = [0.0 if math.isinf(unit) else round(value / unit) * unit for value in values]
+        kept = (there if abs(there - value) < near else value for value, there in zip(values, snapped, strict=True))
+        origin.set(part, " ".join(map(repr, kept)))
+
+
+def _finite(text: str, what: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        _refuse("urdf", f"{what} that is no finite number.")
+    return value
+
+
 def _range(joint: Element) -> tuple[float, float, float, float]:
     """Least and greatest position, greatest speed and torque; 0 where the URDF has none."""
     limit, name = joint.find("limit"), _name(joint)
@@ -247,13 +275,7 @@ def _axis(joint: Element) -> Array:
 
 def _number(limit: Element | None, part: str, joint: str) -> float:
     text = "0" if limit is None else limit.get(part, "0")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        _refuse("urdf", f"Joint {joint!r} has a limit `{part}` that is no finite number.")
-    return value
+    return _finite(text, f"Joint {joint!r} has a limit `{part}`")
 
 
 def _end(joint: Element, side: str) -> str:

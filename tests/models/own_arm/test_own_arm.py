@@ -19,6 +19,7 @@ from models.registry import load_robot
 from models.robot import Array, Robot
 from models.trust import energy_trust
 from optimizer import Arm, Problem, optimize
+from optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.models.test_capsule_cover import meshes as arm_folder
 
 # lengths of about 1 m and torques of some 100 N·m, both by sums of a hundred products
@@ -128,6 +129,22 @@ def test_the_arms_of_another_package(name: str) -> None:
         T = own.oMf[made.model.getFrameId("flange")].homogeneous
         # its angles have nine digits, over lengths of about 1 m
         assert np.abs(T - data.oMf[ours.model.getFrameId("flange")].homogeneous).max() < 1e-8
+
+
+def test_digits_that_a_description_lacks() -> None:
+    """Quarter turns written with five digits are quarter turns: the arm is of the form that its makers gave it."""
+    text = (arm_folder("ur5e") / "ur5e.urdf").read_text()
+    for written in ("1.5707963267948966", "1.570796327", "1.570796326589793"):
+        text = text.replace(written, "1.5708")
+    text = text.replace("3.141592653589793", "3.14159")
+    made = robot(Description(urdf=text, tip="tool0", base="base_link_inertia", acceleration=10.0, payload=3.0))
+    form = URClosedForm.of(made.model)
+    assert form is not None and (form.d1, form.a2, form.d6) == pytest.approx((0.1625, -0.425, 0.0996), abs=EXACT)
+    off = RICH.replace('rpy="0 1.5707963267948966 0"', 'rpy="0 1.5709 0"')
+    kept, exact = (
+        robot(each).model.jointPlacements[3].rotation for each in (dataclasses.replace(RICH_ARM, urdf=off), RICH_ARM)
+    )
+    assert np.linalg.norm(pin.log3(kept.T @ exact)) == pytest.approx(1.5709 - np.pi / 2, abs=1e-9)
 
 
 def test_what_is_missing_follows_from_the_rules_and_says_so() -> None:
