@@ -67,7 +67,7 @@ def test_unreachable_pose(client: TestClient) -> None:
 
 def test_singular_pose(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     # a UR5e reaches no pose on a self-motion of unknown form only: here its known one is hidden
-    monkeypatch.setattr(URClosedForm, "self_motions", lambda self, T: [])
+    monkeypatch.setattr(URClosedForm, "self_motions", lambda *_: [])
     content = refused(client.post("/ik", json={"pose": UPRIGHT}), problems.SingularPose)
     assert content["target"] == "goal"
     assert content["smallest_singular_value"] == 0
