@@ -29,6 +29,7 @@ NINE_DIGITS, THREE_DIGITS = 1e-8, 1e-3
 TORQUE_ROUNDING = 1e-11
 # kg, of the moving links together, by the maker's list of each arm
 MASSES = {
+    "fr3": 2.9274653454 + 2.9355370338 + 2.2449013699 + 2.6155955791 + 2.3271207594 + 1.8170376524 + 0.6271432862,
     "iiwa14": 5.76 + 6.35 + 3 * 3.5 + 1.8 + 1.2,
     "panda": 2.7907 + 2.542 + 2.2513 + 2.2037 + 2.2855 + 1.353 + 0.35973,
     "kr10_r1100": 8.416 + 17.8369 + 6.075 + 5.16238 + 1.6128 + 0.734,
@@ -282,10 +283,12 @@ def test_the_sentence_on_energies_says_what_each_robot_rests_on(robot: Robot) ->
     together = re.search(r"\(link masses, centres of mass, link inertias", told) is not None
     assert together == (robot.name != "ur30")
     groups = {part: group for group, parts in re.findall(r"([^(),]+) \(([^)]+)\)", told) for part in parts.split(", ")}
-    source = {"ur5e": "measured", "ur3e": "measured", "ur10e": "measured", "panda": "sister robot"}
+    source = dict.fromkeys(("ur3e", "ur5e", "ur10e"), "measured")
+    source |= {"panda": "sister robot", "fr3": "second-hand"}
     source |= dict.fromkeys(("ur7e", "ur12e", "ur16e"), "sister robot")
     assert source.get(robot.name, "without a source") in groups["rotor inertias"]
-    assert source.get(robot.name.replace("panda", ""), "without a source") in groups["friction"]
+    without = robot.name in ("fr3", "panda")
+    assert ("without a source" if without else source.get(robot.name, "without a source")) in groups["friction"]
 
 
 def test_the_sentence_on_energies_is_made_from_the_letters() -> None:
@@ -325,7 +328,7 @@ def test_every_link_has_capsules(robot: Robot) -> None:
 
 def test_a_robot_may_have_no_default_motion() -> None:
     without = {name for name in robot_names() if load_robot(name).default_motion is None}
-    assert without >= {"iiwa14", "kr10_r1100", "panda"} and "ur5e" not in without
+    assert without >= {"fr3", "iiwa14", "kr10_r1100", "panda"} and "ur5e" not in without
 
 
 def test_the_kuka_stands_on_its_base_with_its_first_axis_down() -> None:

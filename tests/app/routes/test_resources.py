@@ -24,7 +24,7 @@ def test_robots(client: TestClient) -> None:
     answer = client.get("/robots")
     robots = RobotList.model_validate_json(answer.content).robots
     assert [robot.name for robot in robots] == list(robot_names())
-    assert {robot.name for robot in robots if len(robot.joints) == 7} == {"iiwa14", "panda"}
+    assert {robot.name for robot in robots if len(robot.joints) == 7} == {"fr3", "iiwa14", "panda"}
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
     trust = {robot.name: robot.energy_trust for robot in robots}
     assert "engineering defaults without a source (copper loss" in trust["ur3e"]
