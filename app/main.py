@@ -98,7 +98,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 def _add_middleware(app: FastAPI, settings: Settings) -> None:
     """Adds the middleware, the innermost first."""
     uploads = {
-        "/evaluate": settings.max_upload_bytes,
+        "/evaluate|/robots|/robots/[^/]+": settings.max_upload_bytes,
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)

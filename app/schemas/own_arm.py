@@ -48,8 +48,8 @@ class OwnElectronics(Request):
 
 
 class OwnCollision(Request):
-    """Shape of the links. A link without `capsules` has one around each sphere, cylinder and box among its
-    `<collision>` shapes in the URDF; a link without such shapes, one from joint to joint. Meshes are not read."""
+    """Shape of the links. A link without `capsules` has one around each of its `<collision>` shapes in the URDF, meshes
+    as far as they are in `meshes`; a link without shapes has one from joint to joint."""
 
     capsules: dict[Named, Annotated[list[Capsule], Field(max_length=50)]] | None = described(
         "Capsules by the name of a link: [x1, y1, z1, x2, y2, z2, radius], both ends of the axis in the link's URDF "
@@ -82,7 +82,7 @@ class OwnArm(Request):
 
     urdf: str = described(
         "Text of the URDF: a tree of links. Of its joints, those from `base` to `tip` move; they must be revolute or "
-        "continuous. All else that hangs on them must be fixed, or `locked`. Meshes are not read.",
+        "continuous. All else that hangs on them must be fixed, or `locked`.",
         None,
         URDF,
         min_length=1,
@@ -119,6 +119,13 @@ class OwnArm(Request):
     drives: OwnDrives = described("Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives())
     electronics: OwnElectronics = described("Electronics.", None, {"idle_power": 40.0}, default=OwnElectronics())
     collision: OwnCollision = described("Shape of the links.", None, {"radius": 0.05}, default=OwnCollision())
+    meshes: str | None = described(
+        "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape is a mesh has a "
+        "capsule from joint to joint.",
+        None,
+        "UEsFBgAAAAAAAAAAAAAAAAAAAAAAAA==",
+        default=None,
+    )
     default_motion: OwnMotion | None = described(
         "Default motion of the controller. Null: unknown.", None, {"velocity": 1.0, "acceleration": 1.4}, default=None
     )

@@ -1,11 +1,12 @@
 """Capsules around the links of a user's own arm, and the pairs of links that are not compared.
 
-A link has the capsules that the user gives; else one around each sphere, cylinder and box among its `<collision>`
-shapes in the URDF; else one from joint to joint. Meshes are not read.
+A link has the capsules that the user gives; else one around each of its `<collision>` shapes in the URDF, meshes
+included as far as their files were given; else one from joint to joint.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -15,8 +16,10 @@ import numpy as np
 import pinocchio as pin
 
 from models.own_arm import rules
+from models.own_arm.capsule_around import capsule_around
 from models.own_arm.description import Description, InvalidArm
 from models.own_arm.figure import assumed, stated
+from models.own_arm.mesh_files import corners
 from models.own_arm.upright import UprightChain
 from models.own_arm.urdf_chain import Chain
 from models.robot import Array
@@ -26,15 +29,20 @@ from models.urdf import BASE
 SAMPLES, ALWAYS = 300, 0.95
 # a link shorter than this, over its capsule's radius, has a ball
 SHORT = 1e-3
+# largest mesh of a link [m]: files in millimetres need a scale
+LARGEST = 5.0
 _FRAME = "x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, radius."
 
 Rows = list[list[float]]
 
 
 def collision_figures(
-    description: Description, chain: Chain, upright: UprightChain, links: list[str]
+    description: Description, chain: Chain, upright: UprightChain, links: list[str], warnings: list[str]
 ) -> dict[str, Any]:
-    """Figures of the section `collision`; `links` are the names of the moving links."""
+    """Figures of the section `collision`; `links` are the names of the moving links. Meshes that are missing are added
+    to `warnings`."""
+    missing = list[str]()
+    meshes = description.meshes or {}
     given = dict(description.collision.capsules or {})
     if unknown := [name for name in given if not any(name in rigid for rigid in chain.rigid)]:
         raise InvalidArm("collision.capsules", f"The arm has no link {unknown[0]!r} from base to tip.")
@@ -42,12 +50,15 @@ def collision_figures(
     capsules = list[Rows]()
     for k, (name, rigid) in enumerate(zip(names, chain.rigid, strict=True)):
         own = [row for link in rigid for row in _given(chain, upright, k, link, given.get(link, ()))]
-        shapes = [row for link in rigid if link not in given for row in _of_shapes(chain, upright, k, link)]
+        of_urdf = [_of_shapes(chain, upright, k, link, meshes, missing) for link in rigid if link not in given]
+        shapes = [row for rows in of_urdf for row in rows]
         rows = own + shapes or _between_joints(upright, k, radius)
         capsules.append(rows)
         of_user = stated(description, rows, "m", _FRAME)
         figures[name] = of_user if own or shapes else assumed(rows, "m", f"From joint to joint. {_FRAME}")
     figures["never_meet"] = _never_meet(description, chain, upright, capsules)
+    if missing:
+        warnings.append(f"Meshes that were not given, or are no STL or OBJ, count as nothing: {', '.join(missing)}.")
     return figures
 
 
@@ -68,13 +79,20 @@ def _given(chain: Chain, upright: UprightChain, k: int, link: str, rows: Any) ->
     return [_placed(_frame(chain, upright, k, link), np.array(row[:6]).reshape(2, 3), row[6]) for row in rows]
 
 
-def _of_shapes(chain: Chain, upright: UprightChain, k: int, link: str) -> Rows:
-    """A capsule around each sphere, cylinder and box of a URDF link."""
+def _of_shapes(
+    chain: Chain, upright: UprightChain, k: int, link: str, meshes: Mapping[str, bytes], missing: list[str]
+) -> Rows:
+    """A capsule around each collision shape of a URDF link. Meshes whose files are not there are added to `missing`."""
     element = next(each for each in chain.root.findall("link") if each.get("name") == link)
     frame, rows = _frame(chain, upright, k, link), list[list[float]]()
     for shape in element.findall("collision"):
         geometry = shape.find("geometry")
         found = None if geometry is None else _around(geometry, link)
+        mesh = None if geometry is None else geometry.find("mesh")
+        if mesh is not None:
+            found = _around_mesh(mesh, meshes, link)
+            if found is None:
+                missing.append(mesh.get("filename", ""))
         if found is not None:
             rows.append(_placed(frame * _origin(shape.find("origin"), link), *found))
     return rows
@@ -93,6 +111,17 @@ def _around(geometry: Element, link: str) -> tuple[Array, float] | None:
         axis = np.eye(3)[longest] * half[longest]
         return np.array([-axis, axis]), float(np.linalg.norm(np.delete(half, longest)))
     return None
+
+
+def _around_mesh(mesh: Element, meshes: Mapping[str, bytes], link: str) -> tuple[Array, float] | None:
+    """Ends (2, 3) of the axis and radius of the capsule around a mesh; None if its file is not there."""
+    points = corners(meshes, mesh.get("filename", ""))
+    if points is None:
+        return None
+    scale = _numbers(mesh, "scale", 3, link) if "scale" in mesh.attrib else np.ones(3)
+    if not np.ptp(points * scale, axis=0).max() < LARGEST:
+        raise InvalidArm("meshes", f"A mesh of link {link!r} is larger than {LARGEST:g} m: has the URDF its `scale`?")
+    return capsule_around(points * scale)
 
 
 def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:

@@ -36,7 +36,7 @@ def own_figures(name: str, description: Description) -> tuple[dict[str, Any], li
         "kinematics": _kinematics(description, chain, upright, links),
         "inertials": _inertials(description, chain, upright, warnings),
         "limits": limits,
-        "collision": collision_figures(description, chain, upright, links),
+        "collision": collision_figures(description, chain, upright, links, warnings),
         "drives": drives(description, chain.joints, tau_max),
         "electronics": electronics(description, chain.nq),
         "friction_table": {"knee": assumed(rules.KNEE, "rad/s", "Coulomb friction's step is spread over this speed.")},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import yaml
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
+from models.own_arm.mesh_files import in_folder, in_zip
 
 # no conversion of types, no unknown fields
 for _part in (Collision, Description, Drives, Electronics, Motion):
@@ -20,10 +22,13 @@ _DESCRIPTION = TypeAdapter(Description)
 def read_description(path: Path) -> Description:
     """The description in a YAML file, whose `urdf` is the path of the URDF, relative to the file.
 
+    `meshes` is the path of a folder or zip with mesh files; without it, they are looked for beside the URDF.
+
     Raises InvalidArm, which names the field; OSError if there is no such file.
     """
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        place = data.pop("meshes", None) if isinstance(data, dict) else None
         # as JSON, whose lists are tuples to the validator
         found = _DESCRIPTION.validate_json(json.dumps(data))
     except (yaml.YAMLError, UnicodeDecodeError, TypeError) as error:
@@ -33,8 +38,18 @@ def read_description(path: Path) -> Description:
     urdf = path.parent / found.urdf
     if not urdf.is_file():
         raise InvalidArm("urdf", f"There is no file {urdf}: give the path of the URDF, relative to {path.name}.")
-    text: dict[str, Any] = {"urdf": urdf.read_text(encoding="utf-8", errors="replace")}
-    return type(found)(**(vars(found) | text))
+    text = urdf.read_text(encoding="utf-8", errors="replace")
+    return replace(found, urdf=text, meshes=_meshes(path.parent, place, urdf.parent, text))
+
+
+def _meshes(folder: Path, place: Any, beside: Path, urdf: str) -> dict[str, bytes]:
+    """The mesh files at a place relative to the folder of the description, or beside the URDF if there is none."""
+    if place is None:
+        return in_folder(beside, urdf)
+    if not isinstance(place, str) or not (folder / place).exists():
+        raise InvalidArm("meshes", "meshes must be the path of a folder or a zip, relative to the description.")
+    at = folder / place
+    return in_folder(at, urdf) if at.is_dir() else in_zip(at.read_bytes())
 
 
 def _first(error: ValidationError) -> InvalidArm:

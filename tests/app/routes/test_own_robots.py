@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import zipfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -112,7 +115,7 @@ def test_a_name_that_nobody_added(mine: TestClient) -> None:
         ({"urdf": "<robot>"}, ["body", "urdf"], "not XML"),
         ({"drives": {"copper": [0.1, 0.1, 0.1]}}, ["body", "drives", "copper"], "a list of 2"),
         ({"payload": "heavy"}, ["body", "payload"], "number"),
-        ({"meshes": []}, ["body"], "Unknown field"),
+        ({"sheets": []}, ["body"], "Unknown field"),
     ],
     ids=lambda value: str(value)[:30],
 )
@@ -124,6 +127,26 @@ def test_what_makes_no_robot(client: TestClient, changes: dict[str, Any], place:
         (error,) = refused(answer, problems.Validation)["errors"]
         assert error["loc"][: len(place)] == place and words in error["msg"]
     refused(client.get("/robots/wrong"), problems.UnknownRobot)
+
+
+def test_meshes_come_as_a_zip_in_base64(client: TestClient) -> None:
+    urdf = ARM["urdf"].replace('<cylinder radius="0.05" length="0.3"/>', '<mesh filename="package://cell/arm.obj"/>')
+    corners = [(x, y, z) for x in (-0.04, 0.04) for y in (-0.04, 0.04) for z in (-0.15, 0.15)]
+    faces = "".join(f"f {a} {a % 8 + 1} {(a + 2) % 8 + 1}\n" for a in range(1, 9))
+    obj = "".join("v {} {} {}\n".format(*corner) for corner in corners) + faces
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w") as archive:
+        archive.writestr("arm.obj", obj)
+    arm = ARM | {"urdf": urdf, "meshes": base64.b64encode(target.getvalue()).decode()}
+    made = client.put("/robots/meshed", json=arm).json()
+    ((*_, radius),) = made["collision"]["upper_arm"]["value"]
+    assert 0.04 * np.sqrt(2) <= radius < 0.08 and not any("Meshes" in warning for warning in made["warnings"])
+    missing = client.put("/robots/meshed", json=ARM | {"urdf": urdf}).json()
+    assert any("package://cell/arm.obj" in warning for warning in missing["warnings"])
+    for meshes in ("?", "UEsF"):
+        (error,) = refused(client.put("/robots/meshed", json=arm | {"meshes": meshes}), problems.Validation)["errors"]
+        assert error["loc"] == ["body", "meshes"]
+    client.delete("/robots/meshed")
 
 
 @pytest.mark.parametrize("name", ["Mine", "../etc", "a b", "x" * 65, "-x"])

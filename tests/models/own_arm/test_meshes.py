@@ -1,0 +1,158 @@
+"""Meshes of a user's own arm: found by their paths, and held by a capsule, every triangle of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import ConvexHull
+
+from models.capsule_cover import not_held
+from models.meshes import link_surfaces
+from models.own_arm.capsule_around import DIGIT, capsule_around
+from models.own_arm.description import Description, InvalidArm
+from models.own_arm.figures import own_figures
+from models.own_arm.mesh_files import corners, in_folder, in_zip
+from models.registry import load_robot
+from models.robot import Array, LinkCapsule
+from tests.models.own_arm.test_own_arm import RICH, RICH_ARM, robot
+from tests.models.test_capsule_cover import meshes as arm_folder
+
+NAMED = RICH.replace('"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"')
+# [mm], as a drawing program writes it
+BLOCK = trimesh.creation.box((180.0, 60.0, 40.0))
+
+
+def stl(mesh: trimesh.Trimesh) -> bytes:
+    return bytes(mesh.export(file_type="stl"))
+
+
+def zipped(files: dict[str, bytes]) -> bytes:
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return target.getvalue()
+
+
+def volume(axis: Array, radius: float) -> float:
+    return float(np.pi * radius**2 * (np.linalg.norm(axis[1] - axis[0]) + 4 / 3 * radius))
+
+
+@pytest.mark.parametrize("link", range(7))
+def test_a_capsule_holds_every_triangle_of_a_link(link: int) -> None:
+    """Of a real arm; and it is not much larger than it has to be: than 2.6 times the hull."""
+    surface = link_surfaces(arm_folder("ur5e"), "ur5e", link)["visual"]
+    points = surface.reshape(-1, 3)
+    axis, radius = capsule_around(points)
+    assert not len(not_held(surface, [LinkCapsule(link, axis, radius)]))
+    assert len(not_held(surface, [LinkCapsule(link, axis, radius - 2e-3)]))
+    assert volume(axis, radius) < 2.6 * ConvexHull(points).volume
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_capsule_is_found_again(seed: int) -> None:
+    """Points on a capsule: none is smaller, and the search comes within 2 % of its volume."""
+    rng = np.random.default_rng(seed)
+    ends, radius = rng.uniform(-0.3, 0.3, (2, 3)), rng.uniform(0.02, 0.1)
+    share = rng.uniform(size=(3000, 1))
+    outward = rng.normal(size=(3000, 3))
+    outward *= radius / np.linalg.norm(outward, axis=1, keepdims=True)
+    # half balls at the ends, rings between
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    ring = outward - (outward @ along)[:, None] * along
+    ring *= radius / np.linalg.norm(ring, axis=1, keepdims=True)
+    points = np.concatenate([ends[0] + outward, ends[1] + outward, ends[0] + share * (ends[1] - ends[0]) + ring])
+    found, reach = capsule_around(points)
+    assert volume(found, reach) < 1.02 * volume(ends, radius) + DIGIT * np.pi * radius
+
+
+@pytest.mark.parametrize(
+    "points", [np.zeros((5, 3)), np.eye(3)[[0, 1, 2, 0]], np.outer(np.arange(6.0), [1, 0, 0]) / 10]
+)
+def test_flat_and_thin_meshes_have_a_capsule(points: Array) -> None:
+    axis, radius = capsule_around(points)
+    share = np.clip((points - axis[0]) @ (axis[1] - axis[0]) / max(np.sum((axis[1] - axis[0]) ** 2), 1e-30), 0, 1)
+    assert np.linalg.norm(points - axis[0] - share[:, None] * (axis[1] - axis[0]), axis=1).max() <= radius + 1e-12
+
+
+def test_a_mesh_of_the_urdf_is_held_where_it_stands(tmp_path: Path) -> None:
+    """Named by a package, in millimetres, in a folder or a zip."""
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "forearm.stl").write_bytes(stl(BLOCK))
+    by_folder = in_folder(tmp_path, NAMED)
+    by_zip = in_zip(zipped({"cell/meshes/forearm.stl": stl(BLOCK), "cell/meshes/other.stl": b"", "a.txt": b"?"}))
+    for files in (by_folder, by_zip):
+        made = robot(dataclasses.replace(RICH_ARM, urdf=NAMED, meshes=files))
+        # the cylinder and the mesh
+        cylinder, block = [each for each in made.capsules if each.link == 2]
+        assert cylinder.radius == pytest.approx(0.04)
+        half = np.array([0.09, 0.03, 0.02])
+        assert np.hypot(*half[1:]) <= block.radius < 1.4 * np.hypot(*half[1:])
+        # the mesh's origin is that of the URDF link `forearm`, by the bracket 0.05 and 0.1 m off the joint
+        assert np.linalg.norm(block.axis.mean(axis=0)) == pytest.approx(np.hypot(0.05, 0.1), abs=5e-3)
+
+
+def test_a_missing_mesh_is_told() -> None:
+    figures, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, urdf=NAMED, meshes={}))
+    assert any("package://cell/meshes/forearm.stl" in warning for warning in warnings)
+    assert len(figures["collision"]["elbow_link"]["value"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ({"forearm.stl": b"solid nothing"}, "must have from 4"),
+        ({"forearm.stl": b"\x00" * 80 + b"\xff\xff\xff\x7f"}, "must have from 4"),
+        ({"forearm.stl": stl(trimesh.creation.box((9e3, 1.0, 1.0)))}, "larger than 5 m"),
+        (
+            {"a/meshes/forearm.stl": stl(BLOCK), "b/meshes/forearm.stl": stl(trimesh.creation.icosphere())},
+            "Several files",
+        ),
+    ],
+)
+def test_a_mesh_that_is_none_is_named(files: dict[str, bytes], words: str) -> None:
+    with pytest.raises(InvalidArm, match=words) as found:
+        own_figures("mine", dataclasses.replace(RICH_ARM, urdf=NAMED, meshes=files))
+    assert found.value.field == "meshes"
+
+
+def test_the_longest_agreement_of_paths_counts() -> None:
+    files = {"left/arm/link.stl": stl(BLOCK), "right/arm/link.stl": stl(trimesh.creation.icosphere())}
+    found = corners(files, "package://cell/right/arm/link.stl")
+    assert found is not None and np.linalg.norm(found, axis=1).max() == pytest.approx(1.0)
+    assert corners(files, "package://cell/right/arm/hand.stl") is None
+    # no step out of the folder
+    assert in_folder(Path("/tmp/nowhere"), '<mesh filename="../../../etc/passwd.stl"/>') == {}
+
+
+def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InvalidArm, match="no zip"):
+        in_zip(b"PK")
+    monkeypatch.setattr("models.own_arm.mesh_files.MOST_BYTES", 10_000)
+    with pytest.raises(InvalidArm, match="unpacks to more"):
+        in_zip(zipped({"a.stl": b"0" * 20_000}))
+    monkeypatch.setattr("models.own_arm.mesh_files.MOST_FILES", 1)
+    with pytest.raises(InvalidArm, match="2 mesh files"):
+        in_zip(zipped({"a.stl": b"0", "b.obj": b"0"}))
+
+
+def test_an_arm_of_others_with_its_meshes(tmp_path: Path) -> None:
+    """The UR5e by its visual meshes: every link is within its capsule, as the bundled robot's are."""
+    text = (arm_folder("ur5e") / "ur5e.urdf").read_text().replace("<collision>", "<!--").replace("</collision>", "-->")
+    text = text.replace("<visual>", "<collision>").replace("</visual>", "</collision>")
+    text = "\n".join(line for line in text.splitlines() if "<!-- " not in line)
+    files = in_folder(arm_folder("ur5e"), text)
+    made = robot(
+        Description(urdf=text, tip="tool0", base="base_link_inertia", acceleration=9.0, payload=5.0, meshes=files)
+    )
+    assert len(files) >= 7 and {each.link for each in made.capsules} == set(range(7))
+    for link in range(1, 7):
+        surface = link_surfaces(arm_folder("ur5e"), "ur5e", link)["visual"]
+        assert not len(not_held(surface, [each for each in made.capsules if each.link == link]))
+    assert load_robot("ur5e").nq == made.nq
