@@ -11,7 +11,7 @@ from app.schemas.common import NO_CONTROLS, PLAIN, Request, described
 from app.schemas.examples.own_arm import URDF
 from app.schemas.lengths import NAME_LENGTH, ROBOT_LENGTH
 
-Positive = Annotated[float, Field(gt=0, le=1e6)]
+Positive = Annotated[float, Field(ge=1e-6, le=1e6)]
 NotNegative = Annotated[float, Field(ge=0, le=1e6)]
 PositivePerJoint = Positive | Annotated[list[Positive], Field(min_length=1, max_length=16)]
 PerJoint = NotNegative | Annotated[list[NotNegative], Field(min_length=1, max_length=16)]

@@ -9,6 +9,9 @@ import numpy as np
 from models.own_arm.description import Description, InvalidArm, PerJoint
 from models.robot import Array
 
+# no limit, inertia or friction of an arm is beyond these, in SI units
+LEAST, MOST = 1e-6, 1e6
+
 
 def stated(description: Description, value: Any, unit: str, note: str) -> dict[str, Any]:
     """A figure of the URDF, or of the description, whose source and letter the user states."""
@@ -30,7 +33,7 @@ def either(description: Description, given: Any, default: Any, unit: str, notes:
 def per_joint(field: str, given: PerJoint | None, joints: tuple[str, ...], zero: bool = False) -> Array | None:
     """One value (nq,) for each joint; None stays None.
 
-    Raises InvalidArm, which names the joint, unless all are above 0, or 0 where `zero` allows it.
+    Raises InvalidArm, which names the joint, unless all are between LEAST and MOST, or 0 where `zero` allows it.
     """
     if given is None:
         return None
@@ -41,8 +44,9 @@ def per_joint(field: str, given: PerJoint | None, joints: tuple[str, ...], zero:
         )
     values = np.broadcast_to(values, len(joints))
     for value, joint in zip(values, joints, strict=True):
-        if not (np.isfinite(value) and (value > 0 or (zero and value == 0))):
-            raise InvalidArm(field, f"{field} of joint {joint!r} must be a number above 0{' or 0' if zero else ''}.")
+        if not (LEAST <= value <= MOST or (zero and value == 0)):
+            least = "0, or from " if zero else "from "
+            raise InvalidArm(field, f"{field} of joint {joint!r} must be {least}{LEAST:g} to {MOST:g}.")
     return np.asarray(values)
 
 

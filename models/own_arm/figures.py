@@ -18,6 +18,8 @@ from models.own_arm.upright import UprightChain
 from models.own_arm.urdf_chain import Chain, chain_of
 from models.urdf import BASE, FLANGE
 
+# kg and kg·m², m, rad: beyond these, a description is in other units
+HEAVIEST, LONGEST, FARTHEST_TURN = 1e4, 50.0, 100.0
 _PLACEMENT = "x, y, z, roll, pitch, yaw"
 
 
@@ -104,8 +106,11 @@ def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]
     """Whether a body can be real; a warning where it hardly is. `length` [m] to the next joint."""
     if not body.mass > 0:
         raise InvalidArm("urdf", f"Link {link!r}, with what is fixed to it, has no mass: give it an <inertial>.")
-    if not np.isfinite([body.mass, *body.lever, *body.inertia.ravel()]).all():
-        raise InvalidArm("urdf", f"Link {link!r} has an inertia that is not finite.")
+    if not (np.abs([body.mass, *body.lever, *body.inertia.ravel()]) <= HEAVIEST).all() or not length <= LONGEST:
+        raise InvalidArm(
+            "urdf",
+            f"Link {link!r} must be lighter than {HEAVIEST:g} kg and shorter than {LONGEST:g} m: are its units SI?",
+        )
     moments = np.linalg.eigvalsh(body.inertia)
     if moments[0] < -rules.ROUNDED * abs(moments[2]):
         raise InvalidArm("urdf", f"Link {link!r} has an inertia with a negative principal moment of {moments[0]:.3g}.")
@@ -142,9 +147,11 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
                 raise InvalidArm(
                     field, f"Joint {joint!r} has no limit `{part}` above 0 in the URDF: correct it, or give `{field}`."
                 )
-        found[field] = of_urdf if values is None else values
-    if not (np.isfinite(description.payload) and description.payload >= 0):
-        raise InvalidArm("payload", "payload must be a mass in kg, 0 or more.")
+        found[field] = per_joint(field, tuple(of_urdf), chain.joints) if values is None else values
+    if not 0 <= description.payload <= HEAVIEST:
+        raise InvalidArm("payload", f"payload must be a mass from 0 to {HEAVIEST:g} kg.")
+    if max(np.abs([chain.q_min, chain.q_max]).ravel()) > FARTHEST_TURN:
+        raise InvalidArm("urdf", f"A joint's limits must be within {FARTHEST_TURN:g} rad.")
     return {
         "position_min": stated(description, chain.q_min, "rad", "A joint without end has one turn to either side."),
         "position_max": stated(description, chain.q_max, "rad", "A joint without end has one turn to either side."),
