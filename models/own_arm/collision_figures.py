@@ -29,8 +29,8 @@ from models.urdf import BASE
 SAMPLES, ALWAYS = 300, 0.95
 # a link shorter than this, over its capsule's radius, has a ball
 SHORT = 1e-3
-# largest mesh of a link [m]: files in millimetres need a scale
-LARGEST = 5.0
+# largest mesh of a link, and farthest place of a shape from its joint [m]: files in millimetres need a scale
+LARGEST, FARTHEST = 5.0, 50.0
 _FRAME = "x1, y1, z1, x2, y2, z2 of the axis' ends in the link frame, radius."
 
 Rows = list[list[float]]
@@ -53,6 +53,7 @@ def collision_figures(
         of_urdf = [_of_shapes(chain, upright, k, link, meshes, missing) for link in rigid if link not in given]
         shapes = [row for rows in of_urdf for row in rows]
         rows = own + shapes or _between_joints(upright, k, radius)
+        _check_finite(name, rows)
         capsules.append(rows)
         of_user = stated(description, rows, "m", _FRAME)
         figures[name] = of_user if own or shapes else assumed(rows, "m", f"From joint to joint. {_FRAME}")
@@ -164,6 +165,12 @@ def _often(chain: Chain, upright: UprightChain, capsules: list[Rows]) -> list[li
                 coal.collide(a, T_a, b, T_b, request, coal.CollisionResult()) for a, T_a in first for b, T_b in second
             )
     return [list(pair) for pair, count in zip(pairs, meets, strict=True) if count >= ALWAYS * SAMPLES]
+
+
+def _check_finite(name: str, rows: Rows) -> None:
+    """Raises InvalidArm for capsules that are far away, or nowhere: the origin of a joint or a shape is."""
+    if not (np.abs(np.array(rows)) < FARTHEST).all():
+        raise InvalidArm("urdf", f"The shape of link {name!r} is farther than {FARTHEST:g} m from its joint.")
 
 
 def _length(row: list[float]) -> float:

@@ -23,6 +23,7 @@ MOST_NAMES = 12
 CONTINUOUS = 2 * math.pi
 # angle [rad] from a quarter turn, and length [m], that are rounding: five digits of an angle, eleven of a length
 ROUNDED_ANGLE, ROUNDED_LENGTH, QUARTER = 5e-6, 1e-9, math.pi / 2
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 TURNING, FIXED = ("revolute", "continuous"), "fixed"
 
 
@@ -212,18 +213,40 @@ def _merged(
             if whole.joints[k].nq == 1:
                 q[whole.joints[k].idx_q] = locked.get(given.get(whole.names[k], ""), 0.0)
         model = pin.buildReducedModel(whole, held, q)
+        # a joint that Pinocchio does not understand takes its link away
+        ends = [model.frames[model.getFrameId(name, pin.FrameType.BODY)].placement for name in (base, tip)]
+        if model.nq != len(moving):
+            raise ValueError(f"of {len(moving)} joints it finds {model.nq}")
     except (RuntimeError, ValueError, IndexError) as error:
         _refuse("urdf", f"Pinocchio does not read the URDF: {error}.")
     rigid: list[list[str]] = [[] for _ in range(len(moving) + 1)]
     for name in tree.links:
         rigid[tree.carrier(name, names)].append(name)
-    at = {name: model.frames[model.getFrameId(name, pin.FrameType.BODY)].placement.homogeneous for name in (base, tip)}
+    _check_inertials(root, [name for names in rigid[1:] for name in names])
     q_min, q_max, v_max, tau_max = (np.array(column) for column in zip(*ranges, strict=True))
     axes = np.array([_axis(joint) for joint in moving])
     return Chain(
         model, tuple(names), tuple(_end(joint, "child") for joint in moving), tuple(map(tuple, rigid)),
-        axes, at[base], at[tip], q_min, q_max, v_max, tau_max, base, root,
+        axes, ends[0].homogeneous, ends[1].homogeneous, q_min, q_max, v_max, tau_max, base, root,
     )  # fmt: skip
+
+
+def _check_inertials(root: Element, names: list[str]) -> None:
+    """Whether each <inertial> of some links is whole: of a broken one, a reader takes what it understands."""
+    for link in (each for each in root.findall("link") if _name(each) in names):
+        for inertial in link.findall("inertial"):
+            what = f"The <inertial> of link {_name(link)!r} has"
+            for part, attributes in (("mass", ("value",)), ("inertia", TENSOR)):
+                element = inertial.find(part)
+                for attribute in attributes:
+                    text = "" if element is None else element.get(attribute, "")
+                    _finite(text, f"{what} a <{part}> with `{attribute}`")
+            origin = inertial.find("origin")
+            for part in ("xyz", "rpy"):
+                texts = "0 0 0" if origin is None else origin.get(part, "0 0 0")
+                values = [_finite(text, f"{what} an <origin> with `{part}`") for text in texts.split()]
+                if len(values) != 3:
+                    _refuse("urdf", f"{what} an <origin> whose `{part}` is not three numbers.")
 
 
 def _snap(joint: Element) -> None:

@@ -302,6 +302,9 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "are its units SI", change('<origin xyz="0.25 0 0"/>', '<origin xyz="250 0 0"/>')),
     ("urdf", "within 100 rad", change('lower="-2" upper="2.5"', 'lower="-180" upper="180"')),
     ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
+    ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
+    ("urdf", "Pinocchio does not read", change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>')),
+    ("urdf", "farther than 50 m", change('<origin xyz="0 0 0.1"/>', '<origin xyz="1e308 0 0"/>')),
     ("urdf", "3 finite numbers", change('size="0.1 0.1 0.3"', 'size="0.1 0.1"')),
 ]  # fmt: skip
 
