@@ -107,6 +107,15 @@ class _Tree:
         roots = [each for each in links if each not in above]
         if len(roots) != 1:
             _refuse("urdf", f"A URDF has one root link, not {len(roots)}: {_listed(roots)}.")
+        reached, front = {roots[0]}, [roots[0]]
+        below: dict[str, list[str]] = {}
+        for link, joint in above.items():
+            below.setdefault(_end(joint, "parent"), []).append(link)
+        while front:
+            front = [child for link in front for child in below.get(link, ())]
+            reached.update(front)
+        if loose := [link for link in links if link not in reached]:
+            _refuse("urdf", f"Links hang on each other in a loop: {_listed(loose)}. A URDF is a tree.")
         return _Tree(links, joints, above, roots[0])
 
     def path(self, base: str, tip: str) -> list[Element]:

@@ -257,6 +257,7 @@ def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
 
 
 WITHOUT_MASS = {"urdf": RICH.replace('<mass value="0.8"/>', '<mass value="0"/>').replace('value="0.1"', 'value="0"')}
+LOOP = change('link="forearm"/><child link="wrist"', 'link="finger"/><child link="wrist"')
 WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "is not XML", {"urdf": "<robot"}),
     ("urdf", "root element", {"urdf": "<sdf/>"}),
@@ -279,6 +280,7 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "Two joints", change('"twist"', '"pan"')),
     ("urdf", "that the URDF does not have", change('<child link="wrist"/>', '<child link="wirst"/>')),
     ("urdf", "hangs on two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
+    ("urdf", "in a loop: hand, wrist, ", LOOP),
     ("urdf", "one root link", change('<link name="world"/>', '<link name="world"/><link name="island"/>')),
     ("urdf", "no vector", change('xyz="0 0 -2"', 'xyz="0 0 0"')),
     ("urdf", "'wrist', with what is fixed to it, has no mass", WITHOUT_MASS),
