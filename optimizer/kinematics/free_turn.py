@@ -27,8 +27,9 @@ IN_LINE, STRETCHED = 1e-10, 1e-10
 # points of a curve from which a crossing is sought, steps of the search, the difference of parameters in it, and how
 # many steps it has before it is given up, if one leaves more than a ratio of the lean
 POINTS, STEPS, STEP, FIRST_STEPS, SLOW = 32, 20, 1e-6, 3, 0.7
-# rounding of a box [rad]
-ROUNDING = 1e-8
+# rounding of a box [rad]; and half the width of the loops on which an arm that is stretched to within STRETCHED, but
+# not quite, holds a pose: its elbow is bent by up to 4e-5, and rounding of the pose hides the loops
+ROUNDING, LOOPS = 1e-8, 2e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class FreeTurn:
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion`. The first three joints follow the fifth as `redundant_boxes` has it."""
-        centre, sides = self.at(parameter), np.full((len(parameter), 7), ROUNDING)
+        centre, sides = self.at(parameter), np.full((len(parameter), 7), LOOPS if self.joint == 4 else ROUNDING)
         sides[:, self.joint] += half
         if self.joint == 4:
             return centre, with_shoulder(self.pose, centre, sides)
