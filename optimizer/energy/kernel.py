@@ -18,7 +18,7 @@ import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Robot
 from optimizer.deadline import checkpoint
-from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, seal_path
+from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, mark_used, seal_path
 from optimizer.energy.kernel_expressions import FUNCTION_NAMES, SYMBOLICS, build
 
 # nodes per call of a function whose number of nodes varies from caller to caller
@@ -141,6 +141,7 @@ class _Loader:
         if self._interpreted is not None and not seal_path(self.library_path).exists():
             return self._interpreted
         if is_intact(self.library_path):
+            mark_used(self.library_path)
             with SYMBOLICS:
                 functions = [ca.external(name, str(self.library_path)) for name in FUNCTION_NAMES]
             self._compiled = Kernel(self._robot, functions, compiled=True)

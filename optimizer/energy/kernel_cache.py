@@ -13,6 +13,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -27,6 +28,8 @@ from optimizer.energy.kernel_expressions import SYMBOLICS, build
 log = logging.getLogger(__name__)
 
 COMPILER_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+# users may bring any number of arms, each with a library of about a megabyte
+MOST_LIBRARIES = 200
 # modules whose code decides what is compiled
 SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions)
 
@@ -101,7 +104,23 @@ def compile_kernel(robot: Robot) -> Path:
             # the seal first: a library without its seal counts as damaged, a seal without its library as absent
             seal.replace(seal_path(target))
             library.replace(target)
+    _prune(target.parent)
     return target
+
+
+def mark_used(path: Path) -> None:
+    """Note that a library is in use: of many, those that rested longest are deleted."""
+    with suppress(OSError):  # a cache that is read-only is not pruned either
+        os.utime(path)
+
+
+def _prune(folder: Path) -> None:
+    """Delete the libraries that rested longest, so that MOST_LIBRARIES are left. Who has loaded one keeps it."""
+    with suppress(OSError):
+        libraries = sorted(folder.glob("*.so"), key=lambda each: each.stat().st_mtime, reverse=True)
+        for library in libraries[MOST_LIBRARIES:]:
+            for file in (library, seal_path(library), library.with_suffix(".lock")):
+                file.unlink(missing_ok=True)
 
 
 def _write_source(robot: Robot, folder: Path) -> Path:

@@ -5,6 +5,7 @@ Tests that compile do it without optimisation, by a compiler that adds a flag an
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import pytest
 
 from models.registry import robot_names
 from models.robot import Robot
+from optimizer.energy import kernel_cache
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
 from optimizer.energy.kernel_expressions import build
@@ -258,3 +260,20 @@ def test_the_cache_is_where_the_user_says_or_at_home(monkeypatch: pytest.MonkeyP
     monkeypatch.delenv("JOULEPATH_CACHE_DIR")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert cache_directory() == tmp_path / "home" / ".cache" / "joulepath"
+
+
+def test_libraries_that_rested_longest_leave(whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of many arms that users bring; a library in use is marked, and stays."""
+    monkeypatch.setattr(kernel_cache, "MOST_LIBRARIES", 3)
+    for k in range(5):
+        for ending in (".so", ".sha256", ".lock"):
+            (tmp_path / f"arm{k}{ending}").write_bytes(b"?")
+        os.utime(tmp_path / f"arm{k}.so", (k, k))
+    kernel_cache.mark_used(tmp_path / "arm0.so")
+    kernel_cache._prune(tmp_path)
+    assert sorted(path.name for path in tmp_path.glob("*.so")) == ["arm0.so", "arm3.so", "arm4.so"]
+    assert len(list(tmp_path.iterdir())) == 9
+    # a folder that is gone is no error
+    kernel_cache.mark_used(tmp_path / "none" / "arm.so")
+    kernel_cache._prune(tmp_path / "none")
+    assert whole.exists()
