@@ -31,6 +31,7 @@ def to_description(arm: asked.OwnArm) -> Description:
         drives=Drives(**{name: _per_joint(value) for name, value in arm.drives}),
         electronics=Electronics(**dict(arm.electronics)),
         collision=Collision(capsules, collision.radius, pairs),
+        srdf=arm.srdf,
         meshes=None if arm.meshes is None else in_zip(decoded(arm.meshes, "meshes")),
         default_motion=None if motion is None else Motion(motion.velocity, motion.acceleration),
     )

@@ -119,6 +119,13 @@ class OwnArm(Request):
     drives: OwnDrives = described("Motors and gears.", None, {"rotor_inertia": 0.4}, default=OwnDrives())
     electronics: OwnElectronics = described("Electronics.", None, {"idle_power": 40.0}, default=OwnElectronics())
     collision: OwnCollision = described("Shape of the links.", None, {"radius": 0.05}, default=OwnCollision())
+    srdf: str | None = described(
+        "Text of an SRDF: the pairs of its `disable_collisions` are not compared. Null: none.",
+        None,
+        '<robot name="example"><disable_collisions link1="base" link2="forearm" reason="Never"/></robot>',
+        default=None,
+        min_length=1,
+    )
     meshes: str | None = described(
         "Mesh files (STL, OBJ) that the URDF names, as a zip in base64. Null: a link whose shape is a mesh has a "
         "capsule from joint to joint.",

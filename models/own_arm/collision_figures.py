@@ -20,6 +20,7 @@ from models.own_arm.capsule_around import capsule_around
 from models.own_arm.description import Description, InvalidArm
 from models.own_arm.figure import assumed, stated
 from models.own_arm.mesh_files import corners
+from models.own_arm.srdf import disabled_pairs
 from models.own_arm.upright import UprightChain
 from models.own_arm.urdf_chain import Chain
 from models.robot import Array
@@ -136,15 +137,17 @@ def _between_joints(upright: UprightChain, k: int, radius: float) -> Rows:
 
 def _never_meet(description: Description, chain: Chain, upright: UprightChain, capsules: list[Rows]) -> dict[str, Any]:
     """Pairs of links that are not compared: the user's, else those whose capsules are hardly ever apart."""
-    given = description.collision.never_meet
-    if given is not None:
-        number = {link: k for k, rigid in enumerate(chain.rigid) for link in rigid}
-        for link in (each for pair in given for each in pair):
-            if link not in number:
-                raise InvalidArm("collision.never_meet", f"The arm has no link {link!r} from base to tip.")
-        pairs = {(min(a, b), max(a, b)) for a, b in ((number[a], number[b]) for a, b in given)}
-        found = sorted(pair for pair in pairs if pair[0] + 1 < pair[1])
-        return stated(description, [list(pair) for pair in found], "1", "Numbers of links, 0 for the base.")
+    number = {link: k for k, rigid in enumerate(chain.rigid) for link in rigid}
+    own, srdf = description.collision.never_meet, description.srdf
+    for link in (each for pair in own or () for each in pair):
+        if link not in number:
+            raise InvalidArm("collision.never_meet", f"The arm has no link {link!r} from base to tip.")
+    if own is not None or srdf is not None:
+        # an SRDF may be that of a larger machine
+        given = [*(own or ()), *(() if srdf is None else disabled_pairs(srdf))]
+        known = [(number[a], number[b]) for a, b in given if a in number and b in number]
+        found = sorted({(min(pair), max(pair)) for pair in known if abs(pair[0] - pair[1]) > 1})
+        return stated(description, [list(pair) for pair in found], "1", "Numbers of links, 0 for the base. Not proven.")
     often = _often(chain, upright, capsules)
     return assumed(often, "1", "Pairs whose capsules meet in 95 % of 300 random configurations or more.")
 

@@ -71,8 +71,8 @@ class Description:
 
     `acceleration` [rad/s²], `payload` [kg]. `base` is the link whose frame is the world frame (default: the root).
     `velocity` [rad/s] and `torque` [N·m] replace the URDF's limits; `jerk` [rad/s³]. `locked` has a position [rad] or
-    [m] for each joint that is held. `source` says where the URDF is from, `trust` how good it is. `meshes` has the
-    content of mesh files by their paths.
+    [m] for each joint that is held. `source` says where the URDF is from, `trust` how good it is. `srdf` is the
+    text of an SRDF, whose disabled collisions are not compared. `meshes` has the content of mesh files by their paths.
     """
 
     urdf: str
@@ -90,5 +90,6 @@ class Description:
     drives: Drives = Drives()
     electronics: Electronics = Electronics()
     collision: Collision = Collision()
+    srdf: str | None = None
     meshes: Mapping[str, bytes] | None = None
     default_motion: Motion | None = None

@@ -39,6 +39,11 @@ def read_description(path: Path) -> Description:
     if not urdf.is_file():
         raise InvalidArm("urdf", f"There is no file {urdf}: give the path of the URDF, relative to {path.name}.")
     text = urdf.read_text(encoding="utf-8", errors="replace")
+    if found.srdf is not None:
+        srdf = path.parent / found.srdf
+        if not srdf.is_file():
+            raise InvalidArm("srdf", f"There is no file {srdf}: give the path of the SRDF, relative to {path.name}.")
+        found = replace(found, srdf=srdf.read_text(encoding="utf-8", errors="replace"))
     return replace(found, urdf=text, meshes=_meshes(path.parent, place, urdf.parent, text))
 
 

@@ -232,6 +232,18 @@ def test_capsules_and_pairs_of_the_user() -> None:
     assert next(each for each in made.capsules if each.link == 0).radius == 0.02
 
 
+def test_pairs_of_an_srdf() -> None:
+    """Of the whole machine: links that are not the arm's, and neighbours, count as nothing."""
+    pairs = (("pedestal", "forearm"), ("pedestal", "flange_arm"), ("wrist", "table"), ("pedestal", "finger"))
+    lines = "".join(f'<disable_collisions link1="{a}" link2="{b}" reason="Never"/>' for a, b in pairs)
+    srdf = f'<robot name="rich"><group name="arm"/>{lines}</robot>'
+    assert robot(dataclasses.replace(RICH_ARM, srdf=srdf)).never_in_collision == {(0, 2), (0, 3)}
+    both = dataclasses.replace(RICH_ARM, srdf=srdf, collision=Collision(never_meet=(("wrist", "flange_arm"),)))
+    assert robot(both).never_in_collision == {(0, 2), (0, 3), (1, 3)}
+    for text, words in (("<robot", "not XML"), ("<srdf/>", "root element"), ("<!DOCTYPE r>" + srdf, "document type")):
+        refused("srdf", words, dataclasses.replace(RICH_ARM, srdf=text))
+
+
 def test_a_motion_of_least_energy() -> None:
     """From joints to joints, certified, above its bound; without the baseline of a default that nobody knows."""
     made = robot(dataclasses.replace(RICH_ARM, collision=Collision(never_meet=(("pedestal", "elbow"),))))
@@ -332,8 +344,12 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     made = load_robot(file)
     assert (made.name, made.limits.a_max.tolist()) == ("my_arm", [8.0, 6.5])
     assert load_robot(str(file)) is made
-    file.write_text("urdf: arm.urdf\ntip: tool\nacceleration: 9\npayload: 2\n")
+    file.write_text("urdf: arm.urdf\ntip: tool\nacceleration: 9\npayload: 2\nsrdf: arm.srdf\n")
+    with pytest.raises(InvalidArm, match=r"no file .*arm\.srdf"):
+        load_robot(file)
+    (tmp_path / "arm.srdf").write_text('<robot><disable_collisions link1="base" link2="tool"/></robot>')
     assert load_robot(file).limits.a_max.tolist() == [9.0, 9.0]
+    assert load_robot(file).never_in_collision == {(0, 2)}
     with pytest.raises(OSError, match=r"other\.yaml"):
         load_robot(tmp_path / "other.yaml")
 
