@@ -35,8 +35,10 @@ def in_zip(content: bytes) -> dict[str, bytes]:
                 if left < 0:
                     raise InvalidArm("meshes", f"The zip unpacks to more than {MOST_BYTES >> 20} MiB of meshes.")
             return found
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError) as error:
-        raise InvalidArm("meshes", f"The meshes are no zip that can be read: {error}.") from None
+    except InvalidArm:
+        raise
+    except Exception as error:  # zipfile, and what unpacks its methods, raise many kinds for broken files
+        raise InvalidArm("meshes", "The meshes are no zip that can be read: pack them again.") from error
 
 
 def in_folder(folder: Path, urdf: str) -> dict[str, bytes]:

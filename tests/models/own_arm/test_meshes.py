@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import random
 import zipfile
 from pathlib import Path
 
@@ -140,6 +141,24 @@ def test_a_zip_that_is_none_or_too_large(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr("models.own_arm.mesh_files.MOST_FILES", 1)
     with pytest.raises(InvalidArm, match="2 mesh files"):
         in_zip(zipped({"a.stl": b"0", "b.obj": b"0"}))
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
+    """Whatever unpacks it: 300 mutants of each method."""
+    target, chance, refused = io.BytesIO(), random.Random(method), 0
+    with zipfile.ZipFile(target, "w", method) as archive:
+        archive.writestr("a.stl", bytes(range(256)) * 20)
+        archive.writestr("b/c.obj", b"v 0 0 0\n" * 50)
+    for _ in range(300):
+        content = bytearray(target.getvalue())
+        for _ in range(chance.choice([1, 2, 5])):
+            content[chance.randrange(len(content))] = chance.randrange(256)
+        try:
+            assert set(in_zip(bytes(content))) != {""}
+        except InvalidArm:
+            refused += 1
+    assert refused > 30
 
 
 def test_an_arm_of_others_with_its_meshes(tmp_path: Path) -> None:
