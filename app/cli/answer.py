@@ -101,10 +101,14 @@ def compile_kernel_of(robot_name: str) -> None:
 def write(answer: bytes, output: Path | None) -> None:
     """Writes an answer to a file, or to standard output. Raises click.FileError."""
     if output is None:
-        # a reader that ends first ends this process silently, as it does with the shell's own tools
-        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
-        sys.stdout.buffer.write(answer if answer.endswith(b"\n") else answer + b"\n")
-        sys.stdout.buffer.flush()
+        # a reader that ends first ends this process silently, as it does with the shell's own tools; a connection that
+        # breaks at another time is an error like any other
+        before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+        try:
+            sys.stdout.buffer.write(answer if answer.endswith(b"\n") else answer + b"\n")
+            sys.stdout.buffer.flush()
+        finally:
+            signal.signal(signal.SIGPIPE, before)
         return
     try:
         output.write_bytes(answer)

@@ -247,6 +247,11 @@ def test_a_reader_that_has_gone_leaves_no_traceback() -> None:
     assert (finished.returncode, finished.stderr) == (-signal.SIGPIPE, b"")
 
 
+def test_a_broken_connection_later_on_is_an_error_like_any_other(here: Here) -> None:
+    assert here.run("robots")[0] == 0
+    assert signal.getsignal(signal.SIGPIPE) == signal.SIG_IGN  # Python's own choice: a write raises BrokenPipeError
+
+
 def test_an_interrupt_that_is_dropped_is_raised_again(monkeypatch: pytest.MonkeyPatch) -> None:
     class Drops:
         def __del__(self) -> None:
