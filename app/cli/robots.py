@@ -43,7 +43,7 @@ def add(file: Path, name: str | None, replace: bool) -> None:
 
     FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
     """
-    from app.exceptions import RobotExists, ServiceError
+    from app.exceptions import ServiceError
     from app.schemas.own_arm import NAME_PATTERN
     from app.settings import Settings
     from app.store import robots as stored
@@ -51,8 +51,6 @@ def add(file: Path, name: str | None, replace: bool) -> None:
     from models.own_arm.description import InvalidArm
     from models.own_arm.figures import own_figures
     from models.own_arm.reading import read_description
-    from models.own_arm.robots import own_robot
-    from models.registry import robot_names
     from models.trust import energy_trust
     from optimizer.exceptions import InvalidProblem
 
@@ -60,8 +58,7 @@ def add(file: Path, name: str | None, replace: bool) -> None:
     if not NAME_PATTERN.fullmatch(name):
         raise click.UsageError("The name must have small letters, digits, - and _ only: give another one by --name.")
     try:
-        if name in robot_names():
-            raise RobotExists
+        stored.check_own(name)
         figures, warnings = own_figures(name, read_description(file))
         row = OwnRobot(name=name, created=now(), figures=figures, warnings=warnings)
         put = partial(stored.put if replace else stored.add, robot=row, most=Settings().max_robots)
@@ -70,8 +67,8 @@ def add(file: Path, name: str | None, replace: bool) -> None:
         raise refused(InvalidProblem(error.field, str(error))) from None
     except ServiceError as error:
         raise refused(error) from None
-    robot = own_robot(name, figures)
-    write("\n".join([f"{name}: {robot.nq} joints. {energy_trust(figures)}", *warnings]).encode(), None)
+    joints = len(figures["kinematics"]["joint_names"]["value"])
+    write("\n".join([f"{name}: {joints} joints. {energy_trust(figures)}", *warnings]).encode(), None)
 
 
 @robots.command(
@@ -82,16 +79,12 @@ Example:
 @click.argument("name")
 def remove(name: str) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
-    from app.exceptions import RobotExists, ServiceError
+    from app.exceptions import ServiceError
     from app.store import robots as stored
-    from models.registry import robot_names
     from optimizer.exceptions import UnknownRobot
 
     try:
-        if name in robot_names():
-            raise RobotExists
-        if not in_store(lambda store: store.write(partial(stored.delete, name=name))):
-            raise UnknownRobot(name, [*robot_names(), *in_store(lambda store: store.read(stored.names))])
+        in_store(lambda store: store.write(partial(stored.delete, name=name)))
     except (ServiceError, UnknownRobot) as error:
         raise refused(error) from None
 
@@ -100,7 +93,6 @@ def _table() -> str:
     """Bundled robots, then those in the database; without these where the database does not answer."""
     from app.exceptions import StoreUnavailable
     from app.store import robots as stored
-    from models.own_arm.robots import own_robot
     from models.registry import load_robot, robot_names
     from models.trust import ENERGY_SECTIONS, trust_letters
 
@@ -111,15 +103,16 @@ def _table() -> str:
         "payload [kg]",
         *(f"trust: {part.replace('_', ' ')}" for part in ENERGY_SECTIONS),
     )
-    found = [load_robot(name) for name in robot_names()]
+    found = {name: load_robot(name).figures for name in robot_names()}
     try:
-        found += [own_robot(each.name, each.figures) for each in in_store(lambda store: store.read(stored.all_of))]
+        found |= {each.name: each.figures for each in in_store(lambda store: store.read(stored.all_of))}
     except StoreUnavailable:
         click.echo("The database does not answer: robots that were added are not listed.", err=True)
     rows = [head]
-    for robot in found:
-        letters = (" ".join(sorted(trust_letters(robot.figures[part]))) for part in ENERGY_SECTIONS)
-        rows.append((robot.name, robot.title, str(robot.nq), f"{robot.rated_payload:g}", *letters))
+    for name, figures in found.items():
+        letters = (" ".join(sorted(trust_letters(figures[part]))) for part in ENERGY_SECTIONS)
+        joints, payload = figures["kinematics"]["joint_names"]["value"], figures["limits"]["rated_payload"]["value"]
+        rows.append((name, figures["title"], str(len(joints)), f"{payload:g}", *letters))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
     return "\n".join(lines)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import orjson
 from fastapi import APIRouter, Path, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from app.exceptions import RobotExists
@@ -19,14 +20,11 @@ from app.schemas import errors as problems
 from app.schemas.own_arm import NewRobot, OwnArm, OwnName
 from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, RobotSummary
 from app.store import robots
-from app.store.store import Store
 from app.store.tables import OwnRobot, now
 from app.tasks.own_robot import OwnRobotTask
-from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
-from models.robot import Robot
+from models.robot import FrictionLaw as Law
 from models.trust import TRUST, energy_trust
-from optimizer.exceptions import UnknownRobot
 
 router = APIRouter(prefix="/robots", tags=["robots"])
 
@@ -39,9 +37,14 @@ _SECTIONS = ("kinematics", "inertials", "limits", "collision", "drives", "electr
 @router.get("", summary="All robots", response_model=RobotList, responses=problem_responses(problems.StoreUnavailable))
 async def list_robots(store: ServiceStore) -> RobotList:
     """Names, titles and joints of all robots, and what their energies rest on."""
-    bundled = [RobotSummary(**_summary(load_robot(name), added=False)) for name in robot_names()]
-    added = [own_robot(each.name, each.figures) for each in await store.read(robots.all_of)]
-    return RobotList(robots=[*bundled, *(RobotSummary(**_summary(robot, added=True)) for robot in added)])
+    bundled = await run_in_threadpool(lambda: {name: load_robot(name).figures for name in robot_names()})
+    added = await store.read(robots.all_of)
+    return RobotList(
+        robots=[
+            *(RobotSummary(**_summary(name, figures, added=False)) for name, figures in bundled.items()),
+            *(RobotSummary(**_summary(each.name, each.figures, added=True)) for each in added),
+        ]
+    )
 
 
 @router.post(
@@ -61,8 +64,7 @@ async def add(
 ) -> RobotDetail:
     """Adds an arm of your own, from its URDF and what a URDF does not hold. What is missing follows from stated rules,
     is marked with the trust letter E, and listed in `warnings`."""
-    if body.name in robot_names():
-        raise RobotExists
+    robots.check_own(body.name)
     robot = await _computed(request, body.name, body, engine, settings.max_deadline)
     try:
         await store.write(partial(robots.add, robot=robot, most=settings.max_robots))
@@ -82,11 +84,8 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
     friction laws with their coefficients."""
     if name in robot_names():
-        return _detail(load_robot(name), added=False, warnings=[])
-    found = await store.read(partial(robots.get, name=name))
-    if found is None:
-        raise await _unknown(store, name)
-    return _of_user(found)
+        return _detail(name, load_robot(name).figures, added=False, warnings=[])
+    return _of_user(await store.read(partial(robots.get, name=name)))
 
 
 @router.put(
@@ -109,8 +108,7 @@ async def put(
 ) -> RobotDetail:
     """Adds an arm of your own under this name, or replaces it. Requests from then on use the new one; stored answers
     stay."""
-    if name in robot_names():
-        raise RobotExists
+    robots.check_own(name)
     robot = await _computed(request, name, body, engine, settings.max_deadline)
     write = partial(robots.put, robot=robot, most=settings.max_robots)
     try:
@@ -131,10 +129,7 @@ async def put(
 )
 async def delete(name: Name, store: ServiceStore) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
-    if name in robot_names():
-        raise RobotExists
-    if not await store.write(partial(robots.delete, name=name)):
-        raise await _unknown(store, name)
+    await store.write(partial(robots.delete, name=name))
 
 
 async def _computed(request: Request, name: str, arm: OwnArm, engine: ServiceEngine, deadline: float) -> OwnRobot:
@@ -144,36 +139,33 @@ async def _computed(request: Request, name: str, arm: OwnArm, engine: ServiceEng
     return OwnRobot(name=name, created=now(), **content)
 
 
-async def _unknown(store: Store, name: str) -> UnknownRobot:
-    return UnknownRobot(name, [*robot_names(), *await store.read(robots.names)])
-
-
 def _of_user(row: OwnRobot) -> RobotDetail:
-    return _detail(own_robot(row.name, row.figures), added=True, warnings=row.warnings)
+    return _detail(row.name, row.figures, added=True, warnings=row.warnings)
 
 
-def _detail(robot: Robot, added: bool, warnings: list[str]) -> RobotDetail:
-    content: dict[str, Any] = {section: robot.figures.get(section) for section in _SECTIONS}
-    content |= _summary(robot, added) | {"trust": TRUST, "friction": _friction(robot), "warnings": warnings}
+def _detail(name: str, figures: dict[str, Any], added: bool, warnings: list[str]) -> RobotDetail:
+    content: dict[str, Any] = {section: figures.get(section) for section in _SECTIONS}
+    content |= _summary(name, figures, added) | {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}
     return RobotDetail(**content)
 
 
-def _friction(robot: Robot) -> Friction:
-    figures = robot.figures["friction_laws"]
+def _friction(figures: dict[str, Any]) -> Friction:
+    laws = figures["friction_laws"]
+    default = next(iter(laws))
     return Friction(
-        table=robot.figures["friction_table"],
+        table=figures["friction_table"],
         laws=[
-            FrictionLaw(name=law.name, default=law is robot.friction, formula=law.FORMULA, coefficients=figures[name])
-            for name, law in robot.friction_laws.items()
+            FrictionLaw(name=name, default=name == default, formula=Law.FORMULA, coefficients=coefficients)
+            for name, coefficients in laws.items()
         ],
     )
 
 
-def _summary(robot: Robot, added: bool) -> dict[str, Any]:
+def _summary(name: str, figures: dict[str, Any], added: bool) -> dict[str, Any]:
     return {
-        "name": robot.name,
-        "title": robot.title,
-        "joints": list(robot.joint_names),
+        "name": name,
+        "title": figures["title"],
+        "joints": figures["kinematics"]["joint_names"]["value"],
         "added": added,
-        "energy_trust": energy_trust(robot.figures),
+        "energy_trust": energy_trust(figures),
     }

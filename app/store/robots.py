@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from sqlalchemy import delete as delete_from
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from app.exceptions import RobotExists, TooManyRobots
 from app.store.tables import OwnRobot
+from models.registry import robot_names
+from optimizer.exceptions import UnknownRobot
 
 
-def names(session: Session) -> list[str]:
-    """Names of all robots that users added."""
-    return list(session.scalars(select(OwnRobot.name).order_by(OwnRobot.name)))
+def check_own(name: str) -> None:
+    """Raises RobotExists for a robot that comes with the service: nobody adds, replaces or deletes it."""
+    if name in robot_names():
+        raise RobotExists
 
 
 def all_of(session: Session) -> list[OwnRobot]:
@@ -20,9 +22,12 @@ def all_of(session: Session) -> list[OwnRobot]:
     return list(session.scalars(select(OwnRobot).order_by(OwnRobot.name)))
 
 
-def get(session: Session, name: str) -> OwnRobot | None:
-    """The robot of this name; None if there is none."""
-    return session.get(OwnRobot, name)
+def get(session: Session, name: str) -> OwnRobot:
+    """The robot of this name. Raises UnknownRobot, which knows the names of all robots."""
+    found = session.get(OwnRobot, name)
+    if found is None:
+        raise UnknownRobot(name, [*robot_names(), *session.scalars(select(OwnRobot.name).order_by(OwnRobot.name))])
+    return found
 
 
 def add(session: Session, robot: OwnRobot, most: int) -> None:
@@ -44,10 +49,10 @@ def put(session: Session, robot: OwnRobot, most: int) -> bool:
     return True
 
 
-def delete(session: Session, name: str) -> bool:
-    """Deletes a robot; whether there was one."""
-    found = session.execute(delete_from(OwnRobot).where(OwnRobot.name == name).returning(OwnRobot.name))
-    return found.first() is not None
+def delete(session: Session, name: str) -> None:
+    """Deletes a robot. Raises RobotExists for one that comes with the service, UnknownRobot if there is none."""
+    check_own(name)
+    session.delete(get(session, name))
 
 
 def _check_count(session: Session, most: int) -> None:

@@ -80,7 +80,4 @@ async def known_here(store: Store, name: str) -> AbstractContextManager[None]:
 
 async def own_figures(store: Store, name: str) -> dict[str, Any]:
     """Figures of a robot that a user added. Raises UnknownRobot or StoreUnavailable."""
-    found = await store.read(partial(robots.get, name=name))
-    if found is None:
-        raise UnknownRobot(name, [*robot_names(), *await store.read(robots.names)])
-    return found.figures
+    return (await store.read(partial(robots.get, name=name))).figures

@@ -155,7 +155,7 @@ def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
         for _ in range(chance.choice([1, 2, 5])):
             content[chance.randrange(len(content))] = chance.randrange(256)
         try:
-            assert set(in_zip(bytes(content))) != {""}
+            in_zip(bytes(content))
         except InvalidArm:
             refused += 1
     assert refused > 30
