@@ -255,7 +255,7 @@ class Solution:
     """The motion of least energy, with its lower bound and certificate.
 
     Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or goal. Then `status`
-    is `feasible`, and the lower bound holds for any two configurations.
+    is `feasible`, and the lower bound covers the motions between those that may be missing.
     """
 
     status: Literal["optimal", "feasible"]

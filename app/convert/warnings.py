@@ -10,8 +10,8 @@ ADVICE = "Make sure that the arm and its cell are known as accurately, or ask fo
 
 
 MISSED = (
-    "The inverse kinematics of this arm is numeric and may have missed arm configurations: the answer is the best of "
-    "those found, its status is not `optimal`, and its lower bound is that of any motion."
+    "The inverse kinematics of this arm may have missed arm configurations: the answer is the best of those found, its "
+    "status is not `optimal`, and its lower bound covers those that may be missing."
 )
 NO_DEFAULT_MOTION = "No default motion of the robot's controller is known: `controller_default` is left out."
 

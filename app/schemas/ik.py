@@ -78,8 +78,8 @@ class IKResponse(Answer):
 
     solutions: list[IKSolution] = part("One entry per configuration.")
     complete: bool = described(
-        "Whether every branch is among them. False for an arm whose inverse kinematics is numeric: some may be "
-        "missing.",
+        "Whether every branch is among them. False for an arm whose inverse kinematics is not proven to find all: some "
+        "may be missing.",
         None,
         True,
     )

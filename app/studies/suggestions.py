@@ -15,8 +15,10 @@ import numpy as np
 from app.convert.arm import to_arm
 from app.schemas.arm import ArmRequest
 from app.schemas.request import OptimizeRequest
+from models.robot import Array
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.tcp import rotated_poses
+from optimizer.problem.arm import Arm
 from optimizer.problem.problem import LONGEST_DURATION
 
 Step = Literal["method", "branch", "orientation", "duration", "payload"]
@@ -24,8 +26,8 @@ Fields = dict[str, Any]
 
 _TOOL_AXIS = [0.0, 0.0, 1.0]
 """Axis of the tool in the TCP frame."""
-_TILT = radians(10.0)
-"""Tilt of the tool [rad]."""
+_TILTS = [sign * radians(10.0) * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
+"""Tilts of the tool: rotation vectors [rad]."""
 _LONGER = 1.25
 """Factor of a longer duration."""
 _NEARER = 0.5
@@ -79,8 +81,12 @@ def base_of(kind: str, request: Fields, answer: Fields, objective: str) -> Base 
 
 def proposals(base: Base) -> list[Proposal]:
     """All suggestions for the base, in the order in which they are computed: usually those first that save most."""
-    turned = _orientation(base) if _takes_poses(base) else ()
-    return [*_method(base), *_duration(base), *_branch(base), *turned, *_payload(base)]
+    arm = to_arm(OptimizeRequest.model_validate(base.request))
+    takes_poses = inverse_kinematics_for(arm.robot) is not None
+    here, *tilted = _poses(arm, base.q_goal, [np.zeros(3), *_TILTS])
+    pose = [_same_pose(base, here)] if takes_poses and "q" in base.request["goal"] else []
+    turned = _orientation(base, here, tilted) if takes_poses else ()
+    return [*_method(base), *_duration(base), *pose, *_branch(base), *turned, *_payload(base)]
 
 
 def _method(base: Base) -> Iterator[Proposal]:
@@ -101,13 +107,13 @@ def _duration(base: Base) -> Iterator[Proposal]:
         yield Proposal("duration", f"Make the motion {abs(factor - 1):.0%} {word}.", _timed(base, duration))
 
 
+def _same_pose(base: Base, here: Fields) -> Proposal:
+    request = _without(base.request, "branch", "windings") | {"goal": here}
+    return Proposal("branch", "Reach the same pose in the arm configuration of least energy.", request)
+
+
 def _branch(base: Base) -> Iterator[Proposal]:
-    fixed = "q" in base.request["goal"]
-    if fixed and _takes_poses(base):
-        pose = _poses(base, [np.zeros(3)])[0]
-        request = _without(base.request, "branch", "windings") | {"goal": pose}
-        yield Proposal("branch", "Reach the same pose in the arm configuration of least energy.", request)
-    elif not fixed and any(name in base.request for name in ("branch", "windings")):
+    if "q" not in base.request["goal"] and any(name in base.request for name in ("branch", "windings")):
         yield Proposal(
             "branch",
             "Allow every arm configuration and all full-turn alternatives.",
@@ -124,20 +130,19 @@ def _branch(base: Base) -> Iterator[Proposal]:
             yield Proposal("branch", f"Reach the goal in the branch {name}.", request)
 
 
-def _orientation(base: Base) -> Iterator[Proposal]:
-    (here,) = _poses(base, [np.zeros(3)])
+def _orientation(base: Base, here: Fields, tilted: list[Fields]) -> Iterator[Proposal]:
+    """The goal's pose `here` with the tool free to rotate, and the poses `tilted` by `_TILTS`."""
     orientation = {"free_about": _TOOL_AXIS, "quaternion": here["pose"]["quaternion"]}
     yield Proposal(
         "orientation",
         "Let the tool rotate freely about its z axis at the goal.",
         base.request | {"goal": {"pose": {"position": here["pose"]["position"], "orientation": orientation}}},
     )
-    tilts = [sign * _TILT * axis for axis in np.eye(3)[:2] for sign in (1, -1)]
     yield Proposal(
         "orientation",
         "Tilt the tool by 10 degrees at the goal, about its x or y axis, in the direction that needs the least energy"
         " (four directions compared).",
-        base.request | {"goal": {"any_of": _poses(base, tilts)}},
+        base.request | {"goal": {"any_of": tilted}},
     )
 
 
@@ -160,14 +165,8 @@ def _without(request: Fields, *names: str) -> Fields:
     return {name: value for name, value in request.items() if name not in names}
 
 
-def _takes_poses(base: Base) -> bool:
-    """Whether there is inverse kinematics for the arm."""
-    return inverse_kinematics_for(to_arm(OptimizeRequest.model_validate(base.request)).robot) is not None
-
-
-def _poses(base: Base, rotvecs: list[Any]) -> list[Fields]:
-    arm = to_arm(OptimizeRequest.model_validate(base.request))
-    poses = rotated_poses(arm, np.array(base.q_goal), rotvecs)
+def _poses(arm: Arm, q: list[float], rotvecs: list[Array]) -> list[Fields]:
+    poses = rotated_poses(arm, np.array(q), rotvecs)
     return [{"pose": {"position": at.tolist(), "quaternion": quaternion.tolist()}} for at, quaternion in poses]
 
 

@@ -24,6 +24,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.kinematics.vectors import cross
 from optimizer.problem.arm import Arm
 
 
@@ -106,8 +107,8 @@ class ChainDerivatives:
         z, o, _, c = self._frames(q)
         outer = np.cumsum(self.mass[::-1])[::-1]
         moments = _from_outside(self.mass[:, None] * c) - outer[:, None] * o
-        levers = _cross(z, moments)
-        across = _cross(np.broadcast_to(self.gravity, z.shape), z)
+        levers = cross(z, moments)
+        across = cross(np.broadcast_to(self.gravity, z.shape), z)
         return -levers @ self.gravity, _symmetric(-across @ levers.transpose(0, 2, 1))
 
     def joint_inertia(self, q: Array) -> Array:
@@ -117,9 +118,9 @@ class ChainDerivatives:
         square = (c * c).sum(axis=-1)[..., None, None] * np.eye(3) - c[..., :, None] * c[..., None, :]
         about_origin = _from_outside(about_centre + self.mass[:, None, None] * square)
         outer, moment = np.cumsum(self.mass[::-1])[::-1], _from_outside(self.mass[:, None] * c)
-        speed = _cross(o, z)
-        linear = outer[:, None] * speed + _cross(z, moment)
-        angular = (about_origin @ z[..., None])[..., 0] + _cross(moment, speed)
+        speed = cross(o, z)
+        linear = outer[:, None] * speed + cross(z, moment)
+        angular = (about_origin @ z[..., None])[..., 0] + cross(moment, speed)
         both = z @ angular.transpose(0, 2, 1) + speed @ linear.transpose(0, 2, 1)
         return _symmetric(both) + np.diag(self.rotor)
 
@@ -139,10 +140,3 @@ def _from_outside(each: Array) -> Array:
 def _symmetric(upper: Array) -> Array:
     """The symmetric matrices (n, k, k) with these upper triangles."""
     return np.asarray(np.triu(upper) + np.triu(upper, 1).transpose(0, 2, 1))
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products along the last axis; numpy's own takes several times as long for many short vectors."""
-    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
-    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
-    return np.stack([x, y, a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]], axis=-1)

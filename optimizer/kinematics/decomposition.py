@@ -162,8 +162,8 @@ class DecomposedArm:
         There the formulas for each alone lose branches.
         """
         assert self._wrist is not None
-        arms = np.array([self._wrist.wrist.measures(q)[:2] for q in rows])
-        return bool((np.column_stack([np.abs(arms), sines]) < TWICE_SINGULAR).sum(axis=1).max() > 1)
+        arms = np.abs(self._wrist.wrist.measures(rows)[:, :2])
+        return bool((np.column_stack([arms, sines]) < TWICE_SINGULAR).sum(axis=1).max() > 1)
 
     def _rows(self, T: Array) -> Array:
         """Configurations (n, 6) [rad] of the simplest arm, least-squares approaches included; none out of reach."""
@@ -191,7 +191,7 @@ class DecomposedArm:
     def _beside_folds(self, rows: Array) -> list[Array]:
         """Starts (n, 6) on both sides of a stretched or folded elbow: next to it EAIK has one row for two branches."""
         assert self._wrist is not None
-        folds = [q for q in rows if abs(self._wrist.wrist.measures(q)[1]) < BESIDE_FOLD]
+        folds = rows[np.abs(self._wrist.wrist.measures(rows)[:, 1]) < BESIDE_FOLD]
         return [each for q in folds for each in self._wrist.beside_fold(q, BESIDE_FOLD)]
 
     def _exact(self, q: Array, frames: Array, T: Array) -> tuple[Array, Array]:
@@ -215,7 +215,7 @@ class DecomposedArm:
         values (n,), inf where they need not be known."""
         T_reached = frames[:, -1] @ self._chain.T_last_flange
         missed = miss(pose_error(T_reached, T))
-        singular = np.array([self._may_be_singular(each) for each in q], dtype=bool)
+        singular = self._may_be_singular(q)
         moved = np.flatnonzero((missed > np.where(singular, EXACT, IMPROVED)) & (missed < self._near))
         if len(moved):
             q = q.copy()
@@ -228,9 +228,12 @@ class DecomposedArm:
             smallest[singular] = np.linalg.svd(jacobian, compute_uv=False)[:, -1]
         return q, missed, smallest
 
-    def _may_be_singular(self, q: Array) -> bool:
-        """False where the parts of a spherical wrist's label say that q (6,) is not; the singular value tells more."""
-        return self._wrist is None or min(map(abs, self._wrist.wrist.measures(q))) < REGULAR
+    def _may_be_singular(self, q: Array) -> Mask:
+        """False where the parts of a spherical wrist's label say that a row of q (n, 6) is not; the singular value
+        tells more."""
+        if self._wrist is None:
+            return np.ones(len(q), dtype=bool)
+        return np.asarray((np.abs(self._wrist.wrist.measures(q)) < REGULAR).any(axis=1))
 
     def _more_starts(self, q: Array, smallest: Array, near: Mask, T: Array) -> Array:
         """Starts (n, 6) around nearly singular ones of q (m, 6): of poses nearby, and along their weakest direction.

@@ -40,17 +40,17 @@ class JointAxes:
         for k in range(1, len(directions)):
             if np.linalg.norm(np.cross(self.directions[k - 1], self.directions[k])) < PARALLEL:
                 directions[k] = directions[k - 1] * np.sign(directions[k - 1] @ self.directions[k])
-        fixed = False
         for first in (len(points) - 3, 0):
             three = slice(first, first + 3)
             centre, distance = meeting_point(directions[three], points[three])
-            if distance < MEETING and not fixed:
-                points[three], fixed = centre, True
+            if distance < MEETING:
+                points[three] = centre
                 for k in range(first - 1, -1, -1):
                     _let_meet(directions, points, k, k + 1)
                 for k in range(first + 3, len(points)):
                     _let_meet(directions, points, k, k - 1)
-        if not fixed:
+                break
+        else:
             for k in range(len(points) - 1, 0, -1):
                 _let_meet(directions, points, k, k - 1)
         return JointAxes(directions, points, self.T_zero)

@@ -60,10 +60,7 @@ class RedundantCurve:
 
     def last_angle(self, parameter: Array) -> Array:
         """q7 (n,) [rad] at parameters (n,)."""
-        if self.whole:
-            return np.asarray(parameter, dtype=float)
-        a, b = self.interval
-        return np.asarray((a + b) / 2 - (b - a) / 2 * np.cos(parameter))
+        return _last_angle(np.asarray(parameter, dtype=float), np.array(self.interval), np.asarray(self.whole))
 
     def parameter(self, q: Array) -> float:
         """The parameter of the member nearest to q (7,), nearly: that with its last angle, then on along the tangent.
@@ -153,12 +150,18 @@ def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list
 def _judged(curves: Sequence[RedundantCurve], part: Array, q_min: Array, q_max: Array) -> tuple[Mask, Mask]:
     """Which parts (n, 3) may have members within the limits, and which have no others."""
     owner = part[:, 0].astype(int)
-    a, b = np.array([curve.interval for curve in curves])[owner].T
+    interval = np.array([curve.interval for curve in curves])[owner].T
     whole = np.array([curve.whole for curve in curves])[owner]
-    low, high = (np.where(whole, u, (a + b) / 2 - (b - a) / 2 * np.cos(u)) for u in (part[:, 1], part[:, 2]))
+    low, high = (_last_angle(u, interval, whole) for u in (part[:, 1], part[:, 2]))
     centre, half = boxes_of(curves[0].pose, Cells(low, high, np.array([curve.sheet for curve in curves])[owner]))
     middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
     away = np.abs(wrapped(centre - middle))
     held = (away <= width + half).all(axis=1)
     inside = ((away + half <= width) | (width >= np.pi)).all(axis=1)
     return np.asarray(held), np.asarray(inside)
+
+
+def _last_angle(u: Array, interval: Array, whole: Mask) -> Array:
+    """q7 (n,) [rad] at parameters u (n,) of curves over intervals (2,) or (2, n) [rad]."""
+    a, b = interval
+    return np.where(whole, u, (a + b) / 2 - (b - a) / 2 * np.cos(u))

@@ -11,7 +11,7 @@ a spherical wrist" (2014).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, sin, sqrt
+from math import atan2, hypot, sqrt
 
 import numpy as np
 
@@ -100,15 +100,18 @@ class SphericalWrist:
         measures = zip(("shoulder", "elbow", "wrist"), self.measures(q), strict=True)
         return tuple(part for part, value in measures if abs(value) < SINGULAR)
 
-    def measures(self, q: Array) -> tuple[float, float, float]:
-        """Distance [m] of the wrist ahead of the first axis, sines of elbow and wrist, at a configuration (6,) [rad].
+    def measures(self, q: Array) -> Array:
+        """Distance [m] of the wrist ahead of the first axis, sines of elbow and wrist (..., 3), at q (..., 6) [rad].
 
         Each is zero where its part of the label changes.
         """
-        first = self.upper[1] + self.turns[0] * q[1]
-        second = self.fore[1] + self.turns[0] * q[1] + self.turns[1] * q[2]
-        ahead = self.shoulder[0] + self.upper[0] * cos(first) + self.fore[0] * cos(second)
-        return float(ahead), sin(second - first), sin(self.bend + q[4])
+        lift = self.turns[0] * q[..., 1]
+        first, second = self.upper[1] + lift, self.fore[1] + lift + self.turns[1] * q[..., 2]
+        found = np.empty((*q.shape[:-1], 3))
+        found[..., 0] = self.shoulder[0] + self.upper[0] * np.cos(first) + self.fore[0] * np.cos(second)
+        found[..., 1] = np.sin(second - first)
+        found[..., 2] = np.sin(self.bend + q[..., 4])
+        return found
 
     def bent(self, sine: float, aligned: bool) -> Array:
         """The positions (2,) [rad] of the fifth joint with a wrist angle of this sine; one for no sine.

@@ -108,11 +108,12 @@ class WristGeometry:
         """
         tcp, lengths = T_last_tcp(self.arm), self._wrist_lengths
         angles = 2 * np.pi * np.arange(REACH_ANGLES) / REACH_ANGLES
-        last_two = self.placements[self.inner + 1] @ _about_z(angles) @ self.placements[self.inner + 2]
+        turns = link_frames(np.eye(4)[None], angles[:, None])[:, 1]
+        last_two = self.placements[self.inner + 1] @ turns @ self.placements[self.inner + 2]
         shells = []
         for s in ANCHORS if pose.half_angle < np.pi / 2 else (0.0,):
             anchor = tcp[:3, 3] + s * (tcp[:3, :3] @ pose.axis)
-            rotated = np.append(anchor, 1.0) @ _about_z(angles).transpose(0, 2, 1)
+            rotated = np.append(anchor, 1.0) @ turns.transpose(0, 2, 1)
             reach = np.linalg.norm((rotated @ last_two.transpose(0, 2, 1))[..., :3], axis=-1)
             length = float(np.linalg.norm(anchor))
             slack = np.pi / REACH_ANGLES * (2 * length + float(lengths[1])) + ROUNDING
@@ -158,8 +159,3 @@ def potential_rates(model: pin.Model, gravity: Array, links: int | None = None) 
         for j in range(k + 1):
             rates[j] += body.mass * (float(np.linalg.norm(body.lever)) + float(lengths[j:k].sum()))
     return np.asarray(rates * float(np.linalg.norm(gravity)))
-
-
-def _about_z(angle: Array) -> Array:
-    """Rotations (n, 4, 4) about z."""
-    return link_frames(np.eye(4)[None], angle[:, None])[:, 1]
