@@ -6,7 +6,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
 
-from models.robot import Array
+from models.capsule_cover import outside
+from models.robot import Array, LinkCapsule
 
 # m: places of the ends are rounded to this, the radius up to it
 DIGIT = 1e-5
@@ -49,6 +50,4 @@ def _volume(x: Array, points: Array) -> float:
 
 def _reach(axis: Array, points: Array) -> float:
     """Greatest distance [m] of points (n, 3) from a segment (2, 3)."""
-    begin, along = axis[0], axis[1] - axis[0]
-    share = np.clip((points - begin) @ along / max(float(along @ along), 1e-30), 0.0, 1.0)
-    return float(np.linalg.norm(points - begin - share[:, None] * along, axis=1).max())
+    return float(outside(points, [LinkCapsule(0, axis, 0.0)]).max())

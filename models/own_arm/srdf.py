@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from xml.etree import ElementTree
-
-from models.own_arm.description import InvalidArm
+from models.own_arm.robot_xml import robot_element
 
 
 def disabled_pairs(text: str) -> list[tuple[str, str]]:
@@ -12,12 +10,5 @@ def disabled_pairs(text: str) -> list[tuple[str, str]]:
 
     Such lists are found by sampling: they are taken as the user's word.
     """
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InvalidArm("srdf", "The SRDF has a document type: leave it out.")
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InvalidArm("srdf", f"The SRDF is not XML: {error}.") from None
-    if root.tag != "robot":
-        raise InvalidArm("srdf", "The root element of an SRDF is <robot>.")
+    root = robot_element(text, "srdf")
     return [(each.get("link1", ""), each.get("link2", "")) for each in root.iter("disable_collisions")]

@@ -24,7 +24,7 @@ class UprightChain:
     @staticmethod
     def of(chain: Chain) -> UprightChain:
         """The same arm with its frames turned."""
-        R = np.array([np.eye(3), *(_onto(axis) for axis in chain.axes)])
+        R = np.array([np.eye(3), *(turn_onto(axis) for axis in chain.axes)])
         # the base keeps its own axes, wherever it stands in the URDF
         turns = [pin.SE3(chain.T_base), *(pin.SE3(each, np.zeros(3)) for each in R[1:])]
         placements = list(chain.model.jointPlacements)[1:]
@@ -36,11 +36,11 @@ class UprightChain:
         )
 
 
-def _onto(axis: Array) -> Array:
+def turn_onto(axis: Array) -> Array:
     """The rotation (3, 3) of least angle that turns the z axis into a unit vector (3,)."""
     x, y, z = axis
     if z < -0.5:
         # about x by half a turn, and on from there
-        return np.asarray(np.diag([1.0, -1.0, -1.0]) @ _onto(np.array([x, -y, -z])))
+        return np.asarray(np.diag([1.0, -1.0, -1.0]) @ turn_onto(np.array([x, -y, -z])))
     v = np.array([[0.0, 0.0, x], [0.0, 0.0, y], [-x, -y, 0.0]])
     return np.asarray(np.eye(3) + v + v @ v / (1 + z))

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.own_arm.description import Description, InvalidArm
+from models.own_arm.robot_xml import number, numbers, robot_element
 from models.robot import Array
 
 MOST_JOINTS, MOST_ELEMENTS = 16, 5_000
@@ -24,6 +25,7 @@ CONTINUOUS = 2 * math.pi
 # angle [rad] from a quarter turn, and length [m], that are rounding: five digits of an angle, eleven of a length
 ROUNDED_ANGLE, ROUNDED_LENGTH, QUARTER = 5e-6, 1e-9, math.pi / 2
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+ORIGIN = "0 0 0"
 TURNING, FIXED = ("revolute", "continuous"), "fixed"
 
 
@@ -49,7 +51,6 @@ class Chain:
     q_max: Array
     v_max: Array
     tau_max: Array
-    base: str
     root: Element
 
     @property
@@ -140,18 +141,11 @@ class _Tree:
 
 def _parsed(text: str) -> Element:
     """The root element of a URDF."""
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        _refuse("urdf", "The URDF has a document type: leave it out.")
     # generated files still quote their macros in comments
     plain = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     if "<xacro:" in plain or "${" in plain:
         _refuse("urdf", "This is xacro: make a URDF of it first, by `xacro arm.urdf.xacro > arm.urdf`.")
-    try:
-        root = ElementTree.fromstring(_declared(text))
-    except (ElementTree.ParseError, ValueError) as error:
-        _refuse("urdf", f"The URDF is not XML: {error}.")
-    if root.tag != "robot":
-        _refuse("urdf", "The root element of a URDF is <robot>.")
+    root = robot_element(_declared(text), "urdf")
     if sum(1 for _ in root) > MOST_ELEMENTS:
         _refuse("urdf", f"The URDF has more than {MOST_ELEMENTS} links and joints.")
     return root
@@ -178,7 +172,7 @@ def _check_chain(moving: list[Element]) -> None:
         limit = joint.find("limit")
         if kind == "revolute" and (limit is None or "lower" not in limit.attrib or "upper" not in limit.attrib):
             _refuse("urdf", f"Joint {name!r} has no <limit> with `lower` and `upper`.")
-        if kind == "revolute" and not _number(limit, "lower", name) < _number(limit, "upper", name):
+        if kind == "revolute" and not _limit(joint, "lower") < _limit(joint, "upper"):
             _refuse("urdf", f"Joint {name!r} cannot move, its lower limit being no less than the upper: make it fixed.")
 
 
@@ -236,7 +230,7 @@ def _merged(
     axes = np.array([_axis(joint) for joint in moving])
     return Chain(
         model, tuple(names), tuple(_end(joint, "child") for joint in moving), tuple(map(tuple, rigid)),
-        axes, ends[0].homogeneous, ends[1].homogeneous, q_min, q_max, v_max, tau_max, base, root,
+        axes, ends[0].homogeneous, ends[1].homogeneous, q_min, q_max, v_max, tau_max, root,
     )  # fmt: skip
 
 
@@ -246,16 +240,10 @@ def _check_inertials(root: Element, names: list[str]) -> None:
         for inertial in link.findall("inertial"):
             what = f"The <inertial> of link {_name(link)!r} has"
             for part, attributes in (("mass", ("value",)), ("inertia", TENSOR)):
-                element = inertial.find(part)
                 for attribute in attributes:
-                    text = "" if element is None else element.get(attribute, "")
-                    _finite(text, f"{what} a <{part}> with `{attribute}`")
-            origin = inertial.find("origin")
+                    number(inertial.find(part), attribute, f"{what} a <{part}>")
             for part in ("xyz", "rpy"):
-                texts = "0 0 0" if origin is None else origin.get(part, "0 0 0")
-                values = [_finite(text, f"{what} an <origin> with `{part}`") for text in texts.split()]
-                if len(values) != 3:
-                    _refuse("urdf", f"{what} an <origin> whose `{part}` is not three numbers.")
+                numbers(inertial.find("origin"), part, f"{what} an <origin>", ORIGIN)
 
 
 def _snap(joint: Element) -> None:
@@ -267,47 +255,32 @@ def _snap(joint: Element) -> None:
     for part, unit, near in (("rpy", QUARTER, ROUNDED_ANGLE), ("xyz", math.inf, ROUNDED_LENGTH)):
         if origin is None or part not in origin.attrib:
             continue
-        values = [_finite(text, f"Joint {_name(joint)!r} has an <origin>") for text in origin.get(part, "").split()]
+        values = numbers(origin, part, f"Joint {_name(joint)!r} has an <origin>").tolist()
         snapped = [0.0 if math.isinf(unit) else round(value / unit) * unit for value in values]
         kept = (there if abs(there - value) < near else value for value, there in zip(values, snapped, strict=True))
         origin.set(part, " ".join(map(repr, kept)))
 
 
-def _finite(text: str, what: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        _refuse("urdf", f"{what} that is no finite number.")
-    return value
-
-
 def _range(joint: Element) -> tuple[float, float, float, float]:
     """Least and greatest position, greatest speed and torque; 0 where the URDF has none."""
-    limit, name = joint.find("limit"), _name(joint)
     ends = (-CONTINUOUS, CONTINUOUS)
     if joint.get("type") == "revolute":
-        ends = _number(limit, "lower", name), _number(limit, "upper", name)
-    speed, torque = (abs(_number(limit, part, name)) for part in ("velocity", "effort"))
+        ends = _limit(joint, "lower"), _limit(joint, "upper")
+    speed, torque = (abs(_limit(joint, part)) for part in ("velocity", "effort"))
     return *ends, speed, torque
 
 
 def _axis(joint: Element) -> Array:
     """Unit vector (3,) that a joint turns about, in its frame; x if the URDF names none."""
     element = joint.find("axis")
-    try:
-        axis = np.array([float(part) for part in ("1 0 0" if element is None else element.get("xyz", "")).split()])
-    except ValueError:
-        axis = np.zeros(0)
-    if axis.shape != (3,) or not np.isfinite(axis).all() or not np.linalg.norm(axis) > 0:
-        _refuse("urdf", f"Joint {_name(joint)!r} has an <axis> that is no vector of three numbers.")
+    axis = numbers(element, "xyz", f"Joint {_name(joint)!r} has an <axis>", "1 0 0" if element is None else "")
+    if not np.linalg.norm(axis) > 0:
+        _refuse("urdf", f"Joint {_name(joint)!r} has an <axis> of no length.")
     return np.asarray(axis / np.linalg.norm(axis))
 
 
-def _number(limit: Element | None, part: str, joint: str) -> float:
-    text = "0" if limit is None else limit.get(part, "0")
-    return _finite(text, f"Joint {joint!r} has a limit `{part}`")
+def _limit(joint: Element, part: str) -> float:
+    return number(joint.find("limit"), part, f"Joint {_name(joint)!r} has a <limit>", "0")
 
 
 def _end(joint: Element, side: str) -> str:

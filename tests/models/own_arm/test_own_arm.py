@@ -269,6 +269,9 @@ def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
 
 
 WITHOUT_MASS = {"urdf": RICH.replace('<mass value="0.8"/>', '<mass value="0"/>').replace('value="0.1"', 'value="0"')}
+BALL_JOINT = (
+    '<link name="world"/><link name="y"/><joint name="x" type="ball"><parent link="world"/><child link="y"/></joint>'
+)
 LOOP = change('link="forearm"/><child link="wrist"', 'link="finger"/><child link="wrist"')
 WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "is not XML", {"urdf": "<robot"}),
@@ -294,7 +297,7 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "hangs on two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
     ("urdf", "in a loop: hand, wrist, ", LOOP),
     ("urdf", "one root link", change('<link name="world"/>', '<link name="world"/><link name="island"/>')),
-    ("urdf", "no vector", change('xyz="0 0 -2"', 'xyz="0 0 0"')),
+    ("urdf", "<axis> of no length", change('xyz="0 0 -2"', 'xyz="0 0 0"')),
     ("urdf", "'wrist', with what is fixed to it, has no mass", WITHOUT_MASS),
     ("urdf", "'flange_arm' has an impossible inertia", change('izz="0.015"', 'izz="0.09"')),
     ("urdf", "negative principal moment", change('ixx="0.02" ixy="0.001"', 'ixx="0.02" ixy="0.1"')),
@@ -317,7 +320,8 @@ WRONG: list[tuple[str, str, dict[str, Any]]] = [
     ("urdf", "within 100 rad", change('lower="-2" upper="2.5"', 'lower="-180" upper="180"')),
     ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
     ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
-    ("urdf", "Pinocchio does not read", change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>')),
+    ("urdf", "3 finite numbers", change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>')),
+    ("urdf", "Pinocchio does not read", change('<link name="world"/>', BALL_JOINT)),
     ("urdf", "farther than 50 m", change('<origin xyz="0 0 0.1"/>', '<origin xyz="1e308 0 0"/>')),
     ("urdf", "3 finite numbers", change('size="0.1 0.1 0.3"', 'size="0.1 0.1"')),
 ]  # fmt: skip

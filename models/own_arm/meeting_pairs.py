@@ -1,0 +1,49 @@
+"""Pairs of links whose capsules are hardly ever apart: to compare them would make every motion a collision."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from models.own_arm.link_shapes import Rows
+from models.own_arm.upright import UprightChain, turn_onto
+from models.own_arm.urdf_chain import Chain
+
+# random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart
+SAMPLES, ALWAYS = 300, 0.95
+
+
+def pairs_that_meet(chain: Chain, upright: UprightChain, capsules: list[Rows]) -> list[list[int]]:
+    """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration."""
+    pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
+    meets = np.zeros(len(pairs))
+    shapes = [[(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules]
+    request = coal.CollisionRequest()
+    for q in np.random.default_rng(0).uniform(chain.q_min, chain.q_max, (SAMPLES, chain.nq)):
+        frames = [pin.SE3.Identity()]
+        for angle, placement in zip(q, upright.placements, strict=True):
+            frames.append(frames[-1] * placement * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3)))
+        for k, pair in enumerate(pairs):
+            first, second = ([(shape, _pose(frames[i] * at)) for shape, at in shapes[i]] for i in pair)
+            meets[k] += any(
+                coal.collide(a, T_a, b, T_b, request, coal.CollisionResult()) for a, T_a in first for b, T_b in second
+            )
+    return [list(pair) for pair, count in zip(pairs, meets, strict=True) if count >= ALWAYS * SAMPLES]
+
+
+def _length(row: list[float]) -> float:
+    return float(np.linalg.norm(np.array(row[3:6]) - row[:3]))
+
+
+def _middle(row: list[float]) -> pin.SE3:
+    """The frame of a capsule: its z axis along the capsule's."""
+    begin, end, length = np.array(row[:3]), np.array(row[3:6]), _length(row)
+    turn = np.eye(3) if length == 0 else turn_onto((end - begin) / length)
+    return pin.SE3(turn, (begin + end) / 2)
+
+
+def _pose(T: pin.SE3) -> coal.Transform3s:
+    return coal.Transform3s(np.ascontiguousarray(T.rotation), np.ascontiguousarray(T.translation))

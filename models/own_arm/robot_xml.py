@@ -1,0 +1,49 @@
+"""Reading a URDF or SRDF: a `<robot>` element, and the numbers in its attributes."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from models.own_arm.description import InvalidArm
+from models.robot import Array
+
+
+def robot_element(text: str, field: str) -> Element:
+    """The root element of a description, `field` being "urdf" or "srdf". Raises InvalidArm."""
+    kind = field.upper()
+    # entities may grow without end
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InvalidArm(field, f"The {kind} has a document type: leave it out.")
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InvalidArm(field, f"The {kind} is not XML: {error}.") from None
+    if root.tag != "robot":
+        raise InvalidArm(field, f"The root element of {'an' if kind == 'SRDF' else 'a'} {kind} is <robot>.")
+    return root
+
+
+def numbers(element: Element | None, part: str, where: str, default: str = "", count: int = 3) -> Array:
+    """The numbers (count,) of an attribute, or of `default` where element or attribute is not there.
+
+    Raises InvalidArm unless there are `count`, all finite; its message starts with `where`, e.g. "Joint 'a' has an
+    <axis>".
+    """
+    text = default if element is None else element.get(part, default)
+    try:
+        values = np.array([float(each) for each in text.split()])
+    except ValueError:
+        values = np.zeros(0)
+    if values.shape != (count,) or not np.isfinite(values).all():
+        no_such = "no finite number" if count == 1 else f"not {count} finite numbers"
+        raise InvalidArm("urdf", f"{where} with a `{part}` that is {no_such}.")
+    return values
+
+
+def number(element: Element | None, part: str, where: str, default: str = "") -> float:
+    """The one number of an attribute: see `numbers`."""
+    (value,) = numbers(element, part, where, default, 1)
+    return float(value)
