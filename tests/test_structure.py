@@ -21,6 +21,12 @@ def sources() -> list[Path]:
     return [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
 
 
+def all_sources() -> list[Path]:
+    """Those, and the tests, benchmarks, examples and scripts."""
+    others = ("tests", "benchmarks", "examples", "scripts")
+    return [*sources(), *(path for folder in others for path in sorted((ROOT / folder).rglob("*.py")))]
+
+
 def rooms() -> list[Path]:
     """Every folder of the three packages that holds Python files."""
     return sorted({path.parent for path in sources()})
@@ -50,12 +56,12 @@ def test_a_room_says_in_one_line_what_it_is_for(room: Path) -> None:
         assert not others, f"{name(init)} says more than one line"
 
 
-@pytest.mark.parametrize("path", sources(), ids=name)
+@pytest.mark.parametrize("path", all_sources(), ids=name)
 def test_no_file_is_long(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= MOST_LINES
 
 
-@pytest.mark.parametrize("path", sources(), ids=name)
+@pytest.mark.parametrize("path", all_sources(), ids=name)
 def test_no_function_is_long(path: Path) -> None:
     long = {f"{node.name}: {length} lines" for node, length in functions(path) if length > MOST_FUNCTION_LINES}
     assert not long

@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 
 from app.schemas.examples.own_arm import URDF
-from tests.app.cli.test_cli import Here, here, run
+from tests.app.cli.console import Here, run
 from tests.app.requests import PATIENT
 
-__all__ = ["here"]
 MOVE = {"robot": "cell_arm", "start": {"q": [0.2, 0.4]}, "goal": {"q": [-0.9, 1.3]}, **PATIENT}
 
 

@@ -21,7 +21,7 @@ from models.own_arm.figures import own_figures
 from models.own_arm.mesh_files import corners, in_folder, in_zip
 from models.registry import load_robot
 from models.robot import Array, LinkCapsule
-from tests.models.own_arm.test_own_arm import RICH, RICH_ARM, robot
+from tests.models.own_arm.arms import RICH, RICH_ARM, robot
 from tests.models.test_capsule_cover import meshes as arm_folder
 
 NAMED = RICH.replace('"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"')

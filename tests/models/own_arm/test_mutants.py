@@ -11,7 +11,7 @@ import pytest
 from models.from_figures import robot_of
 from models.own_arm.description import InvalidArm
 from models.own_arm.figures import own_figures
-from tests.models.own_arm.test_own_arm import RICH, RICH_ARM
+from tests.models.own_arm.arms import RICH, RICH_ARM
 from tests.selection import long_but
 
 NUMBERS = ("0", "-1", "1e308", "-1e308", "1e-308", "nan", "inf", "", "a", "1 2", "1e5", "9" * 400, "0x10", "1,5")

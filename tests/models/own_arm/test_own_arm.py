@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
@@ -16,77 +14,15 @@ from models.from_figures import robot_of
 from models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
 from models.own_arm.figures import own_figures
 from models.registry import load_robot
-from models.robot import Array, Robot
+from models.robot import Array
 from models.trust import energy_trust
 from optimizer import Arm, Problem, optimize
 from optimizer.kinematics.ur_closed_form import URClosedForm
+from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
 from tests.models.test_capsule_cover import meshes as arm_folder
 
 # lengths of about 1 m and torques of some 100 N·m, both by sums of a hundred products
 EXACT, TORQUE = 1e-14, 1e-11
-AMPLE = 300.0
-PLAIN = Description(urdf=URDF, tip="tool", acceleration=8.0, payload=2.0)
-# an arm with all that a URDF may have: axes off z, a joint without end, fixed bodies with mass, a gripper, a link named
-# as ours are, a joint named as its link, a prefix that nobody declared, boxes and spheres
-RICH = """<robot name="rich">
-  <link name="world"/><link name="pedestal"/><link name="elbow"/><link name="hand"/>
-  <joint name="fixed_1" type="fixed"><parent link="world"/><child link="pedestal"/>
-    <origin xyz="0.1 -0.2 0.5" rpy="0.1 0.2 0.3"/></joint>
-  <joint name="pan" type="continuous" tool:note="endless"><parent link="pedestal"/><child link="flange_arm"/>
-    <origin xyz="0 0 0.1" rpy="0 0 0.4"/><axis xyz="0 0 -2"/><limit effort="40" velocity="2"/></joint>
-  <link name="flange_arm"><inertial><origin xyz="0.02 0.01 0.1" rpy="0.1 0.5 -0.2"/><mass value="2.5"/>
-    <inertia ixx="0.02" ixy="0.001" ixz="0.002" iyy="0.03" iyz="-0.001" izz="0.015"/></inertial>
-    <collision><origin xyz="0 0 0.1"/><geometry><box size="0.1 0.1 0.3"/></geometry></collision></link>
-  <joint name="elbow" type="revolute"><parent link="flange_arm"/><child link="elbow"/>
-    <origin xyz="0.05 0 0.3" rpy="1.5707963267948966 0.3 0"/><axis xyz="1 1 0.5"/>
-    <limit lower="-2" upper="2.5" effort="30" velocity="2.5"/></joint>
-  <joint name="bracket" type="fixed"><parent link="elbow"/><child link="forearm"/>
-    <origin xyz="0 0.05 0.1" rpy="0 1.5707963267948966 0"/></joint>
-  <link name="forearm"><inertial><origin xyz="0.1 0 0"/><mass value="1.5"/>
-    <inertia ixx="0.004" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>
-    <collision><origin xyz="0.1 0 0" rpy="0 1.57 0"/><geometry><cylinder radius="0.04" length="0.2"/></geometry>
-    </collision><collision><geometry><mesh filename="forearm.stl"/></geometry></collision></link>
-  <joint name="twist" type="revolute"><parent link="forearm"/><child link="wrist"/>
-    <origin xyz="0.25 0 0"/><limit lower="-3" upper="3" effort="12" velocity="4"/></joint>
-  <link name="wrist"><inertial><mass value="0.8"/>
-    <inertia ixx="0.002" ixy="0" ixz="0" iyy="0.002" iyz="0" izz="0.001"/></inertial>
-    <collision><geometry><sphere radius="0.05"/></geometry></collision></link>
-  <joint name="mount" type="fixed"><parent link="wrist"/><child link="hand"/><origin xyz="0.1 0 0" rpy="0 1.2 0"/>
-  </joint>
-  <joint name="finger" type="prismatic"><parent link="hand"/><child link="finger"/><origin xyz="0 0 0.08"/>
-    <axis xyz="0 1 0"/><limit lower="0" upper="0.05" effort="20" velocity="0.1"/></joint>
-  <link name="finger"><inertial><origin xyz="0 0 0.02"/><mass value="0.1"/>
-    <inertia ixx="0.0001" ixy="0" ixz="0" iyy="0.0001" iyz="0" izz="0.00005"/></inertial></link>
-</robot>"""
-HELD = {"finger": 0.03}
-RICH_ARM = Description(urdf=RICH, tip="hand", base="pedestal", acceleration=5.0, payload=1.0, locked=HELD)
-
-
-def robot(description: Description) -> Robot:
-    return robot_of("mine", own_figures("mine", description)[0])
-
-
-def whole(urdf: str, held: dict[str, float], joints: tuple[str, ...]) -> tuple[pin.Model, Array, Array]:
-    """Pinocchio's model of all of a URDF, its neutral position with held joints, and the indices of the others."""
-    root = ElementTree.fromstring(urdf.replace("tool:note", "note"))
-    for joint in root.findall("joint"):
-        joint.set("name", f"joint_{joint.get('name')}")
-        if joint.get("type") == "continuous":
-            joint.set("type", "revolute")
-            limit = joint.find("limit")
-            assert limit is not None
-            limit.attrib |= {"lower": "-7", "upper": "7"}
-    model = pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"))
-    q = pin.neutral(model)
-    for name, position in held.items():
-        q[model.joints[model.getJointId(f"joint_{name}")].idx_q] = position
-    return model, q, np.array([model.joints[model.getJointId(f"joint_{name}")].idx_q for name in joints])
-
-
-def refused(field: str, words: str, description: Description) -> None:
-    with pytest.raises(InvalidArm, match=words) as found:
-        own_figures("mine", description)
-    assert found.value.field == field
 
 
 @pytest.mark.parametrize(
@@ -263,84 +199,6 @@ def test_names_that_stand_for_the_ends_of_every_robot() -> None:
         assert robot_of("mine", figures).nq == 3
 
 
-def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
-    assert old in urdf
-    return {"urdf": urdf.replace(old, new)}
-
-
-WITHOUT_MASS = {"urdf": RICH.replace('<mass value="0.8"/>', '<mass value="0"/>').replace('value="0.1"', 'value="0"')}
-BALL_JOINT = (
-    '<link name="world"/><link name="y"/><joint name="x" type="ball"><parent link="world"/><child link="y"/></joint>'
-)
-LOOP = change('link="forearm"/><child link="wrist"', 'link="finger"/><child link="wrist"')
-WRONG: list[tuple[str, str, dict[str, Any]]] = [
-    ("urdf", "is not XML", {"urdf": "<robot"}),
-    ("urdf", "root element", {"urdf": "<sdf/>"}),
-    ("urdf", "no <link>", {"urdf": "<robot/>"}),
-    ("urdf", "xacro", change("<link name=", "<xacro:macro/><link name=")),
-    ("urdf", "xacro", change('"0.25 0 0"', '"${length} 0 0"')),
-    ("urdf", "document type", {"urdf": '<!DOCTYPE r [<!ENTITY a "b">]>' + RICH}),
-    ("tip", "no link 'nowhere'", {"tip": "nowhere"}),
-    ("base", "no link 'nowhere'", {"base": "nowhere"}),
-    ("tip", "not carried by the base 'hand'", {"tip": "forearm", "base": "hand"}),
-    ("tip", "0 joints move", {"tip": "pedestal", "base": "world"}),
-    ("locked", "no joint 'thumb'", {"locked": {"thumb": 0.0}}),
-    ("locked", "'finger' moves a link beside", {"locked": None}),
-    ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
-    ("urdf", "'twist' mimics", change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="pan"/>')),
-    ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
-    ("urdf", "'elbow' cannot move", change('lower="-2" upper="2.5"', 'lower="1" upper="1"')),
-    ("urdf", "`upper` that is no finite number", change('upper="2.5"', 'upper="inf"')),
-    ("urdf", "Two links", change('name="wrist"', 'name="hand"')),
-    ("urdf", "Two joints", change('"twist"', '"pan"')),
-    ("urdf", "that the URDF does not have", change('<child link="wrist"/>', '<child link="wirst"/>')),
-    ("urdf", "hangs on two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
-    ("urdf", "in a loop: hand, wrist, ", LOOP),
-    ("urdf", "one root link", change('<link name="world"/>', '<link name="world"/><link name="island"/>')),
-    ("urdf", "<axis> of no length", change('xyz="0 0 -2"', 'xyz="0 0 0"')),
-    ("urdf", "'wrist', with what is fixed to it, has no mass", WITHOUT_MASS),
-    ("urdf", "'flange_arm' has an impossible inertia", change('izz="0.015"', 'izz="0.09"')),
-    ("urdf", "negative principal moment", change('ixx="0.02" ixy="0.001"', 'ixx="0.02" ixy="0.1"')),
-    ("torque", "Joint 'elbow' has no limit `effort`", change('effort="30"', 'effort="0"')),
-    ("velocity", "Joint 'pan' has no limit `velocity`", change(' velocity="2"/>', "/>")),
-    ("torque", "a list of 3, one per joint: pan, elbow, twist", {"torque": (1.0, 2.0)}),
-    ("torque", "joint 'elbow' must be from 1e-06", {"torque": (1.0, 0.0, 1.0)}),
-    ("acceleration", "from 1e-06 to 1e\\+06", {"acceleration": 1e-300}),
-    ("payload", "from 0 to 10000 kg", {"payload": -1.0}),
-    ("drives.copper", "from 1e-06", {"drives": Drives(copper=-1.0)}),
-    ("electronics.regeneration", "at most 1", {"electronics": Electronics(regeneration=1.5)}),
-    ("default_motion", "above 0", {"default_motion": Motion(0.0, 1.0)}),
-    ("collision.radius", "below 1 m", {"collision": Collision(radius=2.0)}),
-    ("collision.capsules", "no link 'tail'", {"collision": Collision({"tail": ()})}),
-    ("collision.capsules", "radius above 0", {"collision": Collision({"wrist": ((0.0,) * 7,)})}),
-    ("collision.never_meet", "no link 'tail'", {"collision": Collision(never_meet=(("tail", "wrist"),))}),
-    ("drives.viscous", "0, or from 1e-06", {"drives": Drives(viscous=-1.0)}),
-    ("urdf", "are its units SI", change('<mass value="2.5"/>', '<mass value="2.5e300"/>')),
-    ("urdf", "are its units SI", change('<origin xyz="0.25 0 0"/>', '<origin xyz="250 0 0"/>')),
-    ("urdf", "within 100 rad", change('lower="-2" upper="2.5"', 'lower="-180" upper="180"')),
-    ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
-    ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
-    ("urdf", "3 finite numbers", change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>')),
-    ("urdf", "Pinocchio does not read", change('<link name="world"/>', BALL_JOINT)),
-    ("urdf", "farther than 50 m", change('<origin xyz="0 0 0.1"/>', '<origin xyz="1e308 0 0"/>')),
-    ("urdf", "3 finite numbers", change('size="0.1 0.1 0.3"', 'size="0.1 0.1"')),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("field", "words", "changes"), WRONG, ids=[words for _, words, _ in WRONG])
-def test_what_makes_no_robot_is_named(field: str, words: str, changes: dict[str, Any]) -> None:
-    refused(field, words, dataclasses.replace(RICH_ARM, **changes))
-
-
-def test_what_is_hardly_real_is_remarked() -> None:
-    small = change('<mass value="1.5"/>', '<mass value="150"/>')
-    _, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, **small))
-    assert "Link 'elbow': its radius of gyration" in warnings[0]
-    rounded = change('izz="0.015"', 'izz="0.0515"')
-    _, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, **rounded))
-    assert "Link 'flange_arm': a principal moment is" in warnings[0]
-
-
 def test_a_file_is_read(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     file = tmp_path / "my_arm.yaml"
@@ -356,24 +214,3 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     assert load_robot(file).never_in_collision == {(0, 2)}
     with pytest.raises(OSError, match=r"other\.yaml"):
         load_robot(tmp_path / "other.yaml")
-
-
-@pytest.mark.parametrize(
-    ("text", "field", "words"),
-    [
-        ("urdf: [", "", "no description in YAML"),
-        ("- 1", "", "object"),
-        ("urdf: arm.urdf\ntip: tool\nacceleration: 8", "payload", "required"),
-        ("urdf: none.urdf\ntip: tool\nacceleration: 8\npayload: 2", "urdf", "There is no file"),
-        ("urdf: arm.urdf\ntip: tool\nacceleration: fast\npayload: 2", "acceleration", "number"),
-        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: .nan", "payload", "finite"),
-        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\nmass: 3", "mass", "Unexpected"),
-        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\ndrives: {copper: x}", "drives.copper", "number"),
-    ],
-)
-def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, field: str, words: str) -> None:
-    (tmp_path / "arm.urdf").write_text(URDF)
-    (tmp_path / "my_arm.yaml").write_text(text)
-    with pytest.raises(InvalidArm, match=words) as found:
-        load_robot(tmp_path / "my_arm.yaml")
-    assert found.value.field == field

@@ -1,0 +1,120 @@
+"""What makes no robot is refused, with the link or joint named; what is hardly real is remarked."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.schemas.examples.own_arm import URDF
+from models.own_arm.description import Collision, Drives, Electronics, InvalidArm, Motion
+from models.own_arm.figures import own_figures
+from models.registry import load_robot
+from tests.models.own_arm.arms import RICH, RICH_ARM, refused
+
+
+def change(old: str, new: str, urdf: str = RICH) -> dict[str, Any]:
+    assert old in urdf
+    return {"urdf": urdf.replace(old, new)}
+
+
+WITHOUT_MASS = {"urdf": RICH.replace('<mass value="0.8"/>', '<mass value="0"/>').replace('value="0.1"', 'value="0"')}
+
+
+BALL_JOINT = (
+    '<link name="world"/><link name="y"/><joint name="x" type="ball"><parent link="world"/><child link="y"/></joint>'
+)
+
+
+LOOP = change('link="forearm"/><child link="wrist"', 'link="finger"/><child link="wrist"')
+
+
+WRONG: list[tuple[str, str, dict[str, Any]]] = [
+    ("urdf", "is not XML", {"urdf": "<robot"}),
+    ("urdf", "root element", {"urdf": "<sdf/>"}),
+    ("urdf", "no <link>", {"urdf": "<robot/>"}),
+    ("urdf", "xacro", change("<link name=", "<xacro:macro/><link name=")),
+    ("urdf", "xacro", change('"0.25 0 0"', '"${length} 0 0"')),
+    ("urdf", "document type", {"urdf": '<!DOCTYPE r [<!ENTITY a "b">]>' + RICH}),
+    ("tip", "no link 'nowhere'", {"tip": "nowhere"}),
+    ("base", "no link 'nowhere'", {"base": "nowhere"}),
+    ("tip", "not carried by the base 'hand'", {"tip": "forearm", "base": "hand"}),
+    ("tip", "0 joints move", {"tip": "pedestal", "base": "world"}),
+    ("locked", "no joint 'thumb'", {"locked": {"thumb": 0.0}}),
+    ("locked", "'finger' moves a link beside", {"locked": None}),
+    ("urdf", "'finger' is prismatic", {"tip": "finger", "locked": None}),
+    ("urdf", "'twist' mimics", change('<origin xyz="0.25 0 0"/>', '<origin xyz="0.25 0 0"/><mimic joint="pan"/>')),
+    ("urdf", "'elbow' has no <limit>", change('lower="-2" upper="2.5" ', "")),
+    ("urdf", "'elbow' cannot move", change('lower="-2" upper="2.5"', 'lower="1" upper="1"')),
+    ("urdf", "`upper` that is no finite number", change('upper="2.5"', 'upper="inf"')),
+    ("urdf", "Two links", change('name="wrist"', 'name="hand"')),
+    ("urdf", "Two joints", change('"twist"', '"pan"')),
+    ("urdf", "that the URDF does not have", change('<child link="wrist"/>', '<child link="wirst"/>')),
+    ("urdf", "hangs on two joints", change('<child link="finger"/>', '<child link="wrist"/>')),
+    ("urdf", "in a loop: hand, wrist, ", LOOP),
+    ("urdf", "one root link", change('<link name="world"/>', '<link name="world"/><link name="island"/>')),
+    ("urdf", "<axis> of no length", change('xyz="0 0 -2"', 'xyz="0 0 0"')),
+    ("urdf", "'wrist', with what is fixed to it, has no mass", WITHOUT_MASS),
+    ("urdf", "'flange_arm' has an impossible inertia", change('izz="0.015"', 'izz="0.09"')),
+    ("urdf", "negative principal moment", change('ixx="0.02" ixy="0.001"', 'ixx="0.02" ixy="0.1"')),
+    ("torque", "Joint 'elbow' has no limit `effort`", change('effort="30"', 'effort="0"')),
+    ("velocity", "Joint 'pan' has no limit `velocity`", change(' velocity="2"/>', "/>")),
+    ("torque", "a list of 3, one per joint: pan, elbow, twist", {"torque": (1.0, 2.0)}),
+    ("torque", "joint 'elbow' must be from 1e-06", {"torque": (1.0, 0.0, 1.0)}),
+    ("acceleration", "from 1e-06 to 1e\\+06", {"acceleration": 1e-300}),
+    ("payload", "from 0 to 10000 kg", {"payload": -1.0}),
+    ("drives.copper", "from 1e-06", {"drives": Drives(copper=-1.0)}),
+    ("electronics.regeneration", "at most 1", {"electronics": Electronics(regeneration=1.5)}),
+    ("default_motion", "above 0", {"default_motion": Motion(0.0, 1.0)}),
+    ("collision.radius", "below 1 m", {"collision": Collision(radius=2.0)}),
+    ("collision.capsules", "no link 'tail'", {"collision": Collision({"tail": ()})}),
+    ("collision.capsules", "radius above 0", {"collision": Collision({"wrist": ((0.0,) * 7,)})}),
+    ("collision.never_meet", "no link 'tail'", {"collision": Collision(never_meet=(("tail", "wrist"),))}),
+    ("drives.viscous", "0, or from 1e-06", {"drives": Drives(viscous=-1.0)}),
+    ("urdf", "are its units SI", change('<mass value="2.5"/>', '<mass value="2.5e300"/>')),
+    ("urdf", "are its units SI", change('<origin xyz="0.25 0 0"/>', '<origin xyz="250 0 0"/>')),
+    ("urdf", "within 100 rad", change('lower="-2" upper="2.5"', 'lower="-180" upper="180"')),
+    ("velocity", "from 1e-06", change('velocity="2.5"', 'velocity="1e30"')),
+    ("urdf", "`iyz` that is no finite number", change('iyy="0.01" iyz="0"', 'iyy="0.01"')),
+    ("urdf", "3 finite numbers", change('<origin xyz="0.1 0 0" rpy="0 1.2 0"/>', '<origin xyz="0.1 0"/>')),
+    ("urdf", "Pinocchio does not read", change('<link name="world"/>', BALL_JOINT)),
+    ("urdf", "farther than 50 m", change('<origin xyz="0 0 0.1"/>', '<origin xyz="1e308 0 0"/>')),
+    ("urdf", "3 finite numbers", change('size="0.1 0.1 0.3"', 'size="0.1 0.1"')),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("field", "words", "changes"), WRONG, ids=[words for _, words, _ in WRONG])
+def test_what_makes_no_robot_is_named(field: str, words: str, changes: dict[str, Any]) -> None:
+    refused(field, words, dataclasses.replace(RICH_ARM, **changes))
+
+
+def test_what_is_hardly_real_is_remarked() -> None:
+    small = change('<mass value="1.5"/>', '<mass value="150"/>')
+    _, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, **small))
+    assert "Link 'elbow': its radius of gyration" in warnings[0]
+    rounded = change('izz="0.015"', 'izz="0.0515"')
+    _, warnings = own_figures("mine", dataclasses.replace(RICH_ARM, **rounded))
+    assert "Link 'flange_arm': a principal moment is" in warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "words"),
+    [
+        ("urdf: [", "", "no description in YAML"),
+        ("- 1", "", "object"),
+        ("urdf: arm.urdf\ntip: tool\nacceleration: 8", "payload", "required"),
+        ("urdf: none.urdf\ntip: tool\nacceleration: 8\npayload: 2", "urdf", "There is no file"),
+        ("urdf: arm.urdf\ntip: tool\nacceleration: fast\npayload: 2", "acceleration", "number"),
+        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: .nan", "payload", "finite"),
+        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\nmass: 3", "mass", "Unexpected"),
+        ("urdf: arm.urdf\ntip: tool\nacceleration: 8\npayload: 2\ndrives: {copper: x}", "drives.copper", "number"),
+    ],
+)
+def test_what_is_wrong_in_a_file_is_named(tmp_path: Path, text: str, field: str, words: str) -> None:
+    (tmp_path / "arm.urdf").write_text(URDF)
+    (tmp_path / "my_arm.yaml").write_text(text)
+    with pytest.raises(InvalidArm, match=words) as found:
+        load_robot(tmp_path / "my_arm.yaml")
+    assert found.value.field == field

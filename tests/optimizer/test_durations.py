@@ -1,0 +1,183 @@
+"""Durations that are given, chosen or impossible; deadlines; and what else cannot be done."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optimizer.certificate import certify
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.exceptions import (
+    DeadlineExceeded,
+    DurationTooShort,
+    InvalidProblem,
+    NoTrajectory,
+    TorqueInfeasible,
+    UnreachablePose,
+)
+from optimizer.optimize import optimize
+from optimizer.problem.arm import Payload
+from optimizer.problem.pose import Pose
+from optimizer.search.reserve import RESERVE
+from optimizer.solution import Certificate
+from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, assert_true, shortest, solved
+from tests.optimizer.clocks import LAST_READINGS, CountingClock
+from tests.optimizer.moves import (
+    GOAL,
+    PAYLOAD,
+    ROBOT,
+    START,
+    fixed,
+    limits,
+    problem,
+    random_moves,
+    tcp_pose,
+    torques,
+)
+from tests.selection import long_but
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compiled() -> None:
+    compile_kernel(ROBOT)
+
+
+@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+@pytest.mark.parametrize(
+    ("objective", "duration"),
+    long_but(
+        [("mechanical", 2.345), *(("electrical", duration) for duration in (0.74, 2.345, 7.0))],
+        product(("electrical", "mechanical"), (0.74, 1.1, 2.345, 7.0)),
+    ),
+)
+def test_fixed_durations_are_kept_exactly(objective: str, duration: float, method: str) -> None:
+    assert solved(problem(objective=objective, method=method, **fixed(duration))).duration == duration
+
+
+@pytest.mark.parametrize("method", ["bspline", "time_scaling"])
+def test_duration_bounds_are_kept(method: str) -> None:
+    """To the last digit, where the best duration lies outside them; inside, they change nothing."""
+    best = solved(problem(method=method)).duration
+    slow = solved(problem(method=method, duration_min=1.3 * best)).duration
+    assert 1.3 * best <= slow < 1.3 * best * (1 + CONVERGED)
+    wide = solved(problem(method=method, duration_min=0.5 * best, duration_max=2 * best)).duration
+    assert wide == pytest.approx(best, rel=0.01)  # the energy is flat in the duration
+    cheap = CONDITIONS["idles cheaply"]
+    leisurely = solved(problem(method=method, **cheap)).duration
+    capped = solved(problem(method=method, duration_max=0.8 * leisurely, **cheap)).duration
+    assert 0.8 * leisurely * (1 - 0.02) < capped <= 0.8 * leisurely
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {},
+        {"method": "time_scaling"},
+        {"limits": limits(v_max=0.8)},
+        {"payload": PAYLOAD, "limits": limits(tau_max=[60, 100, 60, 14, 14, 14])},
+        pytest.param({"objective": "mechanical"}, marks=pytest.mark.long),
+        {"goal": tcp_pose(GOAL)},
+        pytest.param({"start": tcp_pose(START), "goal": tcp_pose(GOAL), "windings": False}, marks=pytest.mark.long),
+    ],
+    ids=lambda given: ", ".join(given) or "as it comes",
+)
+def test_the_shortest_duration_that_is_told_holds(given: dict[str, Any]) -> None:
+    """Asked for exactly that, or a little more, there is a motion; asked for less, there is none, told alike."""
+    with pytest.raises(DurationTooShort) as refusal:
+        optimize(problem(**given, **fixed(0.1)))
+    told = refusal.value.shortest
+    assert f"{told:.4f}" in str(refusal.value)
+    for share in (1.0, 1.01):
+        for durations in (fixed(told * share), {"duration_max": told * share}):
+            assert solved(problem(**given, **durations)).duration <= told * share
+    with pytest.raises(DurationTooShort) as again:
+        optimize(problem(**given, **fixed(0.98 * told)))
+    assert again.value.shortest == pytest.approx(told, rel=1e-3)
+
+
+def test_the_shortest_duration_is_nearly_the_seven_segments() -> None:
+    """Where torque is ample, the arm can be told to be as fast as its slowest joint, or hardly slower."""
+    for start, goal in random_moves(43, 4):
+        least = shortest(start, goal)
+        with pytest.raises(DurationTooShort) as refusal:
+            optimize(problem(start, goal, **fixed(0.5 * least)))
+        assert least * (1 - ROUNDING) <= refusal.value.shortest < 1.02 * least
+
+
+@pytest.mark.parametrize(("less", "more"), long_but([(0.8, 2.0)], [(0.8, 2.0), (0.8, 1.2), (1.2, 2.0)]))
+def test_more_time_is_never_dearer_without_a_price_of_time(less: float, more: float) -> None:
+    """The mechanical objective, which a longer duration can only help: up to 2 s is no worse than up to 1 s."""
+    fast, slow = (solved(problem(objective="mechanical", duration_max=T)).energy.mechanical.total for T in (less, more))
+    assert slow <= fast * (1 + CONVERGED)
+
+
+def test_no_time_at_all_is_a_deadline_exceeded() -> None:
+    clock = CountingClock()
+    with pytest.raises(DeadlineExceeded) as refusal:
+        optimize(problem(goal=tcp_pose(GOAL), deadline=1e-6), clock)
+    assert clock.now < LAST_READINGS
+    assert {each.status for each in refusal.value.candidates} <= {"unvisited", "infeasible"}
+
+
+def test_little_time_gives_the_best_found_so_far() -> None:
+    """A search that would take many seconds, cut off: certified, feasible, told which candidates it did not reach."""
+    task = problem(start=tcp_pose(START), goal=tcp_pose(GOAL), objective="mechanical", duration_max=2.5)
+    readings = 300
+    solution = optimize(replace(task, deadline=float(readings)), CountingClock())
+    assert_true(solution, task)
+    assert readings - RESERVE < solution.solver.wall_time < readings + LAST_READINGS
+    assert solution.status == "feasible"
+    assert any(each.status == "unvisited" and "deadline" in each.reason for each in solution.candidates)
+
+
+def test_a_load_that_cannot_be_held_is_told() -> None:
+    """The shoulder, what it needs to hold the arm stretched out, and what it has."""
+    stretched = np.array([0.0, 0.0, 0.0, 0.0, -1.57, 0.0])
+    needed = np.abs(torques(problem(payload=Payload(5.0)), stretched[None], np.zeros((1, 6)), np.zeros((1, 6))))[0, 1]
+    own = limits(tau_max=[150, 0.9 * needed, 150, 28, 28, 28])
+    with pytest.raises(TorqueInfeasible) as refusal:
+        optimize(problem(START, stretched, payload=Payload(5.0), limits=own))
+    error = refusal.value
+    assert (error.joint, error.needed, error.available) == pytest.approx((ROBOT.joint_names[1], needed, 0.9 * needed))
+
+
+def test_a_payload_beyond_the_rating_is_refused() -> None:
+    solved(problem(payload=Payload(5.0)))
+    with pytest.raises(InvalidProblem) as refusal:
+        optimize(problem(payload=Payload(5.01)))
+    assert refusal.value.field == "payload.mass" and "5 kg" in str(refusal.value)
+
+
+def test_poses_out_of_reach_are_refused() -> None:
+    away = tcp_pose(GOAL).T.copy()
+    away[0, 3] += 2.0
+    with pytest.raises(UnreachablePose) as far:
+        optimize(problem(goal=Pose(away)))
+    assert far.value.target == "goal" and far.value.distance is not None and 0.5 < far.value.distance < 2.5
+
+
+@pytest.mark.parametrize("refused", ["all", "the first"])
+def test_nothing_uncertified_is_returned(monkeypatch: pytest.MonkeyPatch, refused: str) -> None:
+    """A motion that its certificate does not confirm is not the answer; what it had ruled out may be."""
+    judged = []
+
+    def judge(*given: Any) -> Certificate:
+        judged.append(given)
+        honest = certify(*given)
+        if refused == "all" or len(judged) == 1:
+            return replace(honest, worst_ratio=honest.worst_ratio | {"torque": 1.01})
+        return honest
+
+    monkeypatch.setattr("optimizer.search.incumbent.certify", judge)
+    task = problem(goal=tcp_pose(GOAL), windings=False)
+    if refused == "the first":
+        assert optimize(task).certificate.valid and len(judged) > 1
+        return
+    with pytest.raises(NoTrajectory) as refusal:
+        optimize(task)
+    assert any("certificate" in each.reason for each in refusal.value.candidates)
+    assert all(each.energy is None for each in refusal.value.candidates)
