@@ -12,6 +12,7 @@ import pinocchio as pin
 from scipy.interpolate import BSpline
 
 from models.robot import Array
+from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown
 from optimizer.problem.problem import Problem
 from optimizer.solution import Energy
@@ -115,4 +116,4 @@ def _model(problem: Problem) -> tuple[pin.Model, pin.Data]:
 
 def _ratios(problem: Problem, q: Array, v: Array, a: Array, jerk: Array | None, tau: Array) -> dict[str, float]:
     jerk = np.full_like(a, np.inf) if jerk is None else jerk
-    return limit_ratios(problem.arm.active_limits, q, v, a, jerk, tau + problem.arm.friction_law.torque(v))
+    return limit_ratios(problem.arm.active_limits, q, v, a, jerk, limited_torque(problem.arm, tau, v, a))

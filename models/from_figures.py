@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast, get_args
 
 import pinocchio as pin
 
 from models.arrays import read_only
-from models.robot import Array, DefaultMotion, Drives, Electronics, FrictionLaw, Limits, LinkCapsule, Robot, link_names
+from models.robot import (
+    Array,
+    DefaultMotion,
+    Drives,
+    Electronics,
+    FrictionLaw,
+    Limits,
+    LinkCapsule,
+    Robot,
+    TorqueSide,
+    link_names,
+)
 from models.urdf import urdf_of
 
 # figures of the section `collision` that are no link's capsules
@@ -43,6 +54,7 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         capsules=capsules,
         never_in_collision=frozenset((first, second) for first, second in figures["collision"]["never_meet"]["value"]),
         figures=figures,
+        torque_side=_torque_side(limits),
         elbow=_elbow(figures, capsules),
     )
 
@@ -50,6 +62,14 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
 def _joints(figure: dict[str, Any], nq: int) -> Array:
     """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises ValueError."""
     return read_only(figure["value"], (nq,), "A figure over joints")
+
+
+def _torque_side(limits: dict[str, Any]) -> TorqueSide:
+    """Raises ValueError for another word than `motor` and `link`."""
+    side = limits["torque_side"]["value"]
+    if side not in get_args(TorqueSide):
+        raise ValueError(f"limits.torque_side is {side!r}: it must be one of {', '.join(get_args(TorqueSide))}.")
+    return cast(TorqueSide, side)
 
 
 def _capsules(figures: dict[str, Any], model: pin.Model) -> tuple[LinkCapsule, ...]:

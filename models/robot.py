@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import pinocchio as pin
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
+TorqueSide = Literal["motor", "link"]
 
 # robots of whom models, kernels and inverse kinematics are kept ready; users may bring any number of arms
 MOST_ROBOTS = 64
@@ -21,7 +22,7 @@ MOST_ROBOTS = 64
 class Limits:
     """Symmetric limits of every joint, shape (nq,) each, SI units; `q_min`, `q_max` need not be symmetric.
 
-    `tau_max` limits the motor torque at the joint: rigid body, rotor and friction together.
+    `tau_max` limits the torque at the joint on the side that the robot's `torque_side` names.
     """
 
     q_min: Array
@@ -138,6 +139,7 @@ class Robot:
     Every link, as its meshes are, lies within its `capsules`. `never_in_collision` holds pairs of links that cannot
     touch at any joint positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be
     limited; None for an arm without one. `default_motion` is None for an arm whose controller's defaults are unknown.
+    `torque_side`: the torque limits are for the `motor`, rotor and friction included, or for the `link`, without them.
     """
 
     name: str
@@ -152,6 +154,7 @@ class Robot:
     capsules: tuple[LinkCapsule, ...]
     never_in_collision: frozenset[tuple[int, int]]
     figures: dict[str, Any] = field(repr=False)
+    torque_side: TorqueSide = "motor"
     elbow: LinkCapsule | None = None
 
     @property

@@ -15,6 +15,7 @@ from optimizer.collision.close_pass import close_pass
 from optimizer.collision.model import collision_model
 from optimizer.deadline import checkpoint
 from optimizer.energy.dwell import dwell_energy, holding_power
+from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown, relative_error
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
@@ -120,9 +121,9 @@ class _Replay:
 
     @property
     def limit_ratios(self) -> dict[str, float]:
-        """The worst value / limit of position, velocity, acceleration, jerk and motor torque."""
-        tau_motor = self.tau + self.arm.friction_law.torque(self.v)
-        return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau_motor)
+        """The worst value / limit of position, velocity, acceleration, jerk and torque."""
+        tau_limited = limited_torque(self.arm, self.tau, self.v, self.a)
+        return limit_ratios(self.arm.active_limits, self.q, self.v, self.a, self.jerk, tau_limited)
 
     @property
     def rest_error(self) -> float:

@@ -26,6 +26,7 @@ def to_description(arm: asked.OwnArm) -> Description:
         trust=arm.trust,
         velocity=_per_joint(arm.velocity),
         torque=_per_joint(arm.torque),
+        torque_side=arm.torque_side,
         jerk=_per_joint(arm.jerk),
         locked=arm.locked,
         drives=Drives(**{name: _per_joint(value) for name, value in arm.drives}),

@@ -81,7 +81,8 @@ class Limits(Request):
     acceleration: RatePerJoint | None = described("Largest absolute joint acceleration.", "rad/s²", 5.0, default=None)
     jerk: RatePerJoint | None = described("Largest absolute joint jerk.", "rad/s³", 100.0, default=None)
     torque: RatePerJoint | None = described(
-        "Largest absolute motor torque at the joint: rigid body, rotor and friction together.",
+        "Largest absolute torque at the joint: of the motor, with rotor and friction, or of the link, without, as the "
+        "robot's `limits.torque_side` says.",
         "N·m",
         [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],
         default=None,

@@ -104,7 +104,14 @@ class OwnArm(Request):
         "Limits on the speed. Null: those of the URDF.", "rad/s", 3.0, default=None
     )
     torque: PositivePerJoint | None = described(
-        "Limits on the motor torque behind the gear. Null: `effort` of the URDF.", "N·m", [60.0, 40.0], default=None
+        "Limits on the torque at the joint. Null: `effort` of the URDF.", "N·m", [60.0, 40.0], default=None
+    )
+    torque_side: Literal["motor", "link"] | None = described(
+        "What the limits on the torque are for: the `motor` behind its gear, friction and rotor included; or the "
+        "`link`, without them, as with torque sensors. Null: the motor, nearly always the tighter reading.",
+        None,
+        "link",
+        default=None,
     )
     jerk: PositivePerJoint | None = described(
         "Limits on the jerk. Null: 20 1/s times those on the acceleration.", "rad/s³", 160.0, default=None

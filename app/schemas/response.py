@@ -221,7 +221,7 @@ class WorstRatio(Response):
     velocity: float = described("Joint velocity.", "1", 0.74)
     acceleration: float = described("Joint acceleration.", "1", 1.0)
     jerk: float = described("Joint jerk.", "1", 0.66)
-    torque: float = described("Motor torque at the joint, friction included.", "1", 0.55)
+    torque: float = described("Torque at the joint, on the side of the robot's `limits.torque_side`.", "1", 0.55)
     tool_cone: float | None = described(
         "Angle between tool axis and direction / `half_angle` of `tool_cone`.", "1", 0.93, default=None
     )

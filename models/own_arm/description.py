@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from models.robot import TorqueSide
+
 # one number for all joints, or one per joint from base to tip
 PerJoint = float | tuple[float, ...]
 Letter = Literal["A", "B", "C", "T"]
@@ -70,9 +72,10 @@ class Description:
     """An arm of a user's own: the URDF's text, the link `tip` at its end, and what a URDF does not say.
 
     `acceleration` [rad/s²], `payload` [kg]. `base` is the link whose frame is the world frame (default: the root).
-    `velocity` [rad/s] and `torque` [N·m] replace the URDF's limits; `jerk` [rad/s³]. `locked` has a position [rad] or
-    [m] for each joint that is held. `source` says where the URDF is from, `trust` how good it is. `srdf` is the
-    text of an SRDF, whose disabled collisions are not compared. `meshes` has the content of mesh files by their paths.
+    `velocity` [rad/s] and `torque` [N·m] replace the URDF's limits; `torque_side` is what the latter are for; `jerk`
+    [rad/s³]. `locked` has a position [rad] or [m] for each joint that is held. `source` says where the URDF is from,
+    `trust` how good it is. `srdf` is the text of an SRDF, whose disabled collisions are not compared. `meshes` has the
+    content of mesh files by their paths.
     """
 
     urdf: str
@@ -85,6 +88,7 @@ class Description:
     trust: Letter = "C"
     velocity: PerJoint | None = None
     torque: PerJoint | None = None
+    torque_side: TorqueSide | None = None
     jerk: PerJoint | None = None
     locked: Mapping[str, float] | None = None
     drives: Drives = Drives()

@@ -132,6 +132,9 @@ def _check_body(link: str, body: pin.Inertia, length: float, warnings: list[str]
         )
 
 
+_SIDE = "What the torque limit is for: the motor, friction and rotor included, or the link, without them."
+
+
 def _limits(description: Description, chain: Chain) -> dict[str, Any]:
     acceleration = per_joint("acceleration", description.acceleration, chain.joints)
     assert acceleration is not None
@@ -158,7 +161,8 @@ def _limits(description: Description, chain: Chain) -> dict[str, Any]:
         "velocity": stated(description, found["velocity"], "rad/s", "Symmetric."),
         "acceleration": stated(description, acceleration, "rad/s²", "Symmetric."),
         "jerk": either(description, jerk, rules.JERK * acceleration, "rad/s³", ("Symmetric.", rules.NOTES["jerk"])),
-        "torque": stated(description, found["torque"], "N·m", "Of the motor, behind the gear; friction included."),
+        "torque": stated(description, found["torque"], "N·m", "At the joint, behind the gear: see torque_side."),
+        "torque_side": either(description, description.torque_side, "motor", "1", (_SIDE, rules.NOTES["torque_side"])),
         "rated_payload": stated(description, description.payload, "kg", "Greatest payload."),
     }
 

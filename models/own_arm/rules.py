@@ -31,6 +31,7 @@ NOTES = {
     "idle_power": "6 W for each joint. Range 3 to 15 W.",
     "controller_power": "Not counted: give the control box's own figure.",
     "regeneration": "Nothing is taken back.",
+    "torque_side": "Of the motor, friction and rotor included: nearly always the tighter reading.",
     "jerk": "20 times the acceleration limit, in 1/s.",
     "torque_constant": "Without effect on the energy: copper loss is scaled with its square.",
     "gear_ratio": "Without effect on the energy: all figures are behind the gear.",

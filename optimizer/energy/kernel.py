@@ -1,6 +1,6 @@
 """The per-node functions of the NLP, ready to be called: compiled once per robot, evaluated from any thread.
 
-`node` gives cost, motor torque and their first and second derivatives at one instant of a motion. Everything that a
+`node` gives cost, limited torque and their first and second derivatives at one instant of a motion. Everything that a
 request may change (payload, gravity, drives, friction, objective) is a parameter. The functions are compiled by the
 system's C compiler and stored on disk: see `kernel_cache`. Until the compiled library exists, or if there is no
 compiler, CasADi's virtual machine evaluates the same expressions.
@@ -80,7 +80,7 @@ class Kernel:
         return known[key]
 
     def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
-        """Cost (N,), tau_motor (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N, 3nq, 3nq).
+        """Cost (N,), tau_limited (N, nq), gradient (N, 3nq), Jacobian (N, nq, 3nq), Hessian (N, 3nq, 3nq).
 
         y (N, 3nq) = q, v, a; multiplier (N, nq); weight (N,); p packed `Parameters`. The results are views: the
         thread's next call with as many nodes overwrites them.
@@ -96,7 +96,7 @@ class Kernel:
         )
 
     def value(self, y: Array, p: Array) -> tuple[Array, Array]:
-        """Cost (N,) and tau_motor (N, nq) [N·m]. Views: the thread's next call with as many nodes overwrites them."""
+        """Cost (N,) and tau_limited (N, nq) [N·m]. Views: the thread's next call with as many nodes overwrites them."""
         cost, tau = self._evaluation("value", len(y))(y, p)
         return cost[:, 0], tau
 

@@ -22,7 +22,7 @@ SYMBOLICS = threading.RLock()
 
 # fields of `Parameters` that are one number; those of other sizes than one number per joint
 _SCALARS = frozenset(
-    ("mass", "base_power", "regeneration", "isolated", "electrical", "mechanical", "time", "knee", "width")
+    ("mass", "link_side", "base_power", "regeneration", "isolated", "electrical", "mechanical", "time", "knee", "width")
 )
 _SIZES = {"com": 3, "inertia": 6, "gravity": 3} | dict.fromkeys(_SCALARS, 1)
 
@@ -36,7 +36,8 @@ class Parameters:
     `curved` [N·m], `speed` [rad/s], `viscous` [N·m·s/rad]; drives `torque_constant` [N·m/A], `copper` [W/A²],
     `inverter_constant` [W], `inverter_linear` [W/A], `inverter_quadratic` [W/A²]; `link_mass_scale` [1].
 
-    `base_power` [W] of the electronics; `regeneration` [1], the fraction of net surplus that the supply takes back;
+    `link_side` is 1 if the limited torque is that of the link, 0 if that of the motor. `base_power` [W] of the
+    electronics; `regeneration` [1], the fraction of net surplus that the supply takes back;
     `isolated` is 1 if every joint dissipates its own surplus, else 0. `electrical`, `mechanical` [1] and `time` [W]
     weigh the parts of the cost. `knee` [rad/s] smooths the reversal of friction, `width` [W] the corners of the cost.
     """
@@ -55,6 +56,7 @@ class Parameters:
     inverter_constant: Any
     inverter_linear: Any
     inverter_quadratic: Any
+    link_side: Any
     base_power: Any
     regeneration: Any
     isolated: Any
@@ -101,14 +103,15 @@ class Parameters:
 
 @dataclass(frozen=True)
 class _Power:
-    """Cost and motor torque as functions of the torque tau (nq,) [N·m] and the speed v (nq,) [rad/s] alone.
+    """The cost and the friction in the limited torque, as functions of the torque tau (nq,) [N·m] and the speed v (nq,)
+    [rad/s] alone.
 
     `slope` (2 nq,) and `bend` (2 nq, 2 nq) are the cost's derivatives by tau and v; `friction_slope` (nq, nq) is that
-    of the friction torque by v, `friction_bend` (nq, nq) the second one of multiplier · friction torque.
+    of the friction by v, `friction_bend` (nq, nq) the second one of multiplier · friction.
     """
 
     cost: ca.SX
-    tau_motor: ca.SX
+    friction: ca.SX
     slope: ca.SX
     bend: ca.SX
     friction_slope: ca.SX
@@ -119,9 +122,9 @@ def build(robot: Robot) -> list[ca.Function]:
     """The functions of a robot as CasADi expressions.
 
     `torque`(y, p) → tau: rigid body and rotor torque [N·m].
-    `value`(y, p) → cost [W], tau_motor [N·m].
-    `node`(y, multiplier, weight, p) → cost, tau_motor, gradient of the cost, Jacobian of tau_motor (nq, 3 nq), and the
-    Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_motor. y = (q, v, a) stacked.
+    `value`(y, p) → cost [W], tau_limited [N·m]: the torque that is limited, see `limited_torque`.
+    `node`(y, multiplier, weight, p) → cost, tau_limited, gradient of the cost, Jacobian of tau_limited (nq, 3 nq), and
+    the Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_limited. y = (q, v, a) stacked.
     """
     with SYMBOLICS:
         return _functions(robot)
@@ -135,9 +138,11 @@ def _functions(robot: Robot) -> list[ca.Function]:
     tau = inverse_dynamics(robot.model, q, v, a, par.payload, par.gravity, par.rotor_inertia, par.link_mass_scale)
     multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")
     power = _power(par, tau, v, multiplier)
-    gradient, jacobian, hessian = _derivatives(power, tau, y, multiplier, weight)
+    # on the link's side without the rotor
+    rotor = par.link_side * par.rotor_inertia
+    gradient, jacobian, hessian = _derivatives(power, tau, rotor, y, multiplier, weight)
     dense = ca.densify
-    value = [power.cost, dense(power.tau_motor)]
+    value = [power.cost, dense(tau - rotor * a + power.friction)]
     node = [*value, dense(gradient), dense(jacobian), dense(hessian)]
     return [
         ca.Function("torque", [y, p], [dense(tau)], {"cse": True}),
@@ -147,19 +152,19 @@ def _functions(robot: Robot) -> list[ca.Function]:
 
 
 def _power(par: Parameters, tau: ca.SX, v: ca.SX, multiplier: ca.SX) -> _Power:
-    """Cost and motor torque at torque tau and speed v, differentiated before these are put in."""
+    """Cost and friction at torque tau and speed v, differentiated before these are put in."""
     nq = tau.numel()
     t, w = ca.SX.sym("t", nq), ca.SX.sym("w", nq)
-    cost, tau_motor = _cost(par, t, w)
+    cost = _cost(par, t, w)
     bend, slope = ca.hessian(cost, ca.vertcat(t, w))
-    friction_torque = par.friction.torque(w, ca)
-    friction_bend, _ = ca.hessian(ca.dot(multiplier, friction_torque), w)
-    local = [cost, tau_motor, slope, bend, ca.jacobian(friction_torque, w), friction_bend]
+    friction = (1 - par.link_side) * par.friction.torque(w, ca)
+    friction_bend, _ = ca.hessian(ca.dot(multiplier, friction), w)
+    local = [cost, friction, slope, bend, ca.jacobian(friction, w), friction_bend]
     return _Power(*ca.substitute(local, [t, w], [tau, v]))
 
 
-def _cost(par: Parameters, t: ca.SX, w: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Smoothed cost [W] and motor torque [N·m] for torques t and speeds w."""
+def _cost(par: Parameters, t: ca.SX, w: ca.SX) -> ca.SX:
+    """Smoothed cost [W] for torques t and speeds w."""
     # the inverter's |i| is smoothed over a tenth of an ampere per watt of width
     flow = power_flow(t, w, par.drives, par.friction, 0.1 * par.width, ca)
     shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
@@ -167,14 +172,17 @@ def _cost(par: Parameters, t: ca.SX, w: ca.SX) -> tuple[ca.SX, ca.SX]:
     isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / t.numel(), ca))
     drawn = (1 - par.isolated) * shared + par.isolated * isolated
     mechanical = ca.sum1(smooth_abs(t * w, par.width, ca))
-    return par.electrical * drawn + par.mechanical * mechanical + par.time, flow.tau_motor
+    cost: ca.SX = par.electrical * drawn + par.mechanical * mechanical + par.time
+    return cost
 
 
-def _derivatives(power: _Power, tau: ca.SX, y: ca.SX, multiplier: ca.SX, weight: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Gradient of the cost, Jacobian of tau_motor, and Hessian of weight · cost + multiplier · tau_motor, all by y.
+def _derivatives(
+    power: _Power, tau: ca.SX, rotor: ca.SX, y: ca.SX, multiplier: ca.SX, weight: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Gradient of the cost, Jacobian of tau_limited, and Hessian of weight · cost + multiplier · tau_limited, all by y.
 
-    The chain rule is applied by hand: it takes a third of the operations that differentiating the composed cost twice
-    takes.
+    `rotor` (nq,) [kg·m²] is the inertia that the limited torque leaves out. The chain rule is applied by hand: it takes
+    a third of the operations that differentiating the composed cost twice takes.
     """
     nq = tau.numel()
     speeds = slice(nq, 2 * nq)
@@ -187,4 +195,5 @@ def _derivatives(power: _Power, tau: ca.SX, y: ca.SX, multiplier: ca.SX, weight:
     hessian[speeds, speeds] += power.friction_bend
     jacobian = J_tau + 0
     jacobian[:, speeds] += power.friction_slope
+    jacobian[:, 2 * nq :] -= ca.diag(rotor)
     return J_inner.T @ power.slope, jacobian, hessian

@@ -12,6 +12,7 @@ from models.robot import Array, FrictionLaw
 from optimizer.energy.bus_flow import charges, drawn_at
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_expressions import Parameters
+from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown, power_flow
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
@@ -86,6 +87,7 @@ class Plant:
             inverter_constant=drives.inverter_constant,
             inverter_linear=drives.inverter_linear,
             inverter_quadratic=drives.inverter_quadratic,
+            link_side=float(self.arm.robot.torque_side == "link"),
             base_power=self.arm.base_power,
             regeneration=self.arm.regeneration if regeneration is None else regeneration,
             isolated=float(self.arm.bus.mode == "isolated"),
@@ -110,6 +112,10 @@ class Plant:
     def torques(self, q: Array, v: Array, a: Array) -> Array:
         """Rigid body and rotor torques (k, nq) [N·m]."""
         return self.kernel.torque(q, v, a, self.electrical_parameters)
+
+    def limited_torques(self, q: Array, v: Array, a: Array) -> Array:
+        """The torques (k, nq) [N·m] that the limit is for: see `limited_torque`."""
+        return limited_torque(self.arm, self.torques(q, v, a), v, a)
 
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
+from optimizer.energy.limited_torque import limited_parts
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.clearance_constraint import CLEARANCE, RESERVE, SCALE
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
@@ -63,22 +64,20 @@ def initial_bounds(path: PathConstraints | None) -> Array:
 
 
 def torque_peaks(prepared: PreparedProblem, spline: Spline) -> Array:
-    """Greatest absolute motor torques (nq,) [N·m] at quadrature points and at the instants of the certificate.
+    """Greatest absolute limited torques (nq,) [N·m] at quadrature points and at the instants of the certificate.
 
     Those instants are left out of a long motion that stays far from the torque limits.
     """
     q, v, a = fine_samples(spline, TORQUE_POINTS)[1:]
-    rigid = prepared.torques(q, v, a)
-    friction = prepared.friction.torque(v)
-    peaks = np.abs(rigid + friction).max(axis=0)
+    smooth, friction = limited_parts(prepared.arm, prepared.torques(q, v, a), v, a)
+    peaks = np.abs(smooth + friction).max(axis=0)
     if spline.duration > LONG:
-        most = np.abs(rigid).max(axis=0) + np.abs(friction).max(axis=0)
+        most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
         if (most <= FAR_BELOW * prepared.problem.arm.active_limits.tau_max).all():
             return np.asarray(peaks)
     # at a reversal of a joint friction changes sign within a millisecond
     q, v, a = sample(spline, grid(spline.duration))
-    tau = prepared.torques(q, v, a) + prepared.friction.torque(v)
-    return np.asarray(np.maximum(peaks, np.abs(tau).max(axis=0)))
+    return np.asarray(np.maximum(peaks, np.abs(prepared.limited_torques(q, v, a)).max(axis=0)))
 
 
 def repair_factors(prepared: PreparedProblem, spline: Spline, overshoot: tuple[Array, Array]) -> Limits | None:

@@ -148,7 +148,7 @@ class PathRetiming:
         return x
 
     def _cost(self, unit: Spline, duration: float) -> tuple[float, Array]:
-        """Cost [J] and motor torques (N, nq) of a motion of 1 s retimed to `duration` [s]."""
+        """Cost [J] and limited torques (N, nq) of a motion of 1 s retimed to `duration` [s]."""
         y = (self.space.at_nodes @ unit.control_points) / np.power(duration, np.arange(3))[:, None, None]
         cost, tau = self.prepared.kernel.value(y.transpose(1, 0, 2).reshape(len(self.space.nodes), -1), self.interval.p)
         return self.interval.constant + duration * float(self.space.weights @ cost), tau

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from models.robot import Array
+from optimizer.energy.limited_torque import limited_torque
 from optimizer.methods.around_obstacles import around_obstacles
 from optimizer.methods.duration_intervals import fastest
 from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
@@ -33,13 +34,14 @@ RATES_USED, TORQUE_USED = 1 - 1e-9, 1 - 1e-4
 
 @dataclass(frozen=True)
 class _Samples:
-    """The given motion on the certificate's grid: q [rad], v [rad/s], torques [N·m], (k, nq) each.
+    """The given motion on the certificate's grid: q [rad], v [rad/s], a [rad/s²], torques [N·m], (k, nq) each.
 
     Rigid-body torque is the `static` torque plus the part `moving`, quadratic in speed, which a factor k divides by k².
     """
 
     q: Array
     v: Array
+    a: Array
     static: Array
     moving: Array
 
@@ -73,7 +75,7 @@ class _UniformScale:
         q, v, a = sample(given, grid(given.duration))
         still = np.zeros_like(q)
         static = self.prepared.torques(q, still, still)
-        self._samples = _Samples(q, v, static, self.prepared.torques(q, v, a) - static)
+        self._samples = _Samples(q, v, a, static, self.prepared.torques(q, v, a) - static)
 
     def solve(self) -> SolveResult:
         """The factor of least cost within the limits and the allowed durations."""
@@ -109,7 +111,8 @@ class _UniformScale:
         """The cost [J], or the duration [s] for minimum time; infinite if torque or a path constraint is exceeded."""
         self.evaluations += 1
         given, v = self._samples, self._samples.v / factor
-        tau = given.static + given.moving / factor**2 + self.prepared.friction.torque(v)
+        tau = given.static + given.moving / factor**2
+        tau = limited_torque(self.prepared.arm, tau, v, given.a / factor**2)
         if (np.abs(tau) > self.prepared.problem.arm.active_limits.tau_max * TORQUE_USED).any():
             return np.inf
         if self.prepared.path is not None and (self.prepared.path.ratios(given.q, v) > TORQUE_USED).any():

@@ -33,8 +33,9 @@ FEASIBILITY = 1e-4
 class Linearisation:
     """Value and derivatives of an NLP at one point x = (free control points row by row, T).
 
-    `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau_motor, `tau` (N, nq) [N·m], and the factors
-    of single torques' gradients: `jacobian` (N, nq, 3, r) = ∂tau/∂(s, v, a), `rate` (N, 3, r) = ∂(s, v, a)/∂T.
+    `cost` [J], `gradient` (n,), `hessian` (n, n) of cost + multiplier · tau, `tau` (N, nq) [N·m] the limited torque,
+    and the factors of single torques' gradients: `jacobian` (N, nq, 3, r) = ∂tau/∂(s, v, a), `rate` (N, 3, r) = ∂(s, v,
+    a)/∂T.
     """
 
     cost: float
@@ -120,7 +121,7 @@ class NonlinearProgram:
         return z, y.reshape(len(y), -1)
 
     def value(self, free: Array, T: float) -> tuple[float, Array]:
-        """Cost [J] and motor torques (N, nq)."""
+        """Cost [J] and limited torques (N, nq)."""
         _, y = self._states(free, T)
         cost, tau = self.kernel.value(y, self.p)
         return self.constant + T * float(self.basis.weights @ cost), tau

@@ -173,7 +173,7 @@ class _Solver:
         return Result(status, at.free, at.T, cost, iterations, violation, stationarity, multiplier)
 
     def _point(self, free: Array, T: float, kinematics: Array, tau: Array) -> _Point:
-        """The iterate, from its motor torques (N, nq)."""
+        """The iterate, from its limited torques (N, nq)."""
         path_values = self.p.path_rows.values(self.p.points(free), T)
         largest = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.qp.rates(T)
         torque = np.abs(tau).max(axis=0) / self.p.limits.tau_max

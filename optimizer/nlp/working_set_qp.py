@@ -84,7 +84,7 @@ class QPStep:
 
 @dataclass(frozen=True)
 class _TorqueRows:
-    """Motor torques near their limits: node and joint, sign, gradients (rows, n) and slack, as ratios of the limit."""
+    """Torques near their limits: node and joint, sign, gradients (rows, n) and slack, as ratios of the limit."""
 
     nodes: tuple[Index, Index]
     signs: Array
@@ -278,7 +278,7 @@ class WorkingSetQP:
         return A
 
     def _torque_rows(self, at: QPInputs) -> _TorqueRows:
-        """The motor torques above NEAR_TORQUE of their limits."""
+        """The limited torques above NEAR_TORQUE of their limits."""
         tau_max = self.p.limits.tau_max
         ratio = at.line.tau / tau_max
         k, j = np.nonzero(np.abs(ratio) > NEAR_TORQUE)

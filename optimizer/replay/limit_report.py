@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from models.robot import Array, Mask
+from optimizer.energy.limited_torque import limited_torque
 from optimizer.kinematics.path_constraints import path_constraints_of
 from optimizer.problem.arm import Arm
 from optimizer.replay.piecewise_motion import Indices, PiecewiseMotion
@@ -45,7 +46,7 @@ class LimitMonitor:
     """Updates the worst ratio of every limit of an arm, block after block."""
 
     def __init__(self, arm: Arm) -> None:
-        self._limits, self._joints, self._friction = arm.active_limits, arm.robot.joint_names, arm.friction_law
+        self._limits, self._joints, self._arm = arm.active_limits, arm.robot.joint_names, arm
         self._worst: dict[LimitName, LimitReport] = {}
         self._path = path_constraints_of(arm)
         self._path_bounds: dict[str, float] = {
@@ -60,13 +61,13 @@ class LimitMonitor:
 
     def update(self, t: Array, q: Array, v: Array, a: Array, jerk: Array, tau: Array) -> None:
         """Add samples at times t (k,) [s]; the others are (k, nq), tau [N·m] is rigid body and rotor torque."""
-        limits, tau_motor = self._limits, tau + self._friction.torque(v)
+        limits, tau_limited = self._limits, limited_torque(self._arm, tau, v, a)
         nearer = np.where(q > (limits.q_max + limits.q_min) / 2, limits.q_max, limits.q_min)
-        values = {"position": q, "velocity": v, "acceleration": a, "jerk": jerk, "torque": tau_motor}
+        values = {"position": q, "velocity": v, "acceleration": a, "jerk": jerk, "torque": tau_limited}
         bounds = {
             "velocity": limits.v_max, "acceleration": limits.a_max, "jerk": limits.j_max, "torque": limits.tau_max,
         }  # fmt: skip
-        for name, ratio in ratios(limits, q, v, a, jerk, tau_motor).items():
+        for name, ratio in ratios(limits, q, v, a, jerk, tau_limited).items():
             k, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             bound = nearer[k, j] if name == "position" else bounds[name][j]
             self._note(name, float(ratio[k, j]), int(j), float(t[k]), float(values[name][k, j]), float(bound))  # type: ignore[arg-type]

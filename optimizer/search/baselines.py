@@ -19,6 +19,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.energy.dwell import dwell_energy, holding_power
+from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown
 from optimizer.problem.problem import Problem
 from optimizer.solution import Baseline, BaselineName, Energy
@@ -109,14 +110,14 @@ def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential
 
 
 def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:
-    """Whether a motion is within every limit: its exact peaks of the rates, positions and motor torques at its samples.
+    """Whether a motion is within every limit: its exact peaks of the rates, positions and torques at its samples.
 
     A motion that takes longer than the cycle does not.
     """
     if problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE):
         return False
     limits = problem.arm.active_limits
-    tau_motor = tau + problem.arm.friction_law.torque(motion.v)
+    tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a)
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
-    ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_motor)
+    ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)
     return all(ratio <= 1 + RATIO_TOLERANCE for ratio in ratios.values())

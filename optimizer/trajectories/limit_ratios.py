@@ -10,12 +10,12 @@ from models.robot import Array, Limits
 RATIO_TOLERANCE = 1e-6
 
 
-def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, float]:
+def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_limited: Array) -> dict[str, float]:
     """The largest value / limit over samples and joints of arrays (k, nq); k may differ between the arrays."""
-    return {name: float(each.max()) for name, each in ratios(limits, q, v, a, jerk, tau_motor).items()}
+    return {name: float(each.max()) for name, each in ratios(limits, q, v, a, jerk, tau_limited).items()}
 
 
-def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor: Array) -> dict[str, Array]:
+def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_limited: Array) -> dict[str, Array]:
     """Value / limit (k, nq) of every sample and joint; k may differ between the arrays.
 
     The ratio of a position is its distance from the middle of the joint's range over half the range: 1 is on a limit,
@@ -27,5 +27,5 @@ def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_motor:
         "velocity": np.abs(v) / limits.v_max,
         "acceleration": np.abs(a) / limits.a_max,
         "jerk": np.abs(jerk) / limits.j_max,
-        "torque": np.abs(tau_motor) / limits.tau_max,
+        "torque": np.abs(tau_limited) / limits.tau_max,
     }
