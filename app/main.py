@@ -20,6 +20,7 @@ from app.http.request_context import RequestContext
 from app.routes import (
     answers,
     compare,
+    cycle,
     docs,
     evaluate,
     health,
@@ -41,6 +42,7 @@ ROUTES = (
     optimize,
     compare,
     pareto,
+    cycle,
     whatif,
     evaluate,
     ik,

@@ -10,9 +10,11 @@ JoulepathError
 ├── NoReachableTarget       none of several targets has a solution
 ├── InCollision             every arm configuration at the start or goal is in collision
 │   ├── StartInCollision
-│   └── GoalInCollision
+│   ├── GoalInCollision
+│   └── StopInCollision
 ├── DurationTooShort
 ├── TorqueInfeasible        the arm cannot hold or move the load
+├── NoSequence              no chain of configurations through a round
 ├── NoTrajectory            every candidate failed
 │   └── NoCollisionFreeTrajectory
 └── DeadlineExceeded        no motion certified in time
@@ -22,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from models.robot import Array
@@ -135,7 +137,7 @@ class InCollision(JoulepathError):
     `pair` names the two bodies of the first one, `depth` [m] is their missing clearance.
     """
 
-    target: ClassVar[str]
+    target: str
 
     def __init__(self, branches: Sequence[CollidingBranch]) -> None:
         self.branches = sorted(branches, key=lambda branch: branch.depth)[:MOST_BRANCHES]
@@ -158,6 +160,35 @@ class GoalInCollision(InCollision):
     """Every arm configuration at the goal is in collision."""
 
     target = "goal"
+
+
+class StopInCollision(InCollision):
+    """Every arm configuration at a stop of a round is in collision."""
+
+    def __init__(self, target: str, branches: Sequence[CollidingBranch]) -> None:
+        self.target = target
+        super().__init__(branches)
+
+
+def in_collision(name: str, branches: Sequence[CollidingBranch]) -> InCollision:
+    """The error for the end `name` (start or goal), or for a stop of this name, whose configurations all collide."""
+    named = {"start": StartInCollision, "goal": GoalInCollision}
+    return named[name](branches) if name in named else StopInCollision(name, branches)
+
+
+class NoSequence(JoulepathError):
+    """Every stop of a round can be reached, but no chain of configurations: there is no motion to `stop`.
+
+    `reached` are the labels of the configurations before it that can be come to, `open` those of its own.
+    """
+
+    def __init__(self, stop: str, reached: Sequence[str], open_: Sequence[str]) -> None:
+        super().__init__(
+            f"Every stop can be reached, but no round: there is no motion within the limits to {stop} from any "
+            "configuration that can be come to. Move this stop or the one before it, relax a limit, leave `branch` out "
+            "or set `windings` true."
+        )
+        self.stop, self.reached, self.open = stop, list(reached), list(open_)
 
 
 class DurationTooShort(JoulepathError):

@@ -8,6 +8,7 @@ import click
 
 from app import __version__
 from app.cli.answer import Refused
+from app.cli.cycle import cycle
 from app.cli.evaluate import evaluate
 from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
 from app.cli.interrupts import interruptible
@@ -39,7 +40,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, evaluate, robots):
+for command in (serve, optimize, cycle, evaluate, robots):
     joulepath.add_command(command)
 
 

@@ -38,7 +38,7 @@ def to_arm(request: asked.ArmRequest) -> Arm:
     return Arm(
         robot=robot,
         T_flange_tcp=to_matrix(request.tcp),
-        payload=_to_payload(request.payload),
+        payload=to_payload(request.payload),
         gravity=np.array(request.gravity),
         limits=_to_limits(request.limits, robot),
         friction=request.friction,
@@ -67,7 +67,8 @@ def _to_tool_cone(cone: asked.ToolCone | None) -> ToolCone | None:
     return None if cone is None else ToolCone(np.array(cone.axis), np.array(cone.direction), cone.half_angle)
 
 
-def _to_payload(payload: asked.Payload | None) -> Payload:
+def to_payload(payload: asked.Payload | None) -> Payload:
+    """The payload of the library; without mass if there is none. Raises InvalidProblem."""
     if payload is None:
         return Payload()
     ixx, ixy, ixz, iyy, iyz, izz = payload.inertia or [0.0] * 6

@@ -23,7 +23,6 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
     shortest, longest = _duration_bounds(request)
-    branch = request.branch
     return Problem(
         start=to_target(request.start),
         goal=to_target(request.goal),
@@ -33,12 +32,17 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         duration_min=shortest,
         duration_max=longest,
         cycle=to_cycle(request.cycle),
-        branch=None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist),
+        branch=to_branch(request.branch),
         windings=request.windings,
         bound=request.bound,
         sample_period=request.sample_period,
         deadline=deadline,
     )
+
+
+def to_branch(branch: asked.Branch | None) -> BranchFilter | None:
+    """The branch filter of the library."""
+    return None if branch is None else BranchFilter(branch.shoulder, branch.elbow, branch.wrist)
 
 
 def to_cycle(asked_for: asked.Cycle | None) -> Cycle | None:

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 from app.convert.fields import candidate_fields, fields, unreachable_fields
 from app.convert.warnings import certified_warnings
-from app.schemas import request as asked
 from app.schemas.response import Clearance
-from optimizer.solution import Certificate, ElectricalEnergy, Energy, Solution, StorageUse
+from optimizer.problem.problem import MethodName
+from optimizer.solution import Certificate, ElectricalEnergy, Energy, Objective, Solution, StorageUse
 
 
-def to_optimize_response(request: asked.OptimizeRequest, request_id: str, solution: Solution) -> dict[str, Any]:
+class Asked(Protocol):
+    """What an answer repeats of its request."""
+
+    robot: str
+    method: MethodName
+
+    @property
+    def objective(self) -> Objective:
+        """The energy that is minimised."""
+        ...
+
+
+def to_optimize_response(request: Asked, request_id: str, solution: Solution) -> dict[str, Any]:
     """The answer of `POST /optimize`: numbers, strings, lists, dicts, and arrays in C order."""
     trajectory = solution.trajectory
     return {

@@ -45,6 +45,8 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.NoReachableTarget: problems.UnreachableTargets,
     optimizer_errors.StartInCollision: problems.StartInCollision,
     optimizer_errors.GoalInCollision: problems.GoalInCollision,
+    optimizer_errors.StopInCollision: problems.StopInCollision,
+    optimizer_errors.NoSequence: problems.NoSequence,
     optimizer_errors.DurationTooShort: problems.DurationTooShort,
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
     optimizer_errors.NoCollisionFreeTrajectory: problems.NoCollisionFreeTrajectory,

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from fastapi import Depends, Header, Path, Request, Response
 
 from app.schemas.common import KEY_HEADER
+from app.schemas.cycle import CycleRequest
 from app.schemas.examples.values import STUDY_ID
 from app.schemas.request import MotionRequest
 from app.schemas.studies import IdempotencyKey
@@ -14,7 +15,7 @@ from app.schemas.whatif import WhatifRequest
 from optimizer.exceptions import InvalidProblem
 
 
-def deadline_of(body: MotionRequest | WhatifRequest, longest: float) -> float:
+def deadline_of(body: MotionRequest | WhatifRequest | CycleRequest, longest: float) -> float:
     """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises InvalidProblem."""
     given = body.deadline if "deadline" in body.model_fields_set else None
     return allowed_deadline(given, body.deadline, longest)

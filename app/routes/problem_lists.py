@@ -39,3 +39,16 @@ MOTION_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.NoCollisionFreeTrajectory,
 )
 """Of every request that optimises a motion."""
+
+CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
+    *WORKER_PROBLEMS,
+    problems.UnreachablePose,
+    problems.SingularPose,
+    problems.UnreachableTargets,
+    problems.OutsideLimits,
+    problems.StartInCollision,
+    problems.StopInCollision,
+    problems.TorqueInfeasible,
+    problems.NoSequence,
+)
+"""Of a request for a round."""

@@ -109,15 +109,12 @@ class Branch(Request):
     )
 
 
-class Cycle(Request):
-    """The wait at the goal: when the arm is needed again, and what holds it until then."""
+class Holding(Request):
+    """What holds the arm while it waits."""
 
-    time: Seconds = described(
-        "Time from the start of the motion until the arm is needed again. The motion takes no longer.", "s", 6.0
-    )
     hold: Literal["motors", "brakes"] = described(
-        "`motors`: the motors hold the arm until the end of the cycle. `brakes`: the motors hold it for "
-        "`brake_delay`, then the brakes.",
+        "`motors`: the motors hold the arm during the wait. `brakes`: the motors hold it for `brake_delay`, then the "
+        "brakes.",
         None,
         "brakes",
         default="motors",
@@ -130,6 +127,14 @@ class Cycle(Request):
         "W",
         20.0,
         default=None,
+    )
+
+
+class Cycle(Holding):
+    """The wait at the goal: when the arm is needed again, and what holds it until then."""
+
+    time: Seconds = described(
+        "Time from the start of the motion until the arm is needed again. The motion takes no longer.", "s", 6.0
     )
 
 

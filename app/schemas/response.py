@@ -203,7 +203,9 @@ class Candidate(Response):
 class UnreachableTarget(Response):
     """A target of an `any_of` that the arm cannot reach. It has no candidates."""
 
-    end: Literal["start", "goal"] = described("End of the motion to which the target belongs.", None, "goal")
+    end: str = described(
+        "What the target belongs to: `start` or `goal`; of `POST /cycle` `start`, or `stops/` and a name.", None, "goal"
+    )
     target: int = described("Index in `any_of`, from 0.", None, 2)
     reason: str = described(
         "Why the target cannot be reached, and how to correct it.",

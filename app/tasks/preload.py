@@ -5,9 +5,9 @@ from __future__ import annotations
 import signal
 from importlib import import_module
 
-from app.tasks import compare, evaluate, ik_path, optimize, pareto, whatif
+from app.tasks import compare, cycle, evaluate, ik_path, optimize, pareto, whatif
 
-__all__ = ["compare", "evaluate", "ik_path", "optimize", "pareto", "whatif"]
+__all__ = ["compare", "cycle", "evaluate", "ik_path", "optimize", "pareto", "whatif"]
 
 # imported where it is called, because the process that answers HTTP does not need it
 import_module("toppra")

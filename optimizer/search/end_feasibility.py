@@ -12,7 +12,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.model import ClosestPair
-from optimizer.exceptions import CollidingBranch, GoalInCollision, InvalidProblem, StartInCollision, TorqueInfeasible
+from optimizer.exceptions import CollidingBranch, InvalidProblem, TorqueInfeasible, in_collision
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.path_constraints import ToolConeConstraint
 from optimizer.nlp.clearance_constraint import RESERVE
@@ -50,9 +50,9 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
 def raise_if_none_is_left(
     name: str, branches: Sequence[tuple[str, int, Array]], ruled: Sequence[InvalidReason | None]
 ) -> None:
-    """Raise the error for the branches (label, target, q) at the `name`, start or goal, if none of them is feasible.
+    """Raise the error for the branches (label, target, q) at the `name`, start, goal or a stop, if none is feasible.
 
-    Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible.
+    Raises InvalidProblem, InCollision or TorqueInfeasible.
     """
     causes = [None if each is None else each.cause for each in ruled]
     if any(cause is None for cause in causes):
@@ -72,7 +72,7 @@ def raise_if_none_is_left(
         for (label, target, q), cause in zip(branches, causes, strict=True)
         if isinstance(cause, ClosestPair)
     ]
-    raise StartInCollision(colliding) if name == "start" else GoalInCollision(colliding)
+    raise in_collision(name, colliding)
 
 
 def _overloads(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:

@@ -19,7 +19,7 @@ from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
-from optimizer.problem.targets import AnyOf, Single
+from optimizer.problem.targets import AnyOf, Single, Target
 from optimizer.solution import UnreachableTarget
 
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least
@@ -58,12 +58,18 @@ class EndConfiguration:
 
 
 def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
-    """The branches at `start` or `goal` that the problem allows; and the targets without any.
+    """The branches at `start` or `goal` that the problem allows; and the targets without any: see `ends_of`."""
+    return ends_of(prepared, name, getattr(prepared.problem, name))
+
+
+def ends_of(
+    prepared: PreparedProblem, name: str, target: Target
+) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
+    """The branches of a target, called `name`, that the problem allows; and its members without any.
 
     Raises NoReachableTarget if none of several targets has a branch; for a single pose UnreachablePose (also if the
     branch asked for does not reach it) or SingularPose; InvalidProblem for a pose of an arm without inverse kinematics.
     """
-    target = getattr(prepared.problem, name)
     if not isinstance(target, AnyOf):
         return _ends_of(prepared, name, target, 0), []
     tolerance = sum(isinstance(member, ConeOrientedPose) for member in target.targets)

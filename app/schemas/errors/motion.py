@@ -20,7 +20,11 @@ class UnknownRobot(ProblemDetails):
 
 
 class _TargetError(ProblemDetails):
-    target: Literal["start", "goal"] = described("Target at fault; `goal` for the pose of `POST /ik`.", None, "goal")
+    target: str = described(
+        "Target at fault: `start`, `goal` (of `POST /ik`, too), or `stops/` and the name of a stop of `POST /cycle`.",
+        None,
+        "goal",
+    )
 
 
 class UnreachablePose(_TargetError):
@@ -135,6 +139,32 @@ class GoalInCollision(_InCollision):
     type: Literal["/problems/goal-in-collision"] = fixed("type", "/problems/goal-in-collision")
     title: Literal["Goal in collision"] = fixed("title", "Goal in collision")
     status: Literal[422] = fixed("status", 422)
+
+
+class StopInCollision(_InCollision):
+    """Every arm configuration at a stop of a round is invalid, at least one because it collides: the arm, its tool or
+    its payload touches a link or an obstacle, or is closer to an obstacle than its `margin`. The arm must be able to
+    come with what it carries to the stop, and to leave with what it carries from there. Move the stop or the obstacle.
+    If the shapes are too coarse, set `collisions` to false."""
+
+    type: Literal["/problems/stop-in-collision"] = fixed("type", "/problems/stop-in-collision")
+    title: Literal["Stop in collision"] = fixed("title", "Stop in collision")
+    status: Literal[422] = fixed("status", 422)
+    target: str = described("`stops/` and the name of the stop.", None, "stops/pick")
+
+
+class NoSequence(ProblemDetails):
+    """Every stop of the round can be reached, but no chain of arm configurations leads through all of them within the
+    limits. Move `stop` or the stop before it, relax a limit, leave `branch` out or set `windings` to true."""
+
+    type: Literal["/problems/no-sequence"] = fixed("type", "/problems/no-sequence")
+    title: Literal["No sequence of arm configurations"] = fixed("title", "No sequence of arm configurations")
+    status: Literal[422] = fixed("status", 422)
+    stop: str = described(
+        "The first stop that no motion comes to: `start`, or `stops/` and a name.", None, "stops/place"
+    )
+    reached: list[str] = described("Branches at the stop before it that motions come to.", None, [LABEL])
+    open: list[str] = described("Branches of this stop.", None, [LABEL])
 
 
 class DurationTooShort(ProblemDetails):

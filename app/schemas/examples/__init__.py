@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi.openapi.models import Example
 
 from app.schemas.examples.compare import COMPARE_EXAMPLES
+from app.schemas.examples.cycle import CYCLE_EXAMPLES
 from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
@@ -18,6 +19,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/optimize": {JSON: OPTIMIZE_EXAMPLES},
     "/compare": {JSON: COMPARE_EXAMPLES},
     "/pareto": {JSON: PARETO_EXAMPLES},
+    "/cycle": {JSON: CYCLE_EXAMPLES},
     "/whatif": {JSON: WHATIF_EXAMPLES},
     "/evaluate": {JSON: EVALUATE_EXAMPLES, CSV: CSV_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},

@@ -1,0 +1,143 @@
+"""POST /cycle: from a request to a round of the library, and from its solution to the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from app.convert.arm import to_arm, to_payload
+from app.convert.fields import fields
+from app.convert.request import to_branch, to_target
+from app.convert.solution import energy_fields, optimality_gap
+from app.convert.warnings import certified_warnings
+from app.schemas import cycle as asked
+from app.schemas.response import Clearance
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.sequence.round_solution import Move, RoundSolution
+from optimizer.solution import Solution
+
+
+def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
+    """The round of a request, of whose time `deadline` [s] is left.
+
+    Raises UnknownRobot, InvalidProblem or OutsideLimits.
+    """
+    return WorkRound(
+        arm=to_arm(request),
+        start=to_target(request.start),
+        stops=[_to_stop(k, stop) for k, stop in enumerate(request.stops)],
+        closed=request.closed,
+        branch=to_branch(request.branch),
+        method=request.method,
+        windings=request.windings,
+        hold=request.hold.hold,
+        brake_delay=request.hold.brake_delay,
+        brake_power=request.hold.brake_power,
+        sample_period=request.sample_period,
+        deadline=deadline,
+    )
+
+
+def _to_stop(k: int, stop: asked.StopRequest) -> Stop:
+    try:
+        # left out: what is carried stays
+        payload = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
+    except InvalidProblem as error:
+        raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
+    return Stop(
+        name=str(k + 1) if stop.name is None else stop.name,
+        target=to_target(stop.target),
+        dwell=stop.dwell,
+        payload=payload,
+        branch=to_branch(stop.branch),
+    )
+
+
+def to_cycle_response(
+    request: asked.CycleRequest, request_id: str, found: RoundSolution, store: Callable[[Solution], str]
+) -> dict[str, Any]:
+    """The answer of `POST /cycle`; `store` keeps the answer of a move and returns its path."""
+    energy = found.energy
+    electrical = energy.electrical
+    return {
+        "id": request_id,
+        **fields(request, "robot", "method"),
+        **fields(found, "duration", "status"),
+        "energy": {
+            **energy_fields(energy),
+            "lower_bound": found.lower_bound,
+            "optimality_gap": optimality_gap(found.lower_bound, electrical.total),
+        },
+        "legs": [leg for move in found.moves for leg in _legs(move, store)],
+        "baselines": [fields(each, *asked.CycleBaseline.model_fields) for each in found.baselines],
+        "certificate": {
+            "worst_ratio": _worst_ratio(found),
+            "joins": found.joins,
+            "energy_error": max(move.solution.certificate.energy_error for move in found.moves),
+            "balance_error": abs(electrical.parts_sum - electrical.total) / abs(electrical.total or 1.0),
+            "clearance": _clearance(found),
+        },
+        "warnings": [
+            f"{move.start} to {move.goal}: {each}" for move in found.moves for each in certified_warnings(move.solution)
+        ],
+        "search": {
+            "pairs": sum(move.pairs for move in found.moves),
+            "distinct": sum(move.kinds for move in found.moves),
+            "solved": sum(move.solved for move in found.moves),
+            "wall_time": found.wall_time,
+        },
+    }
+
+
+def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
+    """The entries of a move, and of the dwell after it."""
+    solution = move.solution
+    start = {**fields(solution.start, "label", "q", "target"), "stop": move.start}
+    goal = {**fields(solution.goal, "label", "q", "target"), "stop": move.goal}
+    legs = [
+        {
+            "kind": "move",
+            "start": start,
+            "goal": goal,
+            "t0": move.t0,
+            "duration": solution.duration,
+            "electrical": solution.energy.electrical.total,
+            "mechanical": solution.energy.mechanical.total,
+            "lower_bound": solution.lower_bound,
+            "payload_mass": move.arm.payload.mass,
+            "answer": store(solution),
+        }
+    ]
+    if move.dwell > 0:
+        legs.append(
+            {
+                "kind": "dwell",
+                "start": goal,
+                "goal": goal,
+                "t0": move.t0 + solution.duration,
+                "duration": move.dwell,
+                "electrical": move.dwell_energy,
+                "mechanical": 0.0,
+                "lower_bound": move.dwell_energy,
+                "payload_mass": move.arm_after.payload.mass,
+                "answer": None,
+            }
+        )
+    return legs
+
+
+def _worst_ratio(found: RoundSolution) -> dict[str, float]:
+    ratios = [move.solution.certificate.worst_ratio for move in found.moves]
+    return {name: max(each[name] for each in ratios) for name in ratios[0]}
+
+
+def _clearance(found: RoundSolution) -> dict[str, Any] | None:
+    """The smallest clearance, with the index of its move among the legs."""
+    leg, nearest = 0, None
+    for move in found.moves:
+        clearance = move.solution.certificate.clearance
+        if clearance is not None and (nearest is None or clearance.min_clearance < nearest["min_clearance"]):
+            nearest = {**fields(clearance, *Clearance.model_fields), "leg": leg}
+        leg += 1 + (move.dwell > 0)
+    return nearest

@@ -1,0 +1,220 @@
+"""What `POST /cycle` takes and answers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.arm import ArmRequest, Payload
+from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
+from app.schemas.examples.values import ANSWER_PATH
+from app.schemas.request import Branch, Holding, Target
+from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
+from optimizer.problem.names import LONGEST_NAME
+from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.work_round import MOST_STOPS
+from optimizer.solution import Objective
+
+StopName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
+
+
+class StopRequest(Request):
+    """A stop: the arm comes to rest at the target, and may take up or put down a payload."""
+
+    name: StopName | None = described(
+        "Name of the stop, different from those of the others. Null: its number, from 1.", None, "pick", default=None
+    )
+    target: Target = described(
+        "Joint positions, a pose of the TCP, or one of several targets. Orientations are given in full.",
+        None,
+        {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+    )
+    dwell: float = described("Time at rest at the stop.", "s", 0.4, default=0.0, ge=0, le=LONGEST_DURATION)
+    payload: Payload | None = described(
+        "What the arm carries from here on, the dwell included. Null: nothing, it is put down. Left out: unchanged.",
+        None,
+        {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
+        default=None,
+    )
+    branch: Branch | None = described(
+        "Allowed branches of the arm configurations at this stop. Null: all branches.",
+        None,
+        {"elbow": "up"},
+        default=None,
+    )
+
+
+class CycleRequest(ArmRequest):
+    """A round of stops, visited in their order. `payload` is what the arm carries to the first stop that changes it."""
+
+    start: Target = described(
+        "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of several targets.",
+        None,
+        {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
+    )
+    stops: Annotated[list[StopRequest], Field(min_length=1, max_length=MOST_STOPS)] = described(
+        "The stops, in the order in which they are visited.",
+        None,
+        [
+            {
+                "name": "pick",
+                "target": {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+                "payload": {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
+            },
+            {
+                "name": "place",
+                "target": {"pose": {"position": [0.1, 0.5, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
+                "payload": None,
+            },
+        ],
+    )
+    closed: bool = described(
+        "Whether the arm returns to the start after the last stop: to the same joint positions, full turns included.",
+        None,
+        True,
+        default=True,
+    )
+    hold: Holding = described(
+        "How the arm is held while it dwells.",
+        None,
+        {"hold": "brakes", "brake_delay": 0.5},
+        default=Holding(),
+    )
+    branch: Branch | None = described(
+        "Allowed branches of the arm configurations at the start. Null: all branches.",
+        None,
+        {"shoulder": "left"},
+        default=None,
+    )
+    method: MethodName = described(
+        "How the moves are parametrised: see `POST /optimize`.", None, "bspline", default="bspline"
+    )
+    windings: bool = described(
+        "Whether full-turn alternatives q + 2πk within the joint range count at every stop. If not, each configuration "
+        "has the joint positions nearest to the middle of the joint range.",
+        None,
+        True,
+        default=True,
+    )
+    sample_period: float = described(
+        "Time between the samples of the answers of the moves.", "s", 0.008, default=0.008, ge=1e-4, le=1
+    )
+    deadline: float = described(
+        "Wall time from the arrival of the request, including the wait for a worker. When it nears, the service "
+        "returns the best certified round found so far.",
+        "s",
+        60.0,
+        default=60.0,
+        ge=1e-3,
+        le=LONGEST_DURATION,
+    )
+
+    @property
+    def objective(self) -> Objective:
+        """The energy that is minimised."""
+        return "electrical"
+
+
+class RoundEnergy(MotionEnergy):
+    """Energy of the round: the moves, and the dwells in `electrical.dwell`."""
+
+    lower_bound: float = described(
+        "Lower bound of the electrical energy: no round that rests at these stops, of any configurations, shapes and "
+        "durations, draws less.",
+        "J",
+        536.1,
+    )
+    optimality_gap: float = described(GAP, "1", 0.11)
+
+
+class StopConfiguration(Configuration):
+    """The arm configuration at a stop."""
+
+    stop: str = described("Name of the stop; `start` for the start.", None, "pick")
+
+
+class CycleLeg(Response):
+    """A move from one stop to the next, or the dwell at a stop."""
+
+    kind: Literal["move", "dwell"] = described("`move`, or `dwell` at a stop.", None, "move")
+    start: StopConfiguration = part("Where it begins.")
+    goal: StopConfiguration = part("Where it ends; for a dwell, where it began.")
+    t0: float = described("When it begins, from the start of the round.", "s", 1.42)
+    duration: float = described("How long it takes.", "s", 0.91)
+    electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
+    mechanical: float = described("Mechanical work.", "J", 30.2)
+    lower_bound: float = described(
+        "Lower bound of the electrical energy between these two configurations; of a dwell, its energy.", "J", 64.0
+    )
+    payload_mass: float = described("Mass of the payload that the arm carries.", "kg", 2.0)
+    answer: str | None = described(
+        "Path of the complete answer of `POST /optimize` for this move; null for a dwell.", None, ANSWER_PATH
+    )
+
+
+class CycleBaseline(Response):
+    """The same stops with the same payloads and dwells, in another way."""
+
+    name: Literal["move_by_move", "controller_default"] = described(
+        "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
+        "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
+        "controller with its default speed and acceleration.",
+        None,
+        "move_by_move",
+    )
+    duration: float = described("Duration of this round.", "s", 9.9)
+    electrical: float = described("Electrical energy of this round.", "J", 700.2)
+    within_limits: bool = described(
+        "Whether every move is within the limits; collisions are checked at sample points.", None, True
+    )
+    saving: float = described("1 - energy of the answer / energy of this round.", "1", 0.15)
+
+
+class RoundClearance(Clearance):
+    """Smallest clearance over all moves."""
+
+    leg: int = described("Index in `legs`, from 0, of the move that comes so close.", None, 2)
+
+
+class RoundCertificate(Response):
+    """The certificates of all moves, and how the moves fit together."""
+
+    worst_ratio: WorstRatio = part("Largest value / limit over all moves, for each limit.")
+    joins: float = described("Largest jump of a joint from the end of a move to the start of the next.", "rad", 0.0)
+    energy_error: float = described("Largest `energy_error` of a move: see `POST /optimize`.", "1", 1e-6)
+    balance_error: float = described(
+        "Relative difference of the sum of the electrical parts of the round and the total.", "1", 1e-6
+    )
+    clearance: RoundClearance | None = part("Smallest clearance; null if `collisions` is false.")
+
+
+class CycleSearch(Response):
+    """Effort of the search."""
+
+    pairs: int = described("Pairs of arm configurations, over all moves.", "1", 295296)
+    distinct: int = described(
+        "Of these, those that differ in more than full turns of both ends; each has a proven bound.", "1", 70368
+    )
+    solved: int = described("Of these, those for which a motion was sought.", "1", 22)
+    wall_time: float = described("Wall time.", "s", 1.9)
+
+
+class CycleResponse(Answer):
+    """The round of least energy, its moves, and its certificate."""
+
+    method: MethodName = described("How the moves are parametrised.", None, "bspline")
+    duration: float = described("Duration of the round, dwells included.", "s", 8.3)
+    status: Literal["optimal", "feasible"] = described(
+        "`optimal`: every move converged, and no other chain of arm configurations has a lower bound below what was "
+        "found. It does not say that no better round exists: see `optimality_gap`. `feasible`: the round is certified, "
+        "but the search was not complete, or arm configurations may have been missed.",
+        None,
+        "optimal",
+    )
+    energy: RoundEnergy = part("Energy and power of the round.")
+    legs: Annotated[list[CycleLeg], Field(min_length=1)] = part("Moves and dwells in their order.")
+    baselines: list[CycleBaseline] = part("The same round in other ways; without what was not found in time.")
+    certificate: RoundCertificate = part("Independent check of all moves.")
+    warnings: list[str] = described(f"{WARNINGS} Each names its move.", None, [])
+    search: CycleSearch = part("Effort of the search.")

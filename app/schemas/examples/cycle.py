@@ -1,0 +1,59 @@
+"""Examples of POST /cycle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi.openapi.models import Example
+
+from app.schemas.examples.values import HOME, at
+
+PART = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
+"""A part in the gripper."""
+
+
+def _down(x: float, y: float, z: float) -> dict[str, Any]:
+    """A pose with the tool down at a position [m]."""
+    return {"pose": {"position": [x, y, z], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+
+
+CYCLE_EXAMPLES: dict[str, Example] = {
+    "pick_and_place": {
+        "summary": "Three parts from a belt into a box",
+        "description": "Six stops between a table, a post and a wall of the box. The arm carries 2 kg on every other "
+        "move; its configurations at all stops are chosen together.",
+        "value": {
+            "start": {"q": HOME},
+            "stops": [
+                {"name": "pick 1", "target": _down(0.45, -0.25, 0.15), "dwell": 0.3, "payload": PART},
+                {"name": "place 1", "target": _down(0.1, 0.5, 0.25), "dwell": 0.3, "payload": None},
+                {"name": "pick 2", "target": _down(0.45, -0.15, 0.15), "dwell": 0.3, "payload": PART},
+                {"name": "place 2", "target": _down(-0.05, 0.5, 0.25), "dwell": 0.3, "payload": None},
+                {"name": "pick 3", "target": _down(0.45, -0.05, 0.15), "dwell": 0.3, "payload": PART},
+                {"name": "place 3", "target": _down(-0.2, 0.5, 0.25), "dwell": 0.3, "payload": None},
+            ],
+            "scene": {
+                "obstacles": [
+                    {"name": "table", "shape": "box", "size": [1.6, 1.6, 0.1], "pose": at(0.0, 0.0, -0.1)},
+                    {"name": "post", "shape": "cylinder", "radius": 0.04, "length": 0.5, "pose": at(0.45, 0.3, 0.2)},
+                    {"name": "box wall", "shape": "box", "size": [0.6, 0.02, 0.12], "pose": at(-0.05, 0.36, 0.01)},
+                ]
+            },
+        },
+    },
+    "press_tending": {
+        "summary": "Tending a press, with brakes during the work",
+        "description": "The arm brings a blank, waits on its brakes while the press works, and takes the part away.",
+        "value": {
+            "start": {"q": HOME},
+            "stops": [
+                {"name": "blanks", "target": _down(0.4, -0.35, 0.1), "dwell": 0.2, "payload": PART},
+                {"name": "press", "target": _down(0.55, 0.1, 0.2), "dwell": 0.2, "payload": None},
+                {"name": "aside", "target": {"q": [-0.6, -1.4, 1.6, -1.8, -1.57, 0.0]}, "dwell": 4.0},
+                {"name": "take", "target": _down(0.55, 0.1, 0.2), "dwell": 0.2, "payload": PART},
+                {"name": "finished", "target": _down(0.1, 0.5, 0.15), "dwell": 0.2, "payload": None},
+            ],
+            "hold": {"hold": "brakes", "brake_delay": 0.5},
+        },
+    },
+}

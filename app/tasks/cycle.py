@@ -1,0 +1,31 @@
+"""POST /cycle in a worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.convert.cycle import to_cycle_response, to_work_round
+from app.convert.solution import to_optimize_response
+from app.engine.result import TaskResult
+from app.schemas.cycle import CycleRequest
+from app.tasks.answer_collector import AnswerCollector
+from app.tasks.certified import certified
+from optimizer.optimize_round import optimize_round
+from optimizer.solution import Solution
+
+
+@dataclass(frozen=True)
+class CycleTask:
+    """A validated request and its id."""
+
+    request: CycleRequest
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /cycle`, within about `deadline` seconds."""
+        found, collector = optimize_round(to_work_round(self.request, deadline)), AnswerCollector()
+
+        def store(solution: Solution) -> str:
+            return collector.add(to_optimize_response(self.request, self.request_id, certified(solution)))
+
+        return TaskResult.of_json(to_cycle_response(self.request, self.request_id, found, store), collector.stored)

@@ -1,0 +1,132 @@
+"""A round of work: stops that the arm visits one after the other, again and again. Validated on construction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from optimizer.exceptions import InvalidProblem, OutsideLimits
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.cycle import Cycle, Hold
+from optimizer.problem.names import check_name, first_repeated
+from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.targets import Target, members, validated
+
+MOST_STOPS = 100
+# name of the configuration from which the round starts, and of a closed round's end
+START = "start"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A target at which the arm comes to rest, for `dwell` [s].
+
+    `payload` is carried from here on, the dwell included: grasped, or released with a payload without mass; None leaves
+    it unchanged. `branch` restricts the inverse kinematics branches of this stop.
+    """
+
+    name: str
+    target: Target
+    dwell: float = 0.0
+    payload: Payload | None = None
+    branch: BranchFilter | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkRound:
+    """A request for the round of least electrical energy: from `start` over all `stops` in their order.
+
+    `start` is a target like those of the stops, `branch` restricts its branches; `arm` carries its payload from the
+    start to the first stop that changes it. A `closed` round ends in the configuration in which it started, full turns
+    included. With `windings` every full-turn alternative of a configuration counts; else the one nearest to the middle
+    of the joints' ranges. `hold`, `brake_delay` [s] and `brake_power` [W] say how the arm dwells, as in `Cycle`.
+
+    Orientations are given in full. Raises InvalidProblem or OutsideLimits, with the field named.
+    """
+
+    arm: Arm
+    start: Target
+    stops: Sequence[Stop]
+    closed: bool = True
+    branch: BranchFilter | None = None
+    method: MethodName = "bspline"
+    windings: bool = True
+    hold: Hold = "motors"
+    brake_delay: float = 0.0
+    brake_power: float | None = None
+    sample_period: float = 0.008
+    deadline: float = 60.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "stops", tuple(self.stops))
+        if not 1 <= len(self.stops) <= MOST_STOPS:
+            raise InvalidProblem("stops", f"A round must have 1 to {MOST_STOPS} stops.")
+        self._check_names()
+        object.__setattr__(self, "start", _full_target(self.arm, "start", self.start))
+        checked = tuple(
+            replace(stop, target=_full_target(self.arm, f"stops.{k}.target", stop.target))
+            for k, stop in enumerate(self.stops)
+        )
+        object.__setattr__(self, "stops", checked)
+        for k, stop in enumerate(self.stops):
+            if not 0 <= stop.dwell <= LONGEST_DURATION:
+                raise InvalidProblem(f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s.")
+            mass = 0.0 if stop.payload is None else stop.payload.mass
+            _check_rating(f"stops.{k}.payload.mass", mass, self.arm)
+        _check_rating("payload.mass", self.arm.payload.mass, self.arm)
+        if self.arm.bus.mode == "storage":
+            raise InvalidProblem("bus.mode", "A round has no energy storage on the bus: use another mode.")
+        for name in ("sample_period", "deadline"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
+        self.dwell(0)  # checks how the arm dwells
+
+    def _check_names(self) -> None:
+        names = [stop.name for stop in self.stops]
+        for k, name in enumerate(names):
+            check_name(f"stops.{k}.name", name)
+        repeated = first_repeated([START, *names])
+        if repeated is not None:
+            raise InvalidProblem(
+                f"stops.{repeated - 1}.name", f"Give each stop a name of its own; {START!r} is the start's."
+            )
+
+    @cached_property
+    def arms(self) -> list[Arm]:
+        """The arm with what it carries on the way to each stop, and after the last one."""
+        arms = [self.arm]
+        for stop in self.stops:
+            arms.append(arms[-1] if stop.payload is None else replace(arms[-1], payload=stop.payload))
+        return arms
+
+    def dwell(self, stop: int) -> Cycle | None:
+        """The dwell at a stop, as the wait after a motion of no duration; None if there is none."""
+        length = self.stops[stop].dwell
+        try:
+            cycle = Cycle(length or 1.0, self.hold, self.brake_delay, self.brake_power)
+        except InvalidProblem as error:
+            raise InvalidProblem(error.field.replace("cycle", "hold"), str(error).replace("cycle", "hold")) from None
+        return cycle if length else None
+
+
+def _full_target(arm: Arm, field: str, target: Target) -> Target:
+    """The target, its joint positions as read-only arrays. Raises InvalidProblem or OutsideLimits."""
+    if any(isinstance(member, ConeOrientedPose) for member in members(target)):
+        raise InvalidProblem(field, "The orientation of a stop is given in full: give a quaternion, rpy or rotvec.")
+    try:
+        return validated(arm, "goal", target)
+    except OutsideLimits as error:
+        raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
+    except InvalidProblem as error:
+        raise InvalidProblem(error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)) from None
+
+
+def _check_rating(field: str, mass: float, arm: Arm) -> None:
+    if mass > arm.robot.rated_payload:
+        rating = arm.robot.rated_payload
+        raise InvalidProblem(field, f"{field} exceeds the robot's rating: give at most {rating:g} kg.")

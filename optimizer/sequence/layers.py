@@ -1,0 +1,98 @@
+"""The layers of a round: the configurations in which the arm may rest at the start and at each stop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import members
+from optimizer.problem.work_round import START, WorkRound
+from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
+from optimizer.search.ends import EndConfiguration, ends_of
+
+# configurations of one layer, full turns included: 64 poses of a UR arm with all of theirs
+MOST_NODES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Configurations `q` (n, nq) [rad] of one stop. Each is one of `ends`, `end` (n,) says which, and `turns` (n, nq)
+    full turns away from this one's joint positions. `complete`: no branch of any pose may be missing."""
+
+    name: str
+    ends: list[EndConfiguration]
+    q: Array
+    end: npt.NDArray[np.intp]
+    turns: npt.NDArray[np.intp]
+    complete: bool
+
+    @property
+    def sampled(self) -> bool:
+        """Whether some of them stand for infinitely many."""
+        return any(end.sampled for end in self.ends)
+
+
+def layers_of(asked: WorkRound) -> list[Layer]:
+    """The layers of the start and of each stop; a closed round ends in the first one again.
+
+    Raises the errors of `optimize` for an end, which name `start` or `stops/NAME`; InvalidProblem for too many
+    configurations.
+    """
+    arms = asked.arms
+    first = _layer(asked, START, "start", asked.start, [arms[0], *(arms[-1:] if asked.closed else [])], asked.branch)
+    others = [
+        _layer(asked, f"stops/{stop.name}", f"stops.{k}.target", stop.target, arms[k : k + 2], stop.branch)
+        for k, stop in enumerate(asked.stops)
+    ]
+    return [first, *others]
+
+
+def _layer(asked: WorkRound, name: str, field: str, target: object, arms: Sequence[Arm], branch: object) -> Layer:
+    """The layer of a target that is come to and left with the `arms`."""
+    problem = Problem(arm=arms[0], start=target, goal=target, branch=branch, windings=asked.windings)  # type: ignore[arg-type]
+    found, _ = ends_of(PreparedProblem.of(problem), name, problem.goal)
+    q = np.array([end.q for end in found])
+    ruled = [
+        check_configurations(PreparedProblem.of(problem if arm is arms[0] else _with(problem, arm)), q) for arm in arms
+    ]
+    either = [next((each for each in causes if each is not None), None) for causes in zip(*ruled, strict=True)]
+    raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in found], either)
+    held = [end for end, cause in zip(found, either, strict=True) if cause is None]
+    middle = (asked.arm.active_limits.q_min + asked.arm.active_limits.q_max) / 2
+    nodes = [(k, np.array(node)) for k, end in enumerate(held) for node in _nodes(end, asked.windings, middle)]
+    if len(nodes) > MOST_NODES:
+        raise InvalidProblem(
+            field,
+            f"{name} has {len(nodes)} arm configurations, of at most {MOST_NODES}: give fewer targets, a `branch`, or "
+            "`windings` false.",
+        )
+    end = np.array([k for k, _ in nodes])
+    positions = np.array([node for _, node in nodes])
+    turns = np.round((positions - np.array([each.q for each in held])[end]) / (2 * np.pi)).astype(np.intp)
+    kinematics = inverse_kinematics_for(asked.arm.robot)
+    given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
+    return Layer(name, held, positions, end, turns, given or (kinematics is not None and kinematics.complete))
+
+
+def _with(problem: Problem, arm: Arm) -> Problem:
+    return Problem(arm=arm, start=problem.start, goal=problem.goal, branch=problem.branch, windings=problem.windings)
+
+
+def _nodes(end: EndConfiguration, windings: bool, middle: Array) -> list[tuple[float, ...]]:
+    """Joint positions (nq,) of a configuration: with every full turn, or the ones nearest to the middle.
+
+    A sample of infinitely many has one: as many samples as there are turns would add little.
+    """
+    if windings and not end.sampled:
+        return list(product(*end.choices))
+    return [tuple(min(each, key=lambda x: abs(x - m)) for each, m in zip(end.choices, middle.tolist(), strict=True))]

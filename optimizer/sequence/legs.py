@@ -1,0 +1,108 @@
+"""The legs of a round: every pair of configurations of two layers, with what is known of the motion between them.
+
+Joint displacement, configurations but for full turns, and payload decide a motion's energy: pairs that agree in these
+are one kind of leg. A kind has its proven bound first, and the energy of a motion once one of its pairs is solved. Only
+the range of a joint can tell pairs of a kind apart: where it does, a pair has a value of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from models.robot import Array
+from optimizer.deadline import checkpoint
+from optimizer.exceptions import InvalidProblem
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.lower_bound import lower_bounds
+from optimizer.sequence.layers import Layer
+
+# pairs of configurations of one leg: a matrix of this size takes some 30 MB
+MOST_PAIRS = 4_000_000
+# kinds between two looks at the deadline: some ten milliseconds
+KINDS_PER_CHECK = 2048
+
+
+@dataclass(eq=False)
+class Leg:
+    """All motions from one layer to the next.
+
+    `kind` (s, g) numbers the kinds of the pairs; `pair` (k, 2) is the pair of each kind that is farthest from the
+    joints' limits. `bound` (k,) [J] are proven. `cost` (s, g) [J] is the bound of a pair that is not solved, the energy
+    found of one that is, and inf of one without a motion; with it comes the `dwell` (g,) [J] at the goal. `solved` has
+    the energies of kinds, `exact` those of pairs, without the dwell.
+    """
+
+    prepared: PreparedProblem
+    start: Layer
+    goal: Layer
+    kind: npt.NDArray[np.intp]
+    pair: npt.NDArray[np.intp]
+    bound: Array
+    dwell: Array
+    cost: Array
+    solved: dict[int, float] = field(default_factory=dict)
+    exact: dict[tuple[int, int], float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, prepared: PreparedProblem, start: Layer, goal: Layer, dwell: Array) -> Leg:
+        """The pairs with their bounds. Raises InvalidProblem if there are too many."""
+        if len(start.q) * len(goal.q) > MOST_PAIRS:
+            raise InvalidProblem(
+                "stops",
+                f"From {start.name} to {goal.name} there are {len(start.q) * len(goal.q)} pairs of arm configurations, "
+                f"of at most {MOST_PAIRS}: give fewer targets, a `branch`, or `windings` false.",
+            )
+        kind, pair = _kinds(start, goal, prepared)
+        bound = _bounds(prepared, start, goal, pair)
+        return cls(prepared, start, goal, kind, pair, bound, dwell, bound[kind] + dwell)
+
+    def known(self, s: int, g: int) -> bool:
+        """Whether the pair, or another one of its kind, is solved."""
+        return (s, g) in self.exact or int(self.kind[s, g]) in self.solved
+
+    def set_kind(self, kind: int, energy: float) -> None:
+        """The energy [J] of a motion of this kind; inf if there is none."""
+        self.solved[kind] = energy
+        own = self.kind == kind
+        self.cost[own] = (energy + np.broadcast_to(self.dwell, self.cost.shape))[own]
+        for (s, g), value in self.exact.items():
+            self.cost[s, g] = value + self.dwell[g]
+
+    def set_pair(self, s: int, g: int, energy: float) -> None:
+        """The energy [J] of the motion of this pair; inf if it has none."""
+        self.exact[s, g] = energy
+        self.cost[s, g] = energy + self.dwell[g]
+
+
+def _kinds(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """The kind (s, g) of each pair, and of each kind the pair (k, 2) that is farthest from the limits."""
+    lowest, highest = (f(np.vstack([start.turns, goal.turns]), axis=0) for f in (np.min, np.max))
+    base = 2 * (highest - lowest) + 1
+    place = np.concatenate([[1], np.cumprod(base[:-1])])
+    turned = (goal.turns @ place)[None, :] - (start.turns @ place)[:, None]
+    ends = start.end[:, None] * len(goal.ends) + goal.end[None, :]
+    code = ends * (2 * int(np.abs(turned).max(initial=0)) + 1) + turned
+    limits = prepared.arm.active_limits
+    middle, half = (limits.q_max + limits.q_min) / 2, (limits.q_max - limits.q_min) / 2
+    edge = [(np.abs(layer.q - middle) / half).max(axis=1) for layer in (start, goal)]
+    order = np.argsort(np.maximum(edge[0][:, None], edge[1][None, :]), axis=None, kind="stable")
+    _, first, kind = np.unique(code.ravel()[order], return_index=True, return_inverse=True)
+    of_pair = np.empty(code.size, dtype=np.intp)
+    of_pair[order] = kind
+    return of_pair.reshape(code.shape), np.column_stack(np.unravel_index(order[first], code.shape))
+
+
+def _bounds(prepared: PreparedProblem, start: Layer, goal: Layer, pair: npt.NDArray[np.intp]) -> Array:
+    """Proven lower bounds (k,) [J] of the kinds."""
+    potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
+    gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
+    displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
+    bounds = []
+    for low in range(0, len(pair), KINDS_PER_CHECK):
+        checkpoint()
+        part = slice(low, low + KINDS_PER_CHECK)
+        bounds.append(lower_bounds(prepared, displacement[part], gain[part])[0])
+    return np.concatenate(bounds)

@@ -1,0 +1,104 @@
+"""The answer to a round: its moves, energy, lower bound, baselines and certificate. SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from optimizer.problem.arm import Arm
+from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, Solution
+
+
+@dataclass(frozen=True)
+class Move:
+    """One move from stop `start` to `goal`, by name, by `arm`; and the dwell after it, by `arm_after`.
+
+    It begins at `t0` [s] of the round; `dwell` [s] is held after it, which draws `dwell_energy` [J]. `pairs` of
+    configurations were possible, of so many `kinds`, of which so many were `solved`.
+    """
+
+    start: str
+    goal: str
+    arm: Arm
+    arm_after: Arm
+    solution: Solution
+    t0: float
+    dwell: float
+    dwell_energy: float
+    pairs: int
+    kinds: int
+    solved: int
+
+
+RoundBaselineName = Literal["move_by_move", "controller_default"]
+
+
+@dataclass(frozen=True)
+class RoundBaseline:
+    """Another way to go round: its duration [s], electrical energy [J], and our saving 1 - ours / theirs."""
+
+    name: RoundBaselineName
+    duration: float
+    electrical: float
+    within_limits: bool
+    saving: float
+
+
+@dataclass(frozen=True)
+class RoundSolution:
+    """The round of least energy. No round over these stops, of any configurations and shapes, with rests at the stops,
+    needs less than `lower_bound` [J].
+
+    `status` is `optimal` if no chain of configurations has a bound below what was found, and every move converged.
+    """
+
+    status: Literal["optimal", "feasible"]
+    moves: list[Move]
+    lower_bound: float
+    baselines: list[RoundBaseline]
+    complete: bool
+    wall_time: float
+
+    @property
+    def duration(self) -> float:
+        """Duration of the round, dwells included [s]."""
+        return sum(move.solution.duration + move.dwell for move in self.moves)
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Energy of the round [J], with the dwells."""
+        return summed([move.solution for move in self.moves], sum(move.dwell_energy for move in self.moves))
+
+    @property
+    def joins(self) -> float:
+        """Largest jump [rad] of a joint from the end of a move to the start of the next."""
+        ends = [move.solution.trajectory.spline.control_points[[0, -1]] for move in self.moves]
+        return max((float(np.abs(b[0] - a[1]).max()) for a, b in pairwise(ends)), default=0.0)
+
+
+def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
+    """The energy of several motions, and of the dwells between them [J]; mean power is that of the motions."""
+    energies = [each.energy for each in solutions]
+    parts = [part.name for part in fields(ElectricalEnergy)]
+    electrical = ElectricalEnergy(**{part: sum(getattr(each.electrical, part) for each in energies) for part in parts})
+    moving = sum(each.duration for each in solutions)
+    return Energy(
+        electrical=electrical,
+        mechanical=MechanicalEnergy(
+            sum(each.mechanical.total for each in energies),
+            np.sum([each.mechanical.per_joint for each in energies], axis=0),
+        ),
+        per_joint=JointEnergy(
+            **{
+                part.name: np.sum([getattr(each.per_joint, part.name) for each in energies], axis=0)
+                for part in fields(JointEnergy)
+            }
+        ),
+        peak_power=max(each.peak_power for each in energies),
+        mean_power=sum(each.energy.mean_power * each.duration for each in solutions) / moving,
+    ).with_dwell(dwell)

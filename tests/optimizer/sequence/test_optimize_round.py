@@ -1,0 +1,256 @@
+"""Rounds: the least of all chains, certified, and never above what choosing move by move gives."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.energy.dwell import holding_power
+from optimizer.exceptions import (
+    DeadlineExceeded,
+    InvalidProblem,
+    NoSequence,
+    OutsideLimits,
+    StopInCollision,
+    UnreachablePose,
+)
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.optimize import optimize
+from optimizer.optimize_round import optimize_round
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.bus import Bus
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import Box, Obstacle, Scene
+from optimizer.problem.targets import AnyOf
+from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.sequence.layers import layers_of
+from optimizer.sequence.round_solution import RoundSolution
+from tests.optimizer.clocks import CountingClock
+from tests.optimizer.moves import AMPLE, ROBOT, torques
+from tests.optimizer.sequence.rounds import HOME, PART, pick_and_place, poses
+from tests.selection import long_but
+
+# relative: sums of the same numbers in another order
+ROUNDING = 1e-9
+# relative: an optimum that is reached from the search's rough motion, and one from nothing
+CONVERGED = 2e-3
+
+
+def assert_true(asked: WorkRound, found: RoundSolution) -> None:
+    """What every round promises."""
+    assert all(move.solution.certificate.valid for move in found.moves)
+    assert found.joins < 1e-9
+    electrical = found.energy.electrical
+    own = sum(move.solution.energy.electrical.total + move.dwell_energy for move in found.moves)
+    assert electrical.total == pytest.approx(own, rel=ROUNDING)
+    assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-3)
+    assert found.lower_bound <= electrical.total
+    assert found.duration == pytest.approx(
+        found.moves[-1].t0 + found.moves[-1].solution.duration + found.moves[-1].dwell
+    )
+    names = ["start", *(stop.name for stop in asked.stops), *(["start"] if asked.closed else [])]
+    assert [move.start for move in found.moves] == names[:-1] and [move.goal for move in found.moves] == names[1:]
+    if asked.closed:
+        assert (found.moves[-1].solution.goal.q == found.moves[0].solution.start.q).all()
+    for baseline in found.baselines:
+        if baseline.within_limits:
+            assert electrical.total <= baseline.electrical * (1 + ROUNDING)
+
+
+def energy_of(asked: WorkRound, k: int, start: Array, goal: Array) -> float:
+    """Energy [J] of move k between joint positions, by `optimize`."""
+    problem = Problem(arm=asked.arms[k], start=start, goal=goal, windings=False, deadline=AMPLE)
+    return optimize(problem).energy.electrical.total
+
+
+@pytest.mark.parametrize("seed", long_but(range(2), range(100)))
+def test_it_is_the_least_of_all_chains(seed: int) -> None:
+    """Two or three stops with two or three branches each, every chain by `optimize`."""
+    asked = pick_and_place(seed, 3, windings=False)
+    only = BranchFilter(elbow="up", wrist="no_flip" if seed % 2 else None)
+    asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
+    found = optimize_round(asked)
+    assert_true(asked, found)
+    layers = [layer.q for layer in layers_of(asked)]
+    goals = [*layers[1:], layers[0]]
+    known = {
+        (k, a, b): energy_of(asked, k, layers[k][a], goals[k][b])
+        for k in range(len(layers))
+        for a, b in product(range(len(layers[k])), range(len(goals[k])))
+    }
+    best = min(
+        sum(known[k, a, b] for k, (a, b) in enumerate(zip(chain, [*chain[1:], chain[0]], strict=True)))
+        for chain in product(*(range(len(layer)) for layer in layers))
+    )
+    assert found.status == "optimal"
+    assert found.energy.electrical.total == pytest.approx(best, rel=CONVERGED)
+    assert found.lower_bound <= best
+
+
+@pytest.mark.parametrize(("seed", "count"), long_but([(1, 3)], [(1, 3), *((seed, 6) for seed in range(20))]))
+def test_rounds_are_true_and_not_above_move_by_move(seed: int, count: int) -> None:
+    asked = pick_and_place(seed, count)
+    found = optimize_round(asked)
+    assert_true(asked, found)
+    assert found.status == "optimal"
+    assert {each.name for each in found.baselines} == {"move_by_move", "controller_default"}
+    assert all(each.saving >= -ROUNDING for each in found.baselines if each.name == "move_by_move")
+
+
+def test_move_by_move_is_what_successive_calls_of_optimize_give() -> None:
+    asked = pick_and_place(1, 3)
+    found = optimize_round(asked)
+    q, total = HOME, 0.0
+    for k, stop in enumerate(asked.stops):
+        move = optimize(Problem(arm=asked.arms[k], start=q, goal=stop.target, deadline=AMPLE))
+        q, total = move.goal.q, total + move.energy.electrical.total
+    total += energy_of(asked, len(asked.stops), q, HOME)
+    total += sum(move.dwell_energy for move in found.moves)
+    (greedy,) = (each for each in found.baselines if each.name == "move_by_move")
+    assert greedy.electrical == pytest.approx(total, rel=0.01)  # either may take the other of two equal moves
+    assert greedy.saving == pytest.approx(1 - found.energy.electrical.total / greedy.electrical, abs=ROUNDING)
+
+
+def test_the_part_is_carried_where_it_is_and_held_while_the_arm_dwells() -> None:
+    asked = pick_and_place(2, 2, windings=False)
+    found = optimize_round(asked)
+    assert [move.arm.payload.mass for move in found.moves] == [0.0, 2.0, 0.0]
+    for k, move in enumerate(found.moves[:-1]):
+        loaded = Problem(arm=asked.arms[k + 1], start=HOME, goal=HOME)
+        q, still = move.solution.goal.q[None], np.zeros((1, 6))
+        hold = float(holding_power(loaded.arm, torques(loaded, q, still, still))[0])
+        assert move.dwell_energy == pytest.approx(0.3 * hold, rel=ROUNDING)
+    braked = optimize_round(replace(asked, hold="brakes", brake_delay=0.1, brake_power=5.0))
+    for with_motors, with_brakes in zip(found.moves[:-1], braked.moves[:-1], strict=True):
+        assert with_brakes.dwell_energy == pytest.approx(with_motors.dwell_energy / 3 + 5.0 * 0.2, rel=ROUNDING)
+
+
+def test_a_heavier_part_costs_more_and_an_open_round_less() -> None:
+    asked = pick_and_place(3, 2, windings=False)
+    heavy = replace(asked, stops=[replace(asked.stops[0], payload=replace(PART, mass=4.0)), asked.stops[1]])
+    least, more, open_ = (
+        optimize_round(each).energy.electrical.total for each in (asked, heavy, replace(asked, closed=False))
+    )
+    assert open_ < least < more
+
+
+def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> None:
+    first, *others = poses(4, 3)
+    stops = [Stop(name=str(k), target=pose) for k, pose in enumerate(others)]
+    asked = WorkRound(arm=Arm(robot=ROBOT, collisions=False), start=first, stops=stops, windings=False, deadline=AMPLE)
+    found = optimize_round(asked)
+    assert_true(asked, found)
+    for start in layers_of(asked)[0].q:
+        fixed = optimize_round(replace(asked, start=start))
+        assert found.energy.electrical.total <= fixed.energy.electrical.total * (1 + CONVERGED)
+        assert found.lower_bound <= fixed.lower_bound * (1 + ROUNDING)
+
+
+def test_one_of_several_targets_is_chosen_for_the_whole_round() -> None:
+    near, far = poses(5, 2)
+    stops = [Stop(name="either", target=AnyOf((far, near))), Stop(name="then", target=far)]
+    asked = WorkRound(arm=Arm(robot=ROBOT, collisions=False), start=HOME, stops=stops, windings=False, deadline=AMPLE)
+    found = optimize_round(asked)
+    assert_true(asked, found)
+    singles = [
+        optimize_round(replace(asked, stops=[replace(stops[0], target=target), stops[1]])).energy.electrical.total
+        for target in (far, near)
+    ]
+    assert found.energy.electrical.total == pytest.approx(min(singles), rel=CONVERGED)
+    assert found.moves[0].solution.goal.q.shape == (6,)
+
+
+def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures() -> None:
+    """Its configurations are samples: never `optimal`, and what fixed postures need is above the bound."""
+    robot = load_robot("panda")
+    q = np.array([[0.3, -0.4, 0.2, -2.0, 0.1, 1.8, 0.5], [-0.6, 0.2, 0.1, -1.7, -0.2, 2.0, 0.9]])
+    arm = Arm(robot=robot, collisions=False)
+    stops = [Stop(name="a", target=Pose(tcp_pose(arm, q[0]))), Stop(name="b", target=Pose(tcp_pose(arm, q[1])))]
+    asked = WorkRound(arm=arm, start=q[0] * 0.9, stops=stops, deadline=AMPLE)
+    found = optimize_round(asked)
+    assert_true(asked, found)
+    assert found.status == "feasible"
+    given = replace(asked, stops=[replace(stop, target=posture) for stop, posture in zip(stops, q, strict=True)])
+    assert found.lower_bound <= optimize_round(given).energy.electrical.total
+
+
+@pytest.mark.parametrize("readings", [40, 200, 1000, 4000])
+def test_a_deadline_gives_the_best_round_so_far_or_says_so(readings: int) -> None:
+    """A clock that counts its readings passes the deadline anywhere; what comes out is certified all the same."""
+    asked = replace(pick_and_place(1, 3, windings=False), deadline=float(readings))
+    try:
+        found = optimize_round(asked, clock=CountingClock())
+    except DeadlineExceeded:
+        return
+    assert_true(asked, found)
+
+
+def test_what_is_wrong_names_the_stop() -> None:
+    arm = Arm(robot=ROBOT)
+    far = Pose.from_rotation([1.5, 0.0, 0.2], np.eye(3))
+    asked = pick_and_place(1, 2)
+    with pytest.raises(UnreachablePose) as unreachable:
+        optimize_round(replace(asked, stops=[asked.stops[0], Stop(name="far", target=far)]))
+    assert unreachable.value.target == "stops/far"
+    place = np.eye(4)
+    place[:3, 3] = poses(1, 1)[0].T[:3, 3]
+    wall = Obstacle(name="wall", shape=Box(np.full(3, 0.2)), T_base_shape=place)
+    blocked = replace(arm, scene=Scene((wall,)))
+    with pytest.raises(StopInCollision) as collision:
+        optimize_round(replace(asked, arm=blocked))
+    assert collision.value.target == "stops/stop 0" and "stops/stop 0 is in collision" in str(collision.value)
+
+
+def test_stops_that_no_chain_connects_are_named() -> None:
+    """Between two ranges of a joint that full turns would have to bridge there is no way without windings."""
+    narrow = replace(ROBOT.limits, v_max=np.full(6, 1e-2))
+    arm = Arm(robot=ROBOT, collisions=False, limits=narrow)
+    stops = [Stop(name="away", target=HOME + np.array([6.1, 0, 0, 0, 0, 0]))]
+    with pytest.raises(NoSequence) as refusal:
+        optimize_round(WorkRound(arm=arm, start=HOME, stops=stops, deadline=AMPLE))
+    assert refusal.value.stop == "stops/away" and refusal.value.reached and refusal.value.open
+
+
+WRONG: dict[str, tuple[str, dict[str, Any]]] = {
+    "no stops": ("stops", {"stops": []}),
+    "too many stops": ("stops", {"stops": [Stop(name=str(k), target=HOME) for k in range(101)]}),
+    "name twice": ("stops.1.name", {"stops": [Stop(name="a", target=HOME), Stop(name="A ", target=HOME)]}),
+    "name of the start": ("stops.0.name", {"stops": [Stop(name="start", target=HOME)]}),
+    "no name": ("stops.0.name", {"stops": [Stop(name="", target=HOME)]}),
+    "dwell": ("stops.0.dwell", {"stops": [Stop(name="a", target=HOME, dwell=-1.0)]}),
+    "dwell nan": ("stops.0.dwell", {"stops": [Stop(name="a", target=HOME, dwell=np.nan)]}),
+    "heavy": ("stops.0.payload.mass", {"stops": [Stop(name="a", target=HOME, payload=Payload(mass=6.0))]}),
+    "joints": ("stops.0.target.q", {"stops": [Stop(name="a", target=np.zeros(5))]}),
+    "free": (
+        "stops.0.target",
+        {"stops": [Stop(name="a", target=ConeOrientedPose(np.array([0.4, 0.0, 0.3])))]},
+    ),
+    "storage": (
+        "bus.mode",
+        {"arm": Arm(robot=ROBOT, bus=Bus("storage", efficiency=0.9, capacity=100.0))},
+    ),
+    "hold": ("hold.brake_delay", {"brake_delay": -1.0}),
+    "deadline": ("deadline", {"deadline": 0.0}),
+}
+
+
+@pytest.mark.parametrize(("field", "given"), WRONG.values(), ids=WRONG)
+def test_a_wrong_round_names_its_field(field: str, given: dict[str, Any]) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        replace(pick_and_place(1, 2), **given)
+    assert refusal.value.field == field
+
+
+def test_joint_positions_out_of_range_name_the_stop_and_the_joint() -> None:
+    with pytest.raises(OutsideLimits) as refusal:
+        replace(pick_and_place(1, 2), stops=[Stop(name="a", target=HOME + 7.0)])
+    assert refusal.value.field == "stops.0.target.q" and refusal.value.joint == ROBOT.joint_names[0]
