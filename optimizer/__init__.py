@@ -10,6 +10,7 @@ from optimizer.exceptions import (
     InvalidProblem,
     JoulepathError,
     NoReachableTarget,
+    NoSequence,
     NoTrajectory,
     OutsideLimits,
     SingularPose,
@@ -18,6 +19,7 @@ from optimizer.exceptions import (
     UnreachablePose,
 )
 from optimizer.optimize import optimize
+from optimizer.optimize_round import optimize_round
 from optimizer.pareto import Front, pareto
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
@@ -25,6 +27,8 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf
+from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.sequence.round_solution import RoundSolution
 from optimizer.solution import Solution
 
 __all__ = [
@@ -38,17 +42,22 @@ __all__ = [
     "InvalidProblem",
     "JoulepathError",
     "NoReachableTarget",
+    "NoSequence",
     "NoTrajectory",
     "OutsideLimits",
     "Payload",
     "Pose",
     "Problem",
+    "RoundSolution",
     "SingularPose",
     "Solution",
+    "Stop",
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
+    "WorkRound",
     "load_robot",
     "optimize",
+    "optimize_round",
     "pareto",
 ]

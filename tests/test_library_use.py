@@ -21,18 +21,23 @@ PUBLIC = {
     "JoulepathError",
     "ConeOrientedPose",
     "NoReachableTarget",
+    "NoSequence",
     "NoTrajectory",
     "OutsideLimits",
     "Payload",
     "Pose",
     "Problem",
+    "RoundSolution",
     "SingularPose",
     "Solution",
+    "Stop",
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
+    "WorkRound",
     "load_robot",
     "optimize",
+    "optimize_round",
     "pareto",
 }
 
@@ -43,12 +48,13 @@ def test_the_public_names_are_a_promise() -> None:
     # `optimizer.optimize` is also a module: the name must stay the function's however the package was imported
     assert callable(optimizer.optimize)
     assert callable(optimizer.pareto)
+    assert callable(optimizer.optimize_round)
 
 
 def test_one_except_clause_catches_every_error() -> None:
     exported = [getattr(optimizer, name) for name in PUBLIC]
     errors = [each for each in exported if isinstance(each, type) and issubclass(each, BaseException)]
-    assert len(errors) == 11
+    assert len(errors) == 12
     assert all(issubclass(error, optimizer.JoulepathError) for error in errors)
 
 

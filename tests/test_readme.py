@@ -1,4 +1,4 @@
-"""The README's Python code, run as it is printed."""
+"""The Python code of the README and of a page, run as it is printed."""
 
 from __future__ import annotations
 
@@ -19,3 +19,11 @@ def test_the_snippet_prints_what_the_readme_says() -> None:
     ((code, printed),) = snippets
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert run.stdout == printed
+
+
+def test_the_snippet_of_the_cycles_page_goes_round() -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "cycles.md").read_text(), re.DOTALL)
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    energy, bound, labels = run.stdout.split(" ", 2)
+    assert 0.8 * float(energy) < float(bound) < float(energy)
+    assert labels.count("/") == 2 * 3

@@ -1,0 +1,91 @@
+"""Rounds of stops: what deciding all stops together saves against move by move, the proven gap, and the time.
+
+    python -m benchmarks.rounds --count 20
+    python -m benchmarks.rounds --count 5 --stops 12
+
+A UR5e starts from rest over the table, takes up 2 kg at every other stop, puts it down at the next one, and comes back.
+Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each. Collisions are ignored,
+so that every round has an answer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread
+from models.registry import load_robot
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.optimize_round import optimize_round
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.pose import Pose
+from optimizer.problem.work_round import Stop, WorkRound
+
+HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()
+# ring around the base, heights [m], and greatest tilt of the tool [rad]
+NEAREST, FARTHEST, HEIGHTS, TILT = 0.35, 0.7, (0.05, 0.4), 0.2
+
+
+def poses(rng: np.random.Generator, count: int) -> list[Pose]:
+    """Poses with the tool nearly down."""
+    found = list[Pose]()
+    while len(found) < count:
+        x, y, z = rng.uniform([-FARTHEST, -FARTHEST, HEIGHTS[0]], [FARTHEST, FARTHEST, HEIGHTS[1]])
+        if NEAREST < np.hypot(x, y) < FARTHEST:
+            roll, pitch, yaw = rng.uniform([-TILT, -TILT, -np.pi], [TILT, TILT, np.pi])
+            found.append(Pose.from_rpy([x, y, z], [np.pi + roll, pitch, yaw]))
+    return found
+
+
+def rounds(seed: int, count: int, stops: int, deadline: float) -> Iterator[WorkRound]:
+    """The rounds, each with a generator of its own."""
+    arm = Arm(robot=load_robot("ur5e"), collisions=False)
+    for k in range(count):
+        targets = poses(np.random.default_rng([seed, k]), stops)
+        yield WorkRound(
+            arm=arm,
+            start=HOME,
+            stops=[
+                Stop(name=str(j), target=pose, dwell=0.3, payload=NOTHING if j % 2 else PART)
+                for j, pose in enumerate(targets)
+            ],
+            deadline=deadline,
+        )
+
+
+def main() -> None:
+    """Solves every round, and prints savings, gaps, times and the number of motions sought."""
+    arguments = parser(__doc__, seed=0)
+    arguments.add_argument("--count", type=int, default=20, help="rounds (%(default)s)")
+    arguments.add_argument("--stops", type=int, default=6, help="stops of a round (%(default)s)")
+    arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a round [s] (%(default)s)")
+    given = arguments.parse_args()
+    on_one_core()
+    compile_kernel(load_robot("ur5e"))
+    optimize_round(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
+    found: dict[str, list[float]] = {}
+    optimal = 0
+    for asked in rounds(given.seed, given.count, given.stops, given.deadline):
+        began = time.perf_counter()
+        answer = optimize_round(asked)
+        row = {f"saved against {each.name}": each.saving for each in answer.baselines}
+        row["gap"] = 1 - answer.lower_bound / answer.energy.electrical.total
+        row["time [s]"] = time.perf_counter() - began
+        row["distinct legs"] = sum(move.kinds for move in answer.moves)
+        row["motions sought"] = sum(move.solved for move in answer.moves)
+        optimal += answer.status == "optimal"
+        for name, value in row.items():
+            found.setdefault(name, []).append(float(value))
+    print(f"{given.count} rounds of {given.stops} stops, seed {given.seed}: {optimal} optimal, all certified")
+    results = {name: Spread.of(values) for name, values in found.items()}
+    for name, spread in results.items():
+        print(f"{name:32s} {spread.formatted(digits=3)}, least {spread.minimum:.3f}")
+    write_json(given.json, {"seed": given.seed, "count": given.count, "stops": given.stops} | results)
+
+
+if __name__ == "__main__":
+    main()

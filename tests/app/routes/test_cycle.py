@@ -1,0 +1,157 @@
+"""POST /cycle: the round as the contract lays it out, its answers by reference, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.schemas.cycle import CycleResponse
+from app.schemas.response import OptimizeResponse
+from tests.app.requests import HOME, PATIENT
+
+# relative: sums of the same numbers in another order
+ROUNDING = 1e-9
+PART = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
+
+
+def down(x: float, y: float, z: float) -> dict[str, Any]:
+    return {"pose": {"position": [x, y, z], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+
+
+def a_round(**fields: Any) -> dict[str, Any]:
+    """Two stops; a part is carried from the first to the second."""
+    stops = [
+        {"name": "pick", "target": down(0.45, -0.25, 0.2), "dwell": 0.5, "payload": PART},
+        {"name": "place", "target": down(0.1, 0.5, 0.25), "payload": None},
+    ]
+    return {"start": {"q": HOME}, "stops": stops, "windings": False, **PATIENT, **fields}
+
+
+@pytest.fixture(scope="module")
+def answer(client: TestClient) -> dict[str, Any]:
+    reply = client.post("/cycle", json=a_round())
+    assert reply.status_code == 200, reply.text
+    CycleResponse.model_validate_json(reply.content)
+    content: dict[str, Any] = reply.json()
+    return content
+
+
+def test_legs_are_in_the_order_of_time(answer: dict[str, Any]) -> None:
+    kinds = [(leg["kind"], leg["start"]["stop"], leg["goal"]["stop"]) for leg in answer["legs"]]
+    assert kinds == [
+        ("move", "start", "pick"),
+        ("dwell", "pick", "pick"),
+        ("move", "pick", "place"),
+        ("move", "place", "start"),
+    ]
+    t = 0.0
+    for leg in answer["legs"]:
+        assert leg["t0"] == pytest.approx(t)
+        t += leg["duration"]
+    assert answer["duration"] == pytest.approx(t)
+    assert [leg["payload_mass"] for leg in answer["legs"]] == [0.0, 2.0, 2.0, 0.0]
+    for before, after in zip(answer["legs"], answer["legs"][1:], strict=False):
+        assert before["goal"]["q"] == after["start"]["q"]
+    assert answer["legs"][-1]["goal"]["q"] == HOME
+
+
+def test_energies_add_up(answer: dict[str, Any]) -> None:
+    energy, legs = answer["energy"], answer["legs"]
+    for part in ("electrical", "mechanical"):
+        assert energy[part]["total"] == pytest.approx(sum(leg[part] for leg in legs), rel=ROUNDING)
+    assert energy["electrical"]["dwell"] == pytest.approx(answer["legs"][1]["electrical"], rel=ROUNDING)
+    assert energy["lower_bound"] <= sum(leg["lower_bound"] for leg in answer["legs"]) * (1 + ROUNDING)
+    assert energy["optimality_gap"] == pytest.approx(1 - energy["lower_bound"] / energy["electrical"]["total"])
+    for each in answer["baselines"]:
+        assert each["saving"] == pytest.approx(1 - energy["electrical"]["total"] / each["electrical"], abs=ROUNDING)
+    assert answer["certificate"]["joins"] < ROUNDING and max(answer["certificate"]["worst_ratio"].values()) <= 1 + 1e-6
+
+
+def test_every_move_refers_to_its_answer(answer: dict[str, Any], client: TestClient) -> None:
+    clearances = []
+    for leg in answer["legs"]:
+        if leg["kind"] == "dwell":
+            assert leg["answer"] is None
+            continue
+        kept = client.get(leg["answer"]).json()
+        assert kept["kind"] == "optimize"
+        own = OptimizeResponse.model_validate(kept["answer"]).model_dump(exclude_unset=True)
+        assert own["energy"]["electrical"]["total"] == leg["electrical"] and own["duration"] == leg["duration"]
+        assert own["branch"]["goal"]["q"] == leg["goal"]["q"]
+        clearances.append(own["certificate"]["clearance"]["min_clearance"])
+    nearest = answer["certificate"]["clearance"]
+    assert nearest["min_clearance"] == min(clearances) and answer["legs"][nearest["leg"]]["kind"] == "move"
+
+
+def test_a_payload_that_is_left_out_stays_and_null_puts_it_down(client: TestClient) -> None:
+    stops = a_round()["stops"]
+    carried = client.post("/cycle", json=a_round(stops=[stops[0], {"target": stops[1]["target"]}], closed=False)).json()
+    assert [leg["payload_mass"] for leg in carried["legs"]] == [0.0, 2.0, 2.0]
+    assert carried["legs"][-1]["goal"]["stop"] == "2"  # a stop without a name has its number
+    put_down = client.post("/cycle", json=a_round(payload=PART, stops=[stops[1]])).json()
+    assert [leg["payload_mass"] for leg in put_down["legs"]] == [2.0, 0.0]
+
+
+REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
+    "no stops": ("validation", ["body", "stops"], {"stops": []}),
+    "unknown field": ("validation", ["body", "stops", 0], {"stops": [{"target": {"q": HOME}, "speed": 1}]}),
+    "same names": (
+        "validation",
+        ["body", "stops", 1, "name"],
+        {"stops": [{"name": "a", "target": {"q": HOME}}, {"name": "A", "target": {"q": HOME}}]},
+    ),
+    "number of another": (
+        "validation",
+        ["body", "stops", 1, "name"],
+        {"stops": [{"name": "2", "target": {"q": HOME}}, {"target": {"q": HOME}}]},
+    ),
+    "joints": ("validation", ["body", "stops", 0, "target", "q"], {"stops": [{"target": {"q": [0.0]}}]}),
+    "free orientation": (
+        "validation",
+        ["body", "stops", 0, "target"],
+        {"stops": [{"target": {"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}}}]},
+    ),
+    "overloaded": (
+        "validation",
+        ["body", "stops", 0, "payload", "mass"],
+        {"stops": [{"target": {"q": HOME}, "payload": {"mass": 50.0, "com": [0, 0, 0]}}]},
+    ),
+    "beyond a joint": ("outside-limits", None, {"stops": [{"target": {"q": [9.0, *HOME[1:]]}}]}),
+    "out of reach": ("unreachable-pose", None, {"stops": [{"target": down(2.0, 0.0, 0.2)}]}),
+    "in the ground": (
+        "stop-in-collision",
+        None,
+        {
+            "scene": {
+                "obstacles": [
+                    {
+                        "name": "block",
+                        "shape": "box",
+                        "size": [0.3, 0.3, 0.3],
+                        "pose": {"position": [0.45, -0.25, 0.2], "rotvec": [0, 0, 0]},
+                    }
+                ]
+            }
+        },
+    ),
+    "deadline": ("validation", ["body", "deadline"], {"deadline": 1e5}),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_wrong_is_named(name: str, client: TestClient) -> None:
+    kind, loc, fields = REFUSED[name]
+    reply = client.post("/cycle", json=a_round(**fields))
+    content = reply.json()
+    assert (reply.status_code, content["type"]) == (422, f"/problems/{kind}"), content
+    if loc is not None:
+        assert content["errors"][0]["loc"][: len(loc)] == loc
+    if kind in ("unreachable-pose", "stop-in-collision"):
+        assert content["target"].startswith("stops/")
+
+
+def test_no_time_is_a_deadline_exceeded(client: TestClient) -> None:
+    reply = client.post("/cycle", json=a_round(deadline=0.002))
+    assert (reply.status_code, reply.json()["type"]) == (504, "/problems/deadline-exceeded")
