@@ -76,10 +76,14 @@ class Run:
 
     def solution(self) -> Solution:
         """The motion of least energy that the certificate confirms. Raises the errors of `optimize`."""
-        incumbent = self.incumbent
         self.prepare()
         for spline in self.known:
             self.warm_start(spline)
+        return self.search()
+
+    def search(self) -> Solution:
+        """The solution, from candidates that are prepared, and of which some may be solved. Raises as `solution`."""
+        incumbent = self.incumbent
         without = self.without_storage() if incumbent.uses_storage else None
         self.explore()
         if without is not None:

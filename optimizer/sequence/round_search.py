@@ -22,7 +22,7 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import Problem
 from optimizer.problem.work_round import WorkRound
-from optimizer.search.attempts import solve
+from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.layers import Layer, layers_of
@@ -31,8 +31,12 @@ from optimizer.solution import CandidateStatus, Solution
 
 # share of the deadline that the search leaves to the motions of its answer, and least time for one of these [s]
 RESERVED, LEAST_TIME = 0.3, 1e-3
+# share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
+SHARE_OF_A_LEG = 1 / 8
 # J: a chain is no better than another one by less
 SAME = 1e-9
+# rad: a motion whose control points are farther from the limits is not held back by them
+NEAR_LIMIT = 1e-3
 
 
 class RoundSearch:
@@ -43,6 +47,8 @@ class RoundSearch:
         self.end = Deadline.after(asked.deadline, clock)
         self.search_end = self.end.earlier_by(RESERVED * asked.deadline)
         self.solutions: dict[tuple[int, int, int], Solution] = {}
+        # searches that have a first motion, to go on with
+        self._runs: dict[tuple[int, int, int], Run] = {}
         # a leg without a motion that is not proven to have none, or one for which the time was too short
         self.failed = self.cut_short = False
         try:
@@ -56,7 +62,7 @@ class RoundSearch:
 
     def _leg(self, k: int, start: Layer, goal: Layer) -> Leg:
         asked = self.asked
-        problem = self._problem(asked.arms[k], start.q[0], goal.q[0])
+        problem = self._problem(asked.arms[k], start.q[0], goal.q[0], asked.deadline)
         cycle = asked.dwell(k) if k < len(asked.stops) else None
         dwell = np.zeros(len(goal.q)) if cycle is None else _dwell(asked.arms[k + 1], cycle, goal)
         return Leg.of(PreparedProblem.of(problem), start, goal, dwell)
@@ -98,38 +104,73 @@ class RoundSearch:
                 self.try_kind(*each)
 
     def try_kind(self, k: int, s: int, g: int) -> None:
-        """Solve the kind of a pair, by the pair of it that is farthest from the joints' limits."""
+        """Solve a pair for its kind; where a joint's range is in its way, the pair farthest from the limits, too."""
         leg = self.legs[k]
         kind = int(leg.kind[s, g])
-        s, g = leg.pair[kind].tolist()
-        run = Run(self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], self.search_end), clock=self.clock)
+        energy = self._try(k, s, g)
+        centre_s, centre_g = leg.pair[kind].tolist()
+        if energy is not None and (s, g) != (centre_s, centre_g) and self._is_at_a_limit(k, s, g):
+            if np.isfinite(energy):
+                leg.set_pair(s, g, energy)
+            energy = self._try(k, centre_s, centre_g)
+        if energy is not None:
+            leg.set_kind(kind, energy)
+
+    def _try(self, k: int, s: int, g: int) -> float | None:
+        """Energy [J] of a first motion of a pair, whose run is kept; inf if none is found in its share of the time.
+
+        None once the time is up.
+        """
+        leg = self.legs[k]
+        time = SHARE_OF_A_LEG * self.search_end.left
+        run = Run(self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], time), clock=self.clock)
         try:
             run.prepare()
         except DeadlineExceeded:
-            self.cut_short = True
-            return
+            return self._late()
         except JoulepathError:
-            leg.set_kind(kind, np.inf)
-            return
-        (candidate,) = run.incumbent.candidates
+            return np.inf
+        incumbent, (candidate,) = run.incumbent, run.incumbent.candidates
         if candidate.status is CandidateStatus.INFEASIBLE:
-            leg.set_kind(kind, np.inf)
-            return
-        result = solve(run.incumbent, candidate)
+            return np.inf
+        candidate.attempt = result = solve(incumbent, candidate)
         if result.status is SolveStatus.OUT_OF_TIME:
-            self.cut_short = True
-            return
+            return self._late()
         self.failed |= result.spline is None
-        leg.set_kind(kind, run.incumbent.prepared.cost_of(result.spline))
+        if settled(incumbent, candidate, result, result.reason) is None:
+            return np.inf
+        self._runs[k, s, g] = run
+        incumbent.end = self.end
+        assert candidate.energy is not None
+        return candidate.energy
+
+    def _late(self) -> float | None:
+        """What a leg for which the time was too short is worth: without its share of it, no other is tried."""
+        self.cut_short = True
+        return None if self.search_end.passed else np.inf
+
+    def _is_at_a_limit(self, k: int, s: int, g: int) -> bool:
+        """Whether the motion of a pair comes to the end of a joint's range, or there is none: then another pair of its
+        kind may need less."""
+        run = self._runs.get((k, s, g))
+        if run is None:
+            return True
+        limits = self.asked.arms[k].active_limits
+        points = run.incumbent.candidates[0].spline.control_points
+        return bool((points < limits.q_min + NEAR_LIMIT).any() or (points > limits.q_max - NEAR_LIMIT).any())
 
     def finish(self, k: int, s: int, g: int) -> None:
         """Optimise the motion of a pair to the end, and certify it. Raises DeadlineExceeded if no time is left."""
         leg, before = self.legs[k], float(self.legs[k].cost[s, g])
-        problem = self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], self.end)
         if self.end.passed:
             raise DeadlineExceeded([])
+        run = self._runs.pop((k, s, g), None)
         try:
-            found = Run(problem, clock=self.clock).solution()
+            if run is None:
+                problem = self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], self.end.left)
+                found = Run(problem, clock=self.clock).solution()
+            else:
+                found = run.search()
         except NoTrajectory:
             self.failed = True
             leg.set_pair(s, g, np.inf)
@@ -148,7 +189,7 @@ class RoundSearch:
             costs.append(np.where(known, leg.cost, np.inf))
         return LeastChain(costs, self.asked.closed).find()[1]
 
-    def _problem(self, arm: Arm, q_start: Array, q_goal: Array, end: Deadline | None = None) -> Problem:
+    def _problem(self, arm: Arm, q_start: Array, q_goal: Array, time: float) -> Problem:
         asked = self.asked
         return Problem(
             arm=arm,
@@ -157,7 +198,7 @@ class RoundSearch:
             method=asked.method,
             windings=False,
             sample_period=asked.sample_period,
-            deadline=asked.deadline if end is None else max(end.left, LEAST_TIME),
+            deadline=max(time, LEAST_TIME),
         )
 
     def _no_sequence(self) -> NoSequence:
