@@ -44,7 +44,7 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
         return RoundSolution(
             status="optimal" if done else "feasible",
             moves=moves,
-            lower_bound=proven_bound(asked, search.legs),
+            lower_bound=proven_bound(asked, search.legs, search.end),
             baselines=[each for each in compared if each is not None],
             complete=complete,
             wall_time=clock() - began,

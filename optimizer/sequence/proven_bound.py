@@ -3,45 +3,66 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import Deadline
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.problem.work_round import WorkRound
+from optimizer.search.candidates import Candidate
 from optimizer.search.lower_bound import LeastBound
+from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.layers import Layer
 from optimizer.sequence.legs import Leg
 
 
-def proven_bound(asked: WorkRound, legs: Sequence[Leg]) -> float:
+def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> float:
     """Lower bound [J] on the electrical energy of all rounds with rests at the stops.
 
     Where configurations are samples of infinitely many, or some may be missing, one more stands for all that are not
-    known: from and to it no joint need move, and the potential energy falls as far as it can.
+    known, with a bound that holds for each of them.
     """
-    return LeastChain([_costs(asked, k, leg) for k, leg in enumerate(legs)], asked.closed).find()[0]
+    return LeastChain([_costs(asked, k, leg, deadline) for k, leg in enumerate(legs)], asked.closed).find()[0]
 
 
-def _costs(asked: WorkRound, k: int, leg: Leg) -> Array:
+def _costs(asked: WorkRound, k: int, leg: Leg, deadline: Deadline) -> Array:
     costs = leg.bound[leg.kind] + leg.dwell
     open_start, open_goal = (layer.sampled or not layer.complete for layer in (leg.start, leg.goal))
     if not open_start and not open_goal:
         return costs
-    (_, most_start), (least_goal, _) = (_levels(leg, layer) for layer in (leg.start, leg.goal))
-    bound, still = LeastBound(leg.prepared), np.zeros((1, leg.prepared.arm.robot.nq))
-    fall = float(bound.of(still, np.array([least_goal - most_start]))[0])
+    least = _of_curves(leg, deadline) if leg.start.complete and leg.goal.complete else _of_any(leg)
     cycle = asked.dwell(k) if k < len(asked.stops) else None
-    arm = asked.arms[k + 1] if k < len(asked.stops) else leg.prepared.arm
-    dwell = 0.0 if cycle is None else dwell_energy(cycle, arm, float(holding_power(arm, still[0])), 0.0)
+    arm = asked.arms[min(k + 1, len(asked.stops))]
+    dwell = 0.0 if cycle is None else dwell_energy(cycle, arm, float(holding_power(arm, np.zeros(arm.robot.nq))), 0.0)
     if open_goal:
-        costs = np.hstack([costs, np.full((len(costs), 1), fall + dwell)])
+        costs = np.hstack([costs, np.full((len(costs), 1), least + dwell)])
     if open_start:
-        row = np.append(fall + leg.dwell, [fall + dwell] * open_goal)
-        costs = np.vstack([costs, row])
+        costs = np.vstack([costs, np.append(least + leg.dwell, [least + dwell] * open_goal)])
     return costs
+
+
+def _of_curves(leg: Leg, deadline: Deadline) -> float:
+    """Bound [J] on the motions of a leg of which an end is any member of a self-motion."""
+    ends = [(leg.start.ends, leg.goal.ends[:1]), (leg.start.ends[:1], leg.goal.ends)]
+    for side, layer in enumerate((leg.start, leg.goal)):
+        on_curve = [end for end in layer.ends if end.sampled][:1]
+        if on_curve:
+            # with one of these, every end on the other side makes a pair that counts
+            ends.append((on_curve, leg.goal.ends) if side == 0 else (leg.start.ends, on_curve))
+    pairs = [Candidate(s, g, s.q, g.q) for starts, goals in ends for s, g in product(starts, goals)]
+    return self_motion_bound(leg.prepared, pairs, deadline)
+
+
+def _of_any(leg: Leg) -> float:
+    """Bound [J] on the motions of a leg between any two configurations: no joint need move, and the potential energy
+    falls as far as it can."""
+    (_, most), (least, _) = (_levels(leg, layer) for layer in (leg.start, leg.goal))
+    still = np.zeros((1, leg.prepared.arm.robot.nq))
+    return float(LeastBound(leg.prepared).of(still, np.array([least - most]))[0])
 
 
 def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
@@ -50,7 +71,7 @@ def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
     But for full turns, which change none, they differ from a known one by at most half a turn in each joint.
     """
     known = [leg.prepared.potential(end.q) for end in layer.ends]
-    if not layer.sampled and layer.complete:
+    if layer.complete:
         return min(known), max(known)
     reach = np.pi * float(potential_rates(leg.prepared.model, leg.prepared.arm.gravity).sum())
     return max(known) - reach, min(known) + reach
