@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
+from app.schemas.cycle import CycleResponse
 from app.schemas.evaluate import EvaluateResponse
 from app.schemas.examples.evaluate import EVALUATE_EXAMPLES
 from app.schemas.response import OptimizeResponse
 from app.settings import Settings
 from tests.app.cli.console import CSV, CSV_OPTIONS, Here, request, run
-from tests.app.requests import NEAR
+from tests.app.requests import HOME, NEAR, PATIENT
 
 
 def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
@@ -24,6 +25,15 @@ def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
     answer = OptimizeResponse.model_validate_json(finished.stdout)
     assert answer.status == "optimal"
     assert answer.trajectory.q[-1] == pytest.approx(NEAR)
+
+
+def test_cycle_answers_as_the_service_does() -> None:
+    stops = [{"name": "there", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0.0, 0.0, 0.05]}}]
+    finished = run("cycle", "-", stdin=json.dumps({"start": {"q": HOME}, "stops": stops, **PATIENT}))
+    assert (finished.returncode, finished.stderr) == (0, b"")
+    answer = CycleResponse.model_validate_json(finished.stdout)
+    assert [leg.payload_mass for leg in answer.legs] == [0.0, 1.0]
+    assert answer.legs[0].goal.q == pytest.approx(NEAR) and answer.legs[1].goal.q == pytest.approx(HOME)
 
 
 def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None:
@@ -69,7 +79,7 @@ def test_a_valid_request_without_a_motion_exits_with_1(here: Here) -> None:
     assert (code, content["type"]) == (1, "/problems/torque-infeasible")
 
 
-@pytest.mark.parametrize("command", ["optimize", "evaluate"])
+@pytest.mark.parametrize("command", ["optimize", "cycle", "evaluate"])
 def test_a_file_that_does_not_exist_is_wrong_usage(here: Here, command: str) -> None:
     code, out, err = here.run(command, "no/such/file.json")
     assert (code, out) == (2, b"")
@@ -150,7 +160,9 @@ def test_robots_are_listed_with_their_trust() -> None:
     assert "T" in cells[6]
 
 
-@pytest.mark.parametrize("command", ["", "serve", "optimize", "evaluate", "robots"])
+@pytest.mark.parametrize(
+    "command", ["", "serve", "optimize", "cycle", "evaluate", "robots", "robots add", "robots remove"]
+)
 def test_every_help_has_an_example(here: Here, command: str) -> None:
     code, out, _ = here.run(*command.split(), "--help")
     assert code == 0

@@ -170,7 +170,8 @@ def test_one_of_several_targets_is_chosen_for_the_whole_round() -> None:
     assert found.moves[0].solution.goal.q.shape == (6,)
 
 
-def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures() -> None:
+@pytest.mark.parametrize("others", long_but([1], [1, 8]))
+def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others: int) -> None:
     """Its configurations are samples: never `optimal`, and what fixed postures need is above the bound."""
     robot = load_robot("panda")
     q = np.array([[0.3, -0.4, 0.2, -2.0, 0.1, 1.8, 0.5], [-0.6, 0.2, 0.1, -1.7, -0.2, 2.0, 0.9]])
@@ -182,7 +183,7 @@ def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures() -> N
     assert found.status == "feasible"
     assert found.lower_bound > 0.3 * found.energy.electrical.total
     rng, layers = np.random.default_rng(5), layers_of(asked)[1:]
-    postures = [q, *([_member(layer.ends, rng) for layer in layers] for _ in range(3))]
+    postures = [q, *([_member(layer.ends, rng) for layer in layers] for _ in range(others))]
     for chosen in postures:
         given = replace(asked, stops=[replace(stop, target=each) for stop, each in zip(stops, chosen, strict=True)])
         assert found.lower_bound <= optimize_round(given).energy.electrical.total
