@@ -9,7 +9,7 @@ from app.convert.arm import to_arm, to_payload
 from app.convert.fields import fields
 from app.convert.request import to_branch, to_target
 from app.convert.solution import energy_fields, optimality_gap
-from app.convert.warnings import certified_warnings
+from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
 from app.schemas.response import Clearance
 from optimizer.exceptions import InvalidProblem
@@ -78,9 +78,7 @@ def to_cycle_response(
             "balance_error": abs(electrical.parts_sum - electrical.total) / abs(electrical.total or 1.0),
             "clearance": _clearance(found),
         },
-        "warnings": [
-            f"{move.start} to {move.goal}: {each}" for move in found.moves for each in certified_warnings(move.solution)
-        ],
+        "warnings": _warnings(found),
         "search": {
             "pairs": sum(move.pairs for move in found.moves),
             "distinct": sum(move.kinds for move in found.moves),
@@ -88,6 +86,19 @@ def to_cycle_response(
             "wall_time": found.wall_time,
         },
     }
+
+
+def _warnings(found: RoundSolution) -> list[str]:
+    """Warnings of the round, then those of single moves, which they name."""
+    of_all = [] if found.complete else [MISSED]
+    if all(baseline.name != "controller_default" for baseline in found.baselines):
+        of_all.append(NO_DEFAULT_MOTION)
+    return of_all + [
+        f"{move.start} to {move.goal}: {words}"
+        for move in found.moves
+        for words in certified_warnings(move.solution)
+        if words != NO_DEFAULT_MOTION
+    ]
 
 
 def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:

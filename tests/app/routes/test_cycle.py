@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.convert.warnings import NO_DEFAULT_MOTION
 from app.schemas.cycle import CycleResponse
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, PATIENT
@@ -155,3 +156,11 @@ def test_what_is_wrong_is_named(name: str, client: TestClient) -> None:
 def test_no_time_is_a_deadline_exceeded(client: TestClient) -> None:
     reply = client.post("/cycle", json=a_round(deadline=0.002))
     assert (reply.status_code, reply.json()["type"]) == (504, "/problems/deadline-exceeded")
+
+
+def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_round(client: TestClient) -> None:
+    q = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8]
+    stops = [{"target": {"q": [0.4, *q[1:]]}}, {"target": {"q": [0.4, -0.3, *q[2:]]}}]
+    answer = client.post("/cycle", json={"robot": "panda", "start": {"q": q}, "stops": stops, **PATIENT}).json()
+    assert answer["warnings"] == [NO_DEFAULT_MOTION]
+    assert [each["name"] for each in answer["baselines"]] == ["move_by_move"]
