@@ -1,21 +1,14 @@
-"""The search for the round of least energy: bounds of all legs first, then a motion where the least chain goes.
-
-All legs weigh their proven bounds. The least chain through them is found, its legs are solved and weigh what was found,
-and so on until every leg of the least chain is solved: then no chain has a bound below it. After Dellin and Srinivasa,
-"A unifying formalism for shortest path problems with expensive edge evaluations" (2016). The moves of this chain are
-optimised to the end and certified, as `optimize` does it.
-"""
+"""The search for the round of least energy in its own time: the moves of its least chain are optimised to the end and
+certified, as `optimize` does it."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 
 from models.robot import Array
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence, NoTrajectory
+from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
@@ -24,8 +17,8 @@ from optimizer.problem.problem import Problem
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
-from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.layers import Layer, layers_of
+from optimizer.sequence.lazy_search import LazySearch
 from optimizer.sequence.legs import Leg
 from optimizer.solution import CandidateStatus, Solution
 
@@ -39,26 +32,23 @@ SAME = 1e-9
 NEAR_LIMIT = 1e-3
 
 
-class RoundSearch:
-    """One search, with the legs and the certified motions that it has found."""
+class RoundSearch(LazySearch):
+    """One search, with the certified motions that it has found."""
 
     def __init__(self, asked: WorkRound, clock: Clock) -> None:
         self.asked, self.clock = asked, clock
         self.end = Deadline.after(asked.deadline, clock)
-        self.search_end = self.end.earlier_by(RESERVED * asked.deadline)
         self.solutions: dict[tuple[int, int, int], Solution] = {}
         # searches that have a first motion, to go on with
         self._runs: dict[tuple[int, int, int], Run] = {}
-        # a leg without a motion that is not proven to have none, or one for which the time was too short
-        self.failed = self.cut_short = False
         try:
             with watch(self.end):
                 layers = layers_of(asked)
                 stops = [*layers, *(layers[:1] if asked.closed else [])]
-                self.legs = [self._leg(k, stops[k], stops[k + 1]) for k in range(len(stops) - 1)]
+                legs = [self._leg(k, stops[k], stops[k + 1]) for k in range(len(stops) - 1)]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
-        self._chain = LeastChain([leg.cost for leg in self.legs], asked.closed)
+        super().__init__(legs, asked.closed, self.end.earlier_by(RESERVED * asked.deadline))
 
     def _leg(self, k: int, start: Layer, goal: Layer) -> Leg:
         asked = self.asked
@@ -73,35 +63,12 @@ class RoundSearch:
         Raises NoSequence, or DeadlineExceeded if the deadline passes before any chain is solved.
         """
         while True:
-            nodes = self._explore()
+            nodes = self.explore()
             fresh = [each for each in self.pairs(nodes) if each not in self.solutions]
             if not fresh:
                 return nodes
             for each in fresh:
                 self.finish(*each)
-
-    def pairs(self, nodes: list[int]) -> Iterator[tuple[int, int, int]]:
-        """Leg, start node and goal node of each move of a chain."""
-        return ((k, nodes[k], nodes[k + 1]) for k in range(len(self.legs)))
-
-    def cost(self, nodes: list[int]) -> float:
-        """Energy [J] of a chain as far as it is known, dwells included."""
-        return float(sum(self.legs[k].cost[s, g] for k, s, g in self.pairs(nodes)))
-
-    def _explore(self) -> list[int]:
-        """The nodes of the least chain, all of its legs solved; once the time is up, of the least solved one."""
-        while True:
-            _, nodes = self._chain.find()
-            if not nodes:
-                raise self._no_sequence()
-            open_ = [(k, s, g) for k, s, g in self.pairs(nodes) if not self.legs[k].known(s, g)]
-            if not open_:
-                return nodes
-            for each in open_:
-                if self.search_end.passed:
-                    self.cut_short = True
-                    return self._least_solved() or nodes
-                self.try_kind(*each)
 
     def try_kind(self, k: int, s: int, g: int) -> None:
         """Solve a pair for its kind; where a joint's range is in its way, the pair farthest from the limits, too."""
@@ -179,16 +146,6 @@ class RoundSearch:
         leg.set_pair(s, g, found.energy.electrical.total)
         self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
 
-    def _least_solved(self) -> list[int]:
-        """The least chain of pairs that are all solved; no nodes if there is none."""
-        costs = []
-        for leg in self.legs:
-            known = np.isin(leg.kind, list(leg.solved))
-            for pair in leg.exact:
-                known[pair] = True
-            costs.append(np.where(known, leg.cost, np.inf))
-        return LeastChain(costs, self.asked.closed).find()[1]
-
     def _problem(self, arm: Arm, q_start: Array, q_goal: Array, time: float) -> Problem:
         asked = self.asked
         return Problem(
@@ -200,20 +157,6 @@ class RoundSearch:
             sample_period=asked.sample_period,
             deadline=max(time, LEAST_TIME),
         )
-
-    def _no_sequence(self) -> NoSequence:
-        """The error for no chain; it names the first stop that none comes to."""
-        reached = np.zeros(len(self.legs[0].start.q))
-        for leg in self.legs:
-            after = (reached[:, None] + leg.cost).min(axis=0)
-            if not np.isfinite(after).any():
-                break
-            reached = after
-        labels = [
-            [layer.ends[k].label for k in sorted(set(layer.end[nodes].tolist()))]
-            for layer, nodes in ((leg.start, np.isfinite(reached)), (leg.goal, np.ones(len(leg.goal.q), dtype=bool)))
-        ]
-        return NoSequence(leg.goal.name, *labels)
 
 
 def _dwell(arm: Arm, cycle: Cycle, layer: Layer) -> Array:

@@ -1,0 +1,84 @@
+"""The lazy search of a least chain: bounds of all legs first, then a motion where the least chain goes.
+
+All legs weigh their proven bounds. The least chain through them is found, its legs are solved and weigh what was found,
+and so on until every leg of the least chain is solved: then no chain has a bound below it. After Dellin and Srinivasa,
+"A unifying formalism for shortest path problems with expensive edge evaluations" (2016).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from optimizer.deadline import Deadline
+from optimizer.exceptions import NoSequence
+from optimizer.sequence.chains import LeastChain
+from optimizer.sequence.legs import Leg
+
+
+class LazySearch(ABC):
+    """A search over `legs`, whose time is up at `search_end`.
+
+    `failed`: some leg has no motion and is not proven to have none. `cut_short`: for some leg the time was too short.
+    """
+
+    def __init__(self, legs: Sequence[Leg], closed: bool, search_end: Deadline) -> None:
+        self.legs, self.closed, self.search_end = list(legs), closed, search_end
+        self.failed = self.cut_short = False
+        self._chain = LeastChain([leg.cost for leg in self.legs], closed)
+
+    @abstractmethod
+    def try_kind(self, k: int, s: int, g: int) -> None:
+        """Give the kind of a pair what its motion needs; leave it as it is once the time is up."""
+
+    def pairs(self, nodes: list[int]) -> Iterator[tuple[int, int, int]]:
+        """Leg, start node and goal node of each move of a chain."""
+        return ((k, nodes[k], nodes[k + 1]) for k in range(len(self.legs)))
+
+    def cost(self, nodes: list[int]) -> float:
+        """What a chain needs as far as it is known, dwells included."""
+        return float(sum(self.legs[k].cost[s, g] for k, s, g in self.pairs(nodes)))
+
+    def explore(self) -> list[int]:
+        """The nodes of the least chain, all of its legs solved; once the time is up, of the least solved one.
+
+        If none is solved by then, those of the least chain. Raises NoSequence.
+        """
+        while True:
+            _, nodes = self._chain.find()
+            if not nodes:
+                raise self._no_sequence()
+            open_ = [(k, s, g) for k, s, g in self.pairs(nodes) if not self.legs[k].known(s, g)]
+            if not open_:
+                return nodes
+            for each in open_:
+                if self.search_end.passed:
+                    self.cut_short = True
+                    return self._least_solved() or nodes
+                self.try_kind(*each)
+
+    def _least_solved(self) -> list[int]:
+        """The least chain of pairs that are all solved; no nodes if there is none."""
+        costs = []
+        for leg in self.legs:
+            known = np.isin(leg.kind, list(leg.solved))
+            for pair in leg.exact:
+                known[pair] = True
+            costs.append(np.where(known, leg.cost, np.inf))
+        return LeastChain(costs, self.closed).find()[1]
+
+    def _no_sequence(self) -> NoSequence:
+        """The error for no chain; it names the first stop that none comes to."""
+        reached = np.zeros(len(self.legs[0].start.q))
+        for leg in self.legs:
+            after = (reached[:, None] + leg.cost).min(axis=0)
+            if not np.isfinite(after).any():
+                break
+            reached = after
+        labels = [
+            [layer.ends[k].label for k in sorted(set(layer.end[nodes].tolist()))]
+            for layer, nodes in ((leg.start, np.isfinite(reached)), (leg.goal, np.ones(len(leg.goal.q), dtype=bool)))
+        ]
+        return NoSequence(leg.goal.name, *labels)
