@@ -2,16 +2,18 @@
 
     python -m benchmarks.rounds --count 20
     python -m benchmarks.rounds --count 5 --stops 12
+    python -m benchmarks.rounds --count 10 --time 1.5
 
 A UR5e starts from rest over the table, takes up 2 kg at every other stop, puts it down at the next one, and comes back.
 Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each. Collisions are ignored,
-so that every round has an answer.
+so that every round has an answer. With `--time`, each round gets so many times the duration of least energy.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -57,19 +59,27 @@ def rounds(seed: int, count: int, stops: int, deadline: float) -> Iterator[WorkR
         )
 
 
+def in_time(asked: WorkRound, factor: float) -> WorkRound:
+    """The round in so many times the duration that it has by itself."""
+    duration = factor * optimize_round(asked).duration
+    return replace(asked, duration_min=duration, duration_max=duration)
+
+
 def main() -> None:
     """Solves every round, and prints savings, gaps, times and the number of motions sought."""
     arguments = parser(__doc__, seed=0)
     arguments.add_argument("--count", type=int, default=20, help="rounds (%(default)s)")
     arguments.add_argument("--stops", type=int, default=6, help="stops of a round (%(default)s)")
     arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a round [s] (%(default)s)")
+    arguments.add_argument("--time", type=float, help="give each round so many times its own duration")
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     optimize_round(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
     found: dict[str, list[float]] = {}
     optimal = 0
-    for asked in rounds(given.seed, given.count, given.stops, given.deadline):
+    for own in rounds(given.seed, given.count, given.stops, given.deadline):
+        asked = own if given.time is None else in_time(own, given.time)
         began = time.perf_counter()
         answer = optimize_round(asked)
         row = {f"saved against {each.name}": each.saving for each in answer.baselines}

@@ -13,6 +13,7 @@ JoulepathError
 │   ├── GoalInCollision
 │   └── StopInCollision
 ├── DurationTooShort
+├── RoundTooShort
 ├── TorqueInfeasible        the arm cannot hold or move the load
 ├── NoSequence              no chain of configurations through a round
 ├── NoTrajectory            every candidate failed
@@ -189,6 +190,16 @@ class NoSequence(JoulepathError):
             "or set `windings` true."
         )
         self.stop, self.reached, self.open = stop, list(reached), list(open_)
+
+
+class RoundTooShort(JoulepathError):
+    """No round is found that is that fast; `shortest` [s] is the duration of the fastest one, of which `dwells` [s]."""
+
+    def __init__(self, shortest: float, dwells: float) -> None:
+        super().__init__(
+            f"The fastest round takes {shortest:.4f} s, of which it dwells {dwells:.4g} s: allow at least as much time."
+        )
+        self.shortest, self.dwells = shortest, dwells
 
 
 class DurationTooShort(JoulepathError):

@@ -9,19 +9,22 @@ from optimizer.deadline import Clock
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.sequence.proven_bound import proven_bound
-from optimizer.sequence.round_baselines import controller_default, move_by_move, of_chain
+from optimizer.sequence.round_baselines import controller_default, move_by_move, of_chain, shared_alike
 from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Move, RoundSolution
+from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
+from optimizer.sequence.timed_round import Timed, TimedSearch
+from optimizer.solution import Solution
 
 
 def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundSolution:
     """Find the round of least energy, every move of it certified against every limit.
 
     `clock` gives the time [s] for the deadline. Choosing a branch at one stop changes what the moves from there cost,
-    so that all stops are decided together.
+    so that all stops are decided together. A round that must be faster or slower than the one of least energy shares
+    its time among the moves, and waits where that costs least.
 
     Raises the errors of `optimize` for an end, with the stop named; NoSequence if no chain of configurations goes
-    round; DeadlineExceeded if the time is too short for any round.
+    round; RoundTooShort; DeadlineExceeded if the time is too short for any round.
     """
     with one_thread():
         began = clock()
@@ -31,47 +34,79 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
         if greedy is not None and search.cost(greedy) < search.cost(nodes):
             # by what the search could not tell apart: motions that were not yet optimised to the end
             nodes = greedy
-        ours = search.cost(nodes)
-        compared = [
+        moving = [search.solutions[each] for each in search.pairs(nodes)]
+        own = sum(each.duration for each in moving) + asked.dwelling
+        duration, price = _duration_asked(asked, own), 0.0
+        bound, timed, timing = proven_bound(asked, search.legs, search.end), None, None
+        if duration is not None:
+            timing = TimedSearch(search, duration)
+            timed = timing.run(nodes)
+            nodes = timed.nodes
+            shares = zip(search.pairs(nodes), timed.shared.lengths, strict=True)
+            moving = [search.solve_in(*each, length) for each, length in shares]
+            # energies of nearly fastest moves are flat: rounding must not turn the price's sign
+            price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
+            bound = max(bound, timing.bound(price))
+        moves = _moves(search, nodes, moving, timed)
+        ours = sum(each.solution.energy.electrical.total + each.dwell_energy + each.wait_energy for each in moves)
+        compared: list[RoundBaseline | None] = [
             None if greedy is None else of_chain(search, greedy, ours),
             controller_default(search, nodes[0], ours),
+            *(() if timing is None or timed is None else shared_alike(timing, timed, ours)),
         ]
-        moves = _moves(search, nodes)
         complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
-        sampled = any(leg.goal.sampled or leg.start.sampled for leg in search.legs)
-        converged = all(move.solution.status == "optimal" for move in moves)
-        done = converged and complete and not (sampled or search.cut_short or search.failed)
         return RoundSolution(
-            status="optimal" if done else "feasible",
+            status="optimal" if _is_done(search, timing, timed, moves) and complete else "feasible",
             moves=moves,
-            lower_bound=proven_bound(asked, search.legs, search.end),
+            lower_bound=bound,
+            price_of_time=price,
             baselines=[each for each in compared if each is not None],
             complete=complete,
             wall_time=clock() - began,
         )
 
 
-def _moves(search: RoundSearch, nodes: list[int]) -> list[Move]:
+def _duration_asked(asked: WorkRound, own: float) -> float | None:
+    """The duration [s] that a round of its `own` duration must be brought to; None if it may have its own."""
+    if asked.duration_min is not None and own < asked.duration_min:
+        return asked.duration_min
+    if asked.duration_max is not None and own > asked.duration_max:
+        return asked.duration_max
+    return None
+
+
+def _is_done(search: RoundSearch, timing: TimedSearch | None, timed: Timed | None, moves: list[Move]) -> bool:
+    """Whether no other chain can be better, and every move converged."""
+    sampled = any(leg.goal.sampled or leg.start.sampled for leg in search.legs)
+    shared = timing is None or (timing.exact and timed is not None and timed.shared.exact)
+    converged = all(move.solution.status == "optimal" for move in moves)
+    return converged and shared and not (sampled or search.cut_short or search.failed)
+
+
+def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: Timed | None) -> list[Move]:
     """The moves of a chain, in their order."""
     asked, t0, moves = search.asked, 0.0, list[Move]()
     names = [START, *(stop.name for stop in asked.stops), START]
-    for k, s, g in search.pairs(nodes):
-        leg, found = search.legs[k], search.solutions[k, s, g]
+    for (k, _, g), solution in zip(search.pairs(nodes), found, strict=True):
+        leg = search.legs[k]
         dwell = asked.stops[k].dwell if k < len(asked.stops) else 0.0
+        waits = timed is not None and timed.at == k
         moves.append(
             Move(
                 start=names[k],
                 goal=names[k + 1],
                 arm=asked.arms[k],
                 arm_after=asked.arms[min(k + 1, len(asked.stops))],
-                solution=found,
+                solution=solution,
                 t0=t0,
                 dwell=dwell,
                 dwell_energy=float(leg.dwell[g]),
+                wait=timed.shared.waited if waits and timed is not None else 0.0,
+                wait_energy=timed.wait_energy if waits and timed is not None else 0.0,
                 pairs=leg.kind.size,
                 kinds=len(leg.pair),
                 solved=len(leg.solved),
             )
         )
-        t0 += found.duration + dwell
+        t0 += solution.duration + dwell + moves[-1].wait
     return moves

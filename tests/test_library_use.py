@@ -28,6 +28,7 @@ PUBLIC = {
     "Pose",
     "Problem",
     "RoundSolution",
+    "RoundTooShort",
     "SingularPose",
     "Solution",
     "Stop",
@@ -54,7 +55,7 @@ def test_the_public_names_are_a_promise() -> None:
 def test_one_except_clause_catches_every_error() -> None:
     exported = [getattr(optimizer, name) for name in PUBLIC]
     errors = [each for each in exported if isinstance(each, type) and issubclass(each, BaseException)]
-    assert len(errors) == 12
+    assert len(errors) == 13
     assert all(issubclass(error, optimizer.JoulepathError) for error in errors)
 
 

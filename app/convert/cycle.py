@@ -23,11 +23,15 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
 
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
+    time = request.time
+    least, most = (time.min, time.max) if isinstance(time, asked.TimeRange) else (time, time)
     return WorkRound(
         arm=to_arm(request),
         start=to_target(request.start),
         stops=[_to_stop(k, stop) for k, stop in enumerate(request.stops)],
         closed=request.closed,
+        duration_min=least,
+        duration_max=most,
         branch=to_branch(request.branch),
         method=request.method,
         windings=request.windings,
@@ -63,7 +67,7 @@ def to_cycle_response(
     return {
         "id": request_id,
         **fields(request, "robot", "method"),
-        **fields(found, "duration", "status"),
+        **fields(found, "duration", "status", "price_of_time"),
         "energy": {
             **energy_fields(energy),
             "lower_bound": found.lower_bound,
@@ -102,7 +106,7 @@ def _warnings(found: RoundSolution) -> list[str]:
 
 
 def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
-    """The entries of a move, and of the dwell after it."""
+    """The entries of a move, and of the dwell and the wait after it."""
     solution = move.solution
     start = {**fields(solution.start, "label", "q", "target"), "stop": move.start}
     goal = {**fields(solution.goal, "label", "q", "target"), "stop": move.goal}
@@ -120,21 +124,27 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
             "answer": store(solution),
         }
     ]
-    if move.dwell > 0:
-        legs.append(
-            {
-                "kind": "dwell",
-                "start": goal,
-                "goal": goal,
-                "t0": move.t0 + solution.duration,
-                "duration": move.dwell,
-                "electrical": move.dwell_energy,
-                "mechanical": 0.0,
-                "lower_bound": move.dwell_energy,
-                "payload_mass": move.arm_after.payload.mass,
-                "answer": None,
-            }
-        )
+    t0 = move.t0 + solution.duration
+    for kind, length, energy in (
+        ("dwell", move.dwell, move.dwell_energy),
+        ("wait", move.wait, move.wait_energy),
+    ):
+        if length > 0:
+            legs.append(
+                {
+                    "kind": kind,
+                    "start": goal,
+                    "goal": goal,
+                    "t0": t0,
+                    "duration": length,
+                    "electrical": energy,
+                    "mechanical": 0.0,
+                    "lower_bound": energy,
+                    "payload_mass": move.arm_after.payload.mass,
+                    "answer": None,
+                }
+            )
+        t0 += length
     return legs
 
 
@@ -150,5 +160,5 @@ def _clearance(found: RoundSolution) -> dict[str, Any] | None:
         clearance = move.solution.certificate.clearance
         if clearance is not None and (nearest is None or clearance.min_clearance < nearest["min_clearance"]):
             nearest = {**fields(clearance, *Clearance.model_fields), "leg": leg}
-        leg += 1 + (move.dwell > 0)
+        leg += 1 + (move.dwell > 0) + (move.wait > 0)
     return nearest

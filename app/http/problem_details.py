@@ -48,6 +48,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.StopInCollision: problems.StopInCollision,
     optimizer_errors.NoSequence: problems.NoSequence,
     optimizer_errors.DurationTooShort: problems.DurationTooShort,
+    optimizer_errors.RoundTooShort: problems.CycleTooShort,
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
     optimizer_errors.NoCollisionFreeTrajectory: problems.NoCollisionFreeTrajectory,
     optimizer_errors.NoTrajectory: problems.NoTrajectory,

@@ -49,6 +49,7 @@ CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.StartInCollision,
     problems.StopInCollision,
     problems.TorqueInfeasible,
+    problems.CycleTooShort,
     problems.NoSequence,
 )
 """Of a request for a round."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from app.schemas.arm import ArmRequest, Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH
-from app.schemas.request import Branch, Holding, Target
+from app.schemas.request import Branch, Holding, Target, by_kind
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
 from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
-from optimizer.problem.work_round import MOST_STOPS
+from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
 from optimizer.solution import Objective
 
 StopName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
@@ -43,6 +43,26 @@ class StopRequest(Request):
         {"elbow": "up"},
         default=None,
     )
+
+
+LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
+
+
+class TimeRange(Request):
+    """Bounds on the duration of a round; each is optional."""
+
+    min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
+    max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
+
+
+RoundTime = Annotated[
+    Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")],
+    Discriminator(
+        by_kind,
+        custom_error_type="duration",
+        custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
+    ),
+]
 
 
 class CycleRequest(ArmRequest):
@@ -75,8 +95,15 @@ class CycleRequest(ArmRequest):
         True,
         default=True,
     )
+    time: RoundTime | None = described(
+        "Duration of the round, dwells and waiting included, or bounds on it. Time is shared among the moves so that "
+        "the energy is least; what is left over is waited out where that costs least. Null: the optimiser chooses.",
+        "s",
+        12.0,
+        default=None,
+    )
     hold: Holding = described(
-        "How the arm is held while it dwells.",
+        "How the arm is held while it dwells and waits.",
         None,
         {"hold": "brakes", "brake_delay": 0.5},
         default=Holding(),
@@ -117,7 +144,7 @@ class CycleRequest(ArmRequest):
 
 
 class RoundEnergy(MotionEnergy):
-    """Energy of the round: the moves, and the dwells in `electrical.dwell`."""
+    """Energy of the round: the moves, and dwells and waiting in `electrical.dwell`."""
 
     lower_bound: float = described(
         "Lower bound of the electrical energy: no round that rests at these stops, of any configurations, shapes and "
@@ -135,31 +162,34 @@ class StopConfiguration(Configuration):
 
 
 class CycleLeg(Response):
-    """A move from one stop to the next, or the dwell at a stop."""
+    """A move from one stop to the next, the dwell at a stop, or a wait after it."""
 
-    kind: Literal["move", "dwell"] = described("`move`, or `dwell` at a stop.", None, "move")
+    kind: Literal["move", "dwell", "wait"] = described(
+        "`move`; `dwell` at a stop; `wait` there for what is left of the time.", None, "move"
+    )
     start: StopConfiguration = part("Where it begins.")
-    goal: StopConfiguration = part("Where it ends; for a dwell, where it began.")
+    goal: StopConfiguration = part("Where it ends; of a dwell and a wait, where it began.")
     t0: float = described("When it begins, from the start of the round.", "s", 1.42)
     duration: float = described("How long it takes.", "s", 0.91)
     electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
     mechanical: float = described("Mechanical work.", "J", 30.2)
     lower_bound: float = described(
-        "Lower bound of the electrical energy between these two configurations; of a dwell, its energy.", "J", 64.0
+        "Lower bound of the electrical energy between these configurations; of a rest, its energy.", "J", 64.0
     )
     payload_mass: float = described("Mass of the payload that the arm carries.", "kg", 2.0)
     answer: str | None = described(
-        "Path of the complete answer of `POST /optimize` for this move; null for a dwell.", None, ANSWER_PATH
+        "Path of the complete answer of `POST /optimize` for this move; null for a rest.", None, ANSWER_PATH
     )
 
 
 class CycleBaseline(Response):
-    """The same stops with the same payloads and dwells, in another way."""
+    """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked for."""
 
-    name: Literal["move_by_move", "controller_default"] = described(
+    name: Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait"] = described(
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
-        "controller with its default speed and acceleration.",
+        "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
+        "slowed or sped up alike; `fastest_then_wait`, the fastest moves and a wait.",
         None,
         "move_by_move",
     )
@@ -204,13 +234,18 @@ class CycleResponse(Answer):
     """The round of least energy, its moves, and its certificate."""
 
     method: MethodName = described("How the moves are parametrised.", None, "bspline")
-    duration: float = described("Duration of the round, dwells included.", "s", 8.3)
+    duration: float = described("Duration of the round, dwells and waiting included.", "s", 8.3)
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: every move converged, and no other chain of arm configurations has a lower bound below what was "
         "found. It does not say that no better round exists: see `optimality_gap`. `feasible`: the round is certified, "
         "but the search was not complete, or arm configurations may have been missed.",
         None,
         "optimal",
+    )
+    price_of_time: float = described(
+        "What one more second would save; negative if it would cost energy. 0 if the round takes its own time.",
+        "W",
+        31.5,
     )
     energy: RoundEnergy = part("Energy and power of the round.")
     legs: Annotated[list[CycleLeg], Field(min_length=1)] = part("Moves and dwells in their order.")

@@ -74,18 +74,19 @@ class DurationRange(Request):
         return self
 
 
-def _by_kind(value: Any) -> str | None:
+def by_kind(value: Any) -> str | None:
+    """Discriminator of a union of a number, tagged `seconds`, and an object, tagged `range`."""
     if isinstance(value, bool):
         return None
     if isinstance(value, int | float):
         return "seconds"
-    return "range" if isinstance(value, dict | DurationRange) else None
+    return "range" if isinstance(value, dict | Request) else None
 
 
 Duration = Annotated[
     Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")],
     Discriminator(
-        _by_kind,
+        by_kind,
         custom_error_type="duration",
         custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
     ),

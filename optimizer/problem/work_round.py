@@ -18,6 +18,8 @@ from optimizer.problem.problem import LONGEST_DURATION, MethodName
 from optimizer.problem.targets import Target, members, validated
 
 MOST_STOPS = 100
+# longest duration of a round [s]
+LONGEST_ROUND = 36_000.0
 # name of the configuration from which the round starts, and of a closed round's end
 START = "start"
 
@@ -43,8 +45,10 @@ class WorkRound:
 
     `start` is a target like those of the stops, `branch` restricts its branches; `arm` carries its payload from the
     start to the first stop that changes it. A `closed` round ends in the configuration in which it started, full turns
-    included. With `windings` every full-turn alternative of a configuration counts; else the one nearest to the middle
-    of the joints' ranges. `hold`, `brake_delay` [s] and `brake_power` [W] say how the arm dwells, as in `Cycle`.
+    included. `duration_min` and `duration_max` [s] bound the duration of the round, dwells and waiting included: time
+    that is left over is waited out where it costs least. With `windings` every full-turn alternative of a configuration
+    counts; else the one nearest to the middle of the joints' ranges. `hold`, `brake_delay` [s] and `brake_power` [W]
+    say how the arm dwells and waits, as in `Cycle`.
 
     Orientations are given in full. Raises InvalidProblem or OutsideLimits, with the field named.
     """
@@ -53,6 +57,8 @@ class WorkRound:
     start: Target
     stops: Sequence[Stop]
     closed: bool = True
+    duration_min: float | None = None
+    duration_max: float | None = None
     branch: BranchFilter | None = None
     method: MethodName = "bspline"
     windings: bool = True
@@ -85,6 +91,7 @@ class WorkRound:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
         self.dwell(0)  # checks how the arm dwells
+        self._check_duration()
 
     def _check_names(self) -> None:
         names = [stop.name for stop in self.stops]
@@ -95,6 +102,22 @@ class WorkRound:
             raise InvalidProblem(
                 f"stops.{repeated - 1}.name", f"Give each stop a name of its own; {START!r} is the start's."
             )
+
+    def _check_duration(self) -> None:
+        for value in (self.duration_min, self.duration_max):
+            if value is not None and not 0 < value <= LONGEST_ROUND:
+                raise InvalidProblem("time", f"time must be above 0 and at most {LONGEST_ROUND:g} s.")
+        if self.duration_min is not None and self.duration_max is not None and self.duration_min > self.duration_max:
+            raise InvalidProblem("time", "time.min must not exceed time.max.")
+
+    @property
+    def dwelling(self) -> float:
+        """Time [s] of all dwells."""
+        return sum(stop.dwell for stop in self.stops)
+
+    def waiting(self, length: float) -> Cycle:
+        """A wait of `length` [s], as the wait after a motion of no duration."""
+        return Cycle(length, self.hold, self.brake_delay, self.brake_power)
 
     @cached_property
     def arms(self) -> list[Arm]:

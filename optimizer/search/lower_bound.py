@@ -52,6 +52,20 @@ def lower_bounds(
     return np.where(t_min > t_max, np.inf, bound), shortest
 
 
+def priced_bounds(
+    prepared: PreparedProblem, displacement: Array, potential_gain: Array, price: float, longest: float
+) -> Array:
+    """Bounds (P,) [J] on energy + price · duration of motions that last at most `longest` [s]; inf for those that last
+    longer in any case.
+
+    displacement (P, nq) [rad] and potential_gain (P,) [J] as in `lower_bounds`; `price` [W] of time may be negative.
+    """
+    shortest = np.maximum(shortest_duration(displacement, prepared.arm.active_limits), LEAST_DURATION)
+    t_max, waiting = np.full_like(shortest, longest), np.full_like(shortest, -price)
+    bound = _least_drawn(prepared, displacement, potential_gain, shortest, t_max, waiting)
+    return np.where(shortest > longest, np.inf, bound)
+
+
 @dataclass(frozen=True)
 class LeastBound:
     """`lower_bounds` of a problem for motions of which only the least displacement and potential gain are known."""

@@ -17,6 +17,9 @@ from optimizer.exceptions import NoSequence
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.legs import Leg
 
+# share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
+SHARE_OF_A_LEG = 1 / 8
+
 
 class LazySearch(ABC):
     """A search over `legs`, whose time is up at `search_end`.

@@ -7,6 +7,7 @@ the range of a joint can tell pairs of a kind apart: where it does, a pair has a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +17,7 @@ from models.robot import Array
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.lower_bound import lower_bounds
+from optimizer.search.lower_bound import lower_bounds, priced_bounds
 from optimizer.sequence.layers import Layer
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
@@ -56,8 +57,21 @@ class Leg:
                 f"of at most {MOST_PAIRS}: give fewer targets, a `branch`, or `windings` false.",
             )
         kind, pair = _kinds(start, goal, prepared)
-        bound = _bounds(prepared, start, goal, pair)
+        bound = _bounds(prepared, start, goal, pair, lambda *of: lower_bounds(prepared, *of)[0])
         return cls(prepared, start, goal, kind, pair, bound, dwell, bound[kind] + dwell)
+
+    def priced(self, price: float, longest: float) -> Leg:
+        """The same leg with what energy + price · duration needs, of motions of at most `longest` [s]; none solved.
+
+        `price` [W]; dwells last as long as they do.
+        """
+        bound = _bounds(
+            self.prepared, self.start, self.goal, self.pair,
+            lambda displacement, gain: priced_bounds(self.prepared, displacement, gain, price, longest),
+        )  # fmt: skip
+        return Leg(
+            self.prepared, self.start, self.goal, self.kind, self.pair, bound, self.dwell, bound[self.kind] + self.dwell
+        )
 
     def known(self, s: int, g: int) -> bool:
         """Whether the pair, or another one of its kind, is solved."""
@@ -95,8 +109,14 @@ def _kinds(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.ND
     return of_pair.reshape(code.shape), np.column_stack(np.unravel_index(order[first], code.shape))
 
 
-def _bounds(prepared: PreparedProblem, start: Layer, goal: Layer, pair: npt.NDArray[np.intp]) -> Array:
-    """Proven lower bounds (k,) [J] of the kinds."""
+def _bounds(
+    prepared: PreparedProblem,
+    start: Layer,
+    goal: Layer,
+    pair: npt.NDArray[np.intp],
+    bound: Callable[[Array, Array], Array],
+) -> Array:
+    """Proven lower bounds (k,) [J] of the kinds, by a `bound` on joint displacements and gains of potential energy."""
     potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
     gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
     displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
@@ -104,5 +124,5 @@ def _bounds(prepared: PreparedProblem, start: Layer, goal: Layer, pair: npt.NDAr
     for low in range(0, len(pair), KINDS_PER_CHECK):
         checkpoint()
         part = slice(low, low + KINDS_PER_CHECK)
-        bounds.append(lower_bounds(prepared, displacement[part], gain[part])[0])
+        bounds.append(bound(displacement[part], gain[part]))
     return np.concatenate(bounds)

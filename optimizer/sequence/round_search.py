@@ -3,11 +3,14 @@ certified, as `optimize` does it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from models.robot import Array
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from optimizer.energy.dwell import dwell_energy, holding_power
+from optimizer.energy.plant import Plant
 from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
@@ -18,14 +21,12 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
 from optimizer.sequence.layers import Layer, layers_of
-from optimizer.sequence.lazy_search import LazySearch
+from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
 from optimizer.solution import CandidateStatus, Solution
 
 # share of the deadline that the search leaves to the motions of its answer, and least time for one of these [s]
 RESERVED, LEAST_TIME = 0.3, 1e-3
-# share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
-SHARE_OF_A_LEG = 1 / 8
 # J: a chain is no better than another one by less
 SAME = 1e-9
 # rad: a motion whose control points are farther from the limits is not held back by them
@@ -126,6 +127,15 @@ class RoundSearch(LazySearch):
         points = run.incumbent.candidates[0].spline.control_points
         return bool((points < limits.q_min + NEAR_LIMIT).any() or (points > limits.q_max - NEAR_LIMIT).any())
 
+    def solve_in(self, k: int, s: int, g: int, duration: float) -> Solution:
+        """The certified motion of a pair in a given duration [s]. Raises the errors of `optimize`."""
+        leg = self.legs[k]
+        if self.end.passed:
+            raise DeadlineExceeded([])
+        problem = self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], self.end.left)
+        fixed = replace(problem, duration_min=duration, duration_max=duration)
+        return Run(fixed, clock=self.clock).solution()
+
     def finish(self, k: int, s: int, g: int) -> None:
         """Optimise the motion of a pair to the end, and certify it. Raises DeadlineExceeded if no time is left."""
         leg, before = self.legs[k], float(self.legs[k].cost[s, g])
@@ -159,9 +169,13 @@ class RoundSearch(LazySearch):
         )
 
 
+def holding_powers(arm: Arm, layer: Layer) -> Array:
+    """Power (n,) [W] that holding the arm on its motors draws in each configuration of a layer."""
+    still = np.zeros((len(layer.ends), arm.robot.nq))
+    tau = Plant(arm).torques(np.array([end.q for end in layer.ends]), still, still)
+    return np.asarray(holding_power(arm, tau)[layer.end])
+
+
 def _dwell(arm: Arm, cycle: Cycle, layer: Layer) -> Array:
     """Energy (n,) [J] of dwelling in each configuration of a layer."""
-    still = np.zeros((len(layer.ends), arm.robot.nq))
-    prepared = PreparedProblem.of(Problem(arm=arm, start=layer.q[0], goal=layer.q[0]))
-    tau = prepared.torques(np.array([end.q for end in layer.ends]), still, still)
-    return np.array([dwell_energy(cycle, arm, float(power), 0.0) for power in holding_power(arm, tau)])[layer.end]
+    return np.array([dwell_energy(cycle, arm, float(power), 0.0) for power in holding_powers(arm, layer)])

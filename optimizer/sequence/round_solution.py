@@ -18,8 +18,9 @@ from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, Mechanical
 class Move:
     """One move from stop `start` to `goal`, by name, by `arm`; and the dwell after it, by `arm_after`.
 
-    It begins at `t0` [s] of the round; `dwell` [s] is held after it, which draws `dwell_energy` [J]. `pairs` of
-    configurations were possible, of so many `kinds`, of which so many were `solved`.
+    It begins at `t0` [s] of the round; `dwell` [s] is held after it, which draws `dwell_energy` [J], and `wait` [s]
+    after that, which draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so
+    many were `solved`.
     """
 
     start: str
@@ -30,12 +31,14 @@ class Move:
     t0: float
     dwell: float
     dwell_energy: float
+    wait: float
+    wait_energy: float
     pairs: int
     kinds: int
     solved: int
 
 
-RoundBaselineName = Literal["move_by_move", "controller_default"]
+RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait"]
 
 
 @dataclass(frozen=True)
@@ -55,24 +58,27 @@ class RoundSolution:
     needs less than `lower_bound` [J].
 
     `status` is `optimal` if no chain of configurations has a bound below what was found, and every move converged.
+    `price_of_time` [W] is what one more second would save; negative where time is left over.
     """
 
     status: Literal["optimal", "feasible"]
     moves: list[Move]
     lower_bound: float
+    price_of_time: float
     baselines: list[RoundBaseline]
     complete: bool
     wall_time: float
 
     @property
     def duration(self) -> float:
-        """Duration of the round, dwells included [s]."""
-        return sum(move.solution.duration + move.dwell for move in self.moves)
+        """Duration of the round, dwells and waiting included [s]."""
+        return sum(move.solution.duration + move.dwell + move.wait for move in self.moves)
 
     @cached_property
     def energy(self) -> Energy:
-        """Energy of the round [J], with the dwells."""
-        return summed([move.solution for move in self.moves], sum(move.dwell_energy for move in self.moves))
+        """Energy of the round [J], with dwells and waiting."""
+        resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
+        return summed([move.solution for move in self.moves], resting)
 
     @property
     def joins(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.schemas.errors.motion import (
     CollidingBranch,
+    CycleTooShort,
     DeadlineExceeded,
     DurationTooShort,
     GoalInCollision,
@@ -52,6 +53,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     GoalInCollision,
     StopInCollision,
     DurationTooShort,
+    CycleTooShort,
     TorqueInfeasible,
     NoSequence,
     NoTrajectory,
@@ -79,6 +81,7 @@ __all__ = [
     "BodyTooLarge",
     "Busy",
     "CollidingBranch",
+    "CycleTooShort",
     "DeadlineExceeded",
     "DurationTooShort",
     "EmptyStudy",

@@ -167,6 +167,16 @@ class NoSequence(ProblemDetails):
     open: list[str] = described("Branches of this stop.", None, [LABEL])
 
 
+class CycleTooShort(ProblemDetails):
+    """No round was found that is as fast as `time` asks for: the fastest takes `shortest`. Allow at least as much."""
+
+    type: Literal["/problems/cycle-too-short"] = fixed("type", "/problems/cycle-too-short")
+    title: Literal["Cycle too short"] = fixed("title", "Cycle too short")
+    status: Literal[422] = fixed("status", 422)
+    shortest: float = described("Duration of the fastest round found.", "s", 5.55)
+    dwells: float = described("Time of it that the arm dwells.", "s", 0.9)
+
+
 class DurationTooShort(ProblemDetails):
     """No motion within the limits was found for the largest allowed duration: `duration`, its `max`, or the time of the
     `cycle`. Allow at least `shortest`, or let the optimiser choose the duration."""

@@ -42,8 +42,9 @@ CYCLE_EXAMPLES: dict[str, Example] = {
         },
     },
     "press_tending": {
-        "summary": "Tending a press, with brakes during the work",
-        "description": "The arm brings a blank, waits on its brakes while the press works, and takes the part away.",
+        "summary": "Tending a press in a given time, with brakes during the work",
+        "description": "The arm brings a blank, waits on its brakes while the press works, and takes the part away in "
+        "15 s. This time is shared among the moves, and what is left is waited out where that costs least.",
         "value": {
             "start": {"q": HOME},
             "stops": [
@@ -53,7 +54,8 @@ CYCLE_EXAMPLES: dict[str, Example] = {
                 {"name": "take", "target": _down(0.55, 0.1, 0.2), "dwell": 0.2, "payload": PART},
                 {"name": "finished", "target": _down(0.1, 0.5, 0.15), "dwell": 0.2, "payload": None},
             ],
-            "hold": {"hold": "brakes", "brake_delay": 0.5},
+            "time": 15.0,
+            "hold": {"hold": "brakes", "brake_delay": 0.5, "brake_power": 12.0},
         },
     },
 }

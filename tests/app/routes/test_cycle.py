@@ -138,6 +138,9 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
         },
     ),
     "deadline": ("validation", ["body", "deadline"], {"deadline": 1e5}),
+    "no time": ("validation", ["body", "time"], {"time": 0.0}),
+    "turned round": ("validation", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
+    "text": ("validation", ["body", "time"], {"time": "long"}),
 }
 
 
@@ -164,3 +167,24 @@ def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_round(client: Te
     answer = client.post("/cycle", json={"robot": "panda", "start": {"q": q}, "stops": stops, **PATIENT}).json()
     assert answer["warnings"] == [NO_DEFAULT_MOTION]
     assert [each["name"] for each in answer["baselines"]] == ["move_by_move"]
+
+
+def test_a_round_in_a_given_time_waits_on_its_brakes(client: TestClient, answer: dict[str, Any]) -> None:
+    time, hold = 2.5 * answer["duration"], {"hold": "brakes", "brake_delay": 0.2, "brake_power": 2.0}
+    found = client.post("/cycle", json=a_round(time=time, hold=hold)).json()
+    assert found["duration"] == pytest.approx(time) and found["price_of_time"] < 0
+    (wait,) = (leg for leg in found["legs"] if leg["kind"] == "wait")
+    assert wait["start"] == wait["goal"] and wait["answer"] is None
+    legs = found["legs"]
+    assert found["energy"]["electrical"]["total"] == pytest.approx(sum(leg["electrical"] for leg in legs), rel=ROUNDING)
+    assert legs[-1]["t0"] + legs[-1]["duration"] == pytest.approx(time)
+    assert "fastest_then_wait" in {each["name"] for each in found["baselines"]}
+    at_most = client.post("/cycle", json=a_round(time={"max": time})).json()
+    assert at_most["duration"] == answer["duration"] and at_most["price_of_time"] == 0
+
+
+def test_a_round_that_cannot_be_so_fast_says_how_fast_it_can_be(client: TestClient, answer: dict[str, Any]) -> None:
+    reply = client.post("/cycle", json=a_round(time=1.0))
+    problem = reply.json()
+    assert (reply.status_code, problem["type"], problem["dwells"]) == (422, "/problems/cycle-too-short", 0.5)
+    assert 1.0 < problem["shortest"] <= answer["duration"]

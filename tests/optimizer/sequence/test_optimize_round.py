@@ -51,7 +51,7 @@ def assert_true(asked: WorkRound, found: RoundSolution) -> None:
     assert all(move.solution.certificate.valid for move in found.moves)
     assert found.joins < 1e-9
     electrical = found.energy.electrical
-    own = sum(move.solution.energy.electrical.total + move.dwell_energy for move in found.moves)
+    own = sum(move.solution.energy.electrical.total + move.dwell_energy + move.wait_energy for move in found.moves)
     assert electrical.total == pytest.approx(own, rel=ROUNDING)
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-3)
     assert found.lower_bound <= electrical.total

@@ -1,0 +1,83 @@
+"""Motions and chains at a price of time: what needs the least energy + price · duration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from optimizer.deadline import Deadline, DeadlinePassed, watch
+from optimizer.methods import solver_for
+from optimizer.methods.duration_intervals import DurationInterval, fastest
+from optimizer.problem.problem import LEAST_DURATION
+from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
+from optimizer.sequence.legs import Leg
+from optimizer.trajectories.spline import Spline, sampled
+
+
+@dataclass(frozen=True)
+class PricedMotion:
+    """A motion of `energy` [J]."""
+
+    spline: Spline
+    energy: float
+
+    @property
+    def duration(self) -> float:
+        """Its duration [s]."""
+        return self.spline.duration
+
+
+def priced_motion(
+    leg: Leg, s: int, g: int, price: float, longest: float, deadline: Deadline, guess: Spline | None = None
+) -> PricedMotion | None:
+    """The motion of a pair of least energy + price · duration; None if none is found before the deadline.
+
+    `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
+    """
+    prepared = leg.prepared
+    interval = DurationInterval(prepared.parameters(electrical=1.0, time=price), LEAST_DURATION, longest)
+    return _solved(leg, s, g, interval, deadline, guess)
+
+
+def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion | None:
+    """The motion of a pair of least duration; None if none is found before the deadline."""
+    return _solved(leg, s, g, fastest(leg.prepared), deadline)
+
+
+def _solved(
+    leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None = None
+) -> PricedMotion | None:
+    solver = solver_for(leg.prepared, leg.start.q[s], leg.goal.q[g], deadline, interval)
+    try:
+        with watch(deadline):
+            result = solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)
+            if result.spline is None:
+                return None
+            return PricedMotion(result.spline, leg.prepared.energy(result.spline).electrical.total)
+    except DeadlinePassed:
+        return None
+
+
+class PricedSearch(LazySearch):
+    """The search of the least chain at a price of time [W]; `motions` are those found, by leg and kind."""
+
+    def __init__(self, legs: Sequence[Leg], closed: bool, price: float, longest: float, search_end: Deadline) -> None:
+        super().__init__([leg.priced(price, longest) for leg in legs], closed, search_end)
+        self.price, self.longest = price, longest
+        self.motions: dict[tuple[int, int], PricedMotion] = {}
+
+    def try_kind(self, k: int, s: int, g: int) -> None:
+        """Solve a pair for its kind."""
+        leg = self.legs[k]
+        deadline = self.search_end.within(SHARE_OF_A_LEG * self.search_end.left)
+        found = priced_motion(leg, s, g, self.price, self.longest, deadline)
+        if found is None and self.search_end.passed:
+            self.cut_short = True
+            return
+        self.failed |= found is None
+        kind = int(leg.kind[s, g])
+        if found is not None:
+            self.motions[k, kind] = found
+        leg.set_kind(kind, np.inf if found is None else found.energy + self.price * found.duration)

@@ -1,0 +1,196 @@
+"""Rounds in a given time: the time is met, shared at one price, and never dearer than sharing it in simple ways."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, RoundTooShort
+from optimizer.optimize import optimize
+from optimizer.optimize_round import optimize_round
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.problem import Problem
+from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.layers import layers_of
+from optimizer.sequence.round_solution import RoundSolution
+from tests.optimizer.clocks import CountingClock
+from tests.optimizer.moves import AMPLE, fixed
+from tests.optimizer.sequence.rounds import HOME, pick_and_place
+from tests.optimizer.sequence.test_optimize_round import assert_true
+from tests.selection import long_but
+
+ROUNDING = 1e-9
+# relative: an optimum found from another guess
+CONVERGED = 2e-3
+ASKED = pick_and_place(1, 2, windings=False)
+
+
+@cache
+def free() -> RoundSolution:
+    """The round of least energy in its own time."""
+    return optimize_round(ASKED)
+
+
+@cache
+def shortest() -> float:
+    """Duration [s] of the fastest round, as the refusal of a faster one tells."""
+    with pytest.raises(RoundTooShort) as refusal:
+        optimize_round(in_time(ASKED, 0.3 * free().duration))
+    return refusal.value.shortest
+
+
+def in_time(asked: WorkRound, duration: float) -> WorkRound:
+    return replace(asked, duration_min=duration, duration_max=duration)
+
+
+def duration_of(factor: float) -> float:
+    """`factor` times the round's own duration [s]; below 1, this share of the way to it from the shortest one."""
+    return factor * free().duration if factor >= 1 else shortest() + factor * (free().duration - shortest())
+
+
+@cache
+def timed(factor: float) -> RoundSolution:
+    """The round in `duration_of` the factor."""
+    return optimize_round(in_time(ASKED, duration_of(factor)))
+
+
+FACTORS = long_but([0.4, 1.3], [0.05, 0.4, 0.8, 1.02, 1.3, 2.0, 3.0, 10.0, 30.0])
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_the_time_is_met_and_the_round_true(factor: float) -> None:
+    found, duration = timed(factor), duration_of(factor)
+    assert_true(in_time(ASKED, duration), found)
+    assert found.duration == pytest.approx(duration, rel=1e-9)
+    assert found.energy.electrical.total >= free().energy.electrical.total * (1 - CONVERGED)
+    assert found.lower_bound >= free().lower_bound * (1 - ROUNDING)
+    assert sum(move.wait > 0 for move in found.moves) <= 1
+    assert found.price_of_time <= 0 if factor > 1 else found.price_of_time >= 0
+
+
+@pytest.mark.parametrize("factor", FACTORS)
+def test_it_is_not_dearer_than_simple_ways_to_share_the_time(factor: float) -> None:
+    names = {each.name: each for each in timed(factor).baselines}
+    assert "fastest_then_wait" in names
+    for name in ("fastest_then_wait", "same_factor"):
+        if name in names and names[name].within_limits:
+            assert names[name].saving >= -CONVERGED
+
+
+def test_no_other_way_to_share_the_time_is_cheaper() -> None:
+    """Every move in every share of the time, on the same chain: a grid of durations, each by `optimize`."""
+    found = timed(1.3)
+    total = sum(move.solution.duration + move.wait for move in found.moves)
+    ends = [(move.arm, move.solution.start.q, move.solution.goal.q) for move in found.moves]
+    own = [move.solution.duration for move in found.moves]
+    moving = found.energy.electrical.total - sum(move.dwell_energy for move in found.moves)
+
+    @cache
+    def energy(k: int, duration: float) -> float:
+        arm, q_start, q_goal = ends[k]
+        task = Problem(arm=arm, start=q_start, goal=q_goal, windings=False, deadline=AMPLE, **fixed(duration))
+        return optimize(task).energy.electrical.total
+
+    shares = [0.92, 1.0, 1.08]
+    for first, second in product(shares, shares):
+        durations = [first * own[0], second * own[1]]
+        last = total - sum(durations) - sum(move.wait for move in found.moves)
+        other = sum(energy(k, round(t, 6)) for k, t in enumerate([*durations, last]))
+        other += sum(move.wait_energy for move in found.moves)
+        assert moving <= other * (1 + CONVERGED)
+
+
+def test_the_price_is_what_a_second_more_would_save() -> None:
+    step = 0.02
+    before, after = (timed(1.3 + side * step) for side in (-1, 1))
+    slope = (before.energy.electrical.total - after.energy.electrical.total) / (after.duration - before.duration)
+    assert timed(1.3).price_of_time == pytest.approx(slope, rel=0.1)
+    assert timed(1.3).price_of_time < 0
+
+
+def test_brakes_make_waiting_cheap() -> None:
+    """Of a brake power below what the electronics draw, next to nothing is saved by slower moves."""
+    asked = in_time(replace(ASKED, hold="brakes", brake_delay=0.1, brake_power=1.0), 3.0 * free().duration)
+    braked = optimize_round(asked)
+    assert_true(asked, braked)
+    (waiting,) = (move for move in braked.moves if move.wait > 0)
+    # the motors hold during the first tenth of a second: in the dwell, where there is one
+    late = waiting.wait - (0.1 if waiting.dwell == 0 else 0.0)
+    assert waiting.wait_energy == pytest.approx(1.0 * late, abs=5.0 if waiting.dwell == 0 else 1e-9)
+    assert braked.energy.electrical.total < 1.1 * free().energy.electrical.total
+    assert braked.price_of_time == pytest.approx(-1.0)
+
+
+def test_bounds_on_the_time_leave_a_round_alone_that_keeps_them() -> None:
+    own = free().duration
+    wide = optimize_round(replace(ASKED, duration_min=0.9 * own, duration_max=1.1 * own))
+    assert wide.energy.electrical.total == free().energy.electrical.total and wide.price_of_time == 0
+    hurried = optimize_round(replace(ASKED, duration_max=duration_of(0.4)))
+    assert hurried.duration == pytest.approx(duration_of(0.4))
+    assert hurried.energy.electrical.total == pytest.approx(timed(0.4).energy.electrical.total, rel=CONVERGED)
+
+
+@pytest.mark.parametrize("factor", long_but([0.5], [0.05, 0.5]))
+def test_too_little_time_says_how_much_the_fastest_round_takes(factor: float) -> None:
+    with pytest.raises(RoundTooShort) as refusal:
+        optimize_round(in_time(ASKED, factor * free().duration))
+    assert refusal.value.shortest == pytest.approx(shortest(), rel=1e-3)
+    assert shortest() < free().duration and refusal.value.dwells == ASKED.dwelling
+    assert optimize_round(in_time(ASKED, 1.001 * shortest())).duration == pytest.approx(1.001 * shortest())
+
+
+@pytest.mark.parametrize("seed", long_but([0], range(10)))
+def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
+    """Random chains of configurations, in random shares of the time, need no less."""
+    asked = pick_and_place(seed, 2, windings=False)
+    only = BranchFilter(elbow="up")
+    asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
+    duration = 1.4 * optimize_round(asked).duration
+    found = optimize_round(in_time(asked, duration))
+    rng, layers = np.random.default_rng(seed), layers_of(asked)
+    for _ in range(6):
+        chain = [HOME, *(layer.q[rng.integers(len(layer.q))] for layer in layers[1:]), HOME]
+        shares = np.diff([0.0, *np.sort(rng.uniform(0.2, 0.8, 2)), 1.0]) * duration
+        total = 0.0
+        for k, share in enumerate(shares):
+            given = {"windings": False, "deadline": AMPLE, **fixed(share)}
+            try:
+                move = optimize(Problem(arm=asked.arms[k], start=chain[k], goal=chain[k + 1], **given))
+            except JoulepathError:  # this share is too short: no round of this kind
+                break
+            total += move.energy.electrical.total
+        else:
+            assert found.lower_bound <= total
+            assert found.energy.electrical.total <= total * (1 + CONVERGED)
+
+
+@pytest.mark.parametrize("readings", [500, 3000])
+def test_a_deadline_gives_a_round_in_its_time_or_says_so(readings: int) -> None:
+    asked = replace(in_time(ASKED, 1.3 * free().duration), deadline=float(readings))
+    try:
+        found = optimize_round(asked, clock=CountingClock())
+    except DeadlineExceeded:
+        return
+    assert_true(asked, found)
+    assert found.duration == pytest.approx(1.3 * free().duration)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"duration_min": 0.0},
+        {"duration_max": np.nan},
+        {"duration_max": 1e6},
+        {"duration_min": 3.0, "duration_max": 2.0},
+    ],
+    ids=str,
+)
+def test_a_wrong_time_names_its_field(given: dict[str, Any]) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        replace(ASKED, **given)
+    assert refusal.value.field.startswith("time")
