@@ -95,7 +95,7 @@ def to_cycle_response(
 def _warnings(found: RoundSolution) -> list[str]:
     """Warnings of the round, then those of single moves, which they name."""
     of_all = [] if found.complete else [MISSED]
-    if all(baseline.name != "controller_default" for baseline in found.baselines):
+    if found.moves[0].arm.robot.default_motion is None:
         of_all.append(NO_DEFAULT_MOTION)
     return of_all + [
         f"{move.start} to {move.goal}: {words}"

@@ -93,29 +93,28 @@ class TimedSearch:
             return None
         if fast.moving > self.time:
             return None
-        at, _ = self._cheapest(timed.nodes)
-        wait = self._wait_energy(timed.nodes, at, self.time - fast.moving)
+        _, wait = self._cheapest_wait(timed.nodes, self.time - fast.moving)
         return self.time + self.asked.dwelling, fast.energy + self._dwells(timed.nodes) + wait
 
     def _of(self, nodes: list[int], guesses: Sequence[Spline | None]) -> Timed | None:
         """A chain with its time shared; None if it cannot be that fast."""
-        at, waiting = self._cheapest(nodes)
+        waiting = min(float(self.powers(k)[nodes[k + 1]]) for k in range(len(self.legs)))
         sharing = TimeSharing(self.legs, list(self.search.pairs(nodes)), guesses, self.longest, self.search.search_end)
         try:
             shared = sharing.fill(self.time, waiting)
         except NoTrajectory:
             return None
-        wait = self._wait_energy(nodes, at, shared.waited)
+        at, wait = self._cheapest_wait(nodes, shared.waited)
         return Timed(nodes, shared, at, wait, shared.energy + self._dwells(nodes) + wait)
 
     def _dwells(self, nodes: list[int]) -> float:
         """Energy [J] of the dwells of a chain."""
         return sum(float(self.legs[k].dwell[g]) for k, _, g in self.search.pairs(nodes))
 
-    def _cheapest(self, nodes: list[int]) -> tuple[int, float]:
-        """The move after which a long wait draws least, and its power [W]."""
-        powers = [float(self.powers(k)[nodes[k + 1]]) for k in range(len(self.legs))]
-        return int(np.argmin(powers)), min(powers)
+    def _cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
+        """The move after which a wait [s] draws least, and its energy [J] beside the dwell there."""
+        energies = [self._wait_energy(nodes, k, waited) for k in range(len(self.legs))]
+        return int(np.argmin(energies)), min(energies)
 
     def powers(self, k: int) -> Array:
         """Power (n,) [W] of a long wait after move k, in each configuration of its goal."""
