@@ -14,8 +14,9 @@ from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
+from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
-from optimizer.problem.targets import members
+from optimizer.problem.targets import Target, members
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
 from optimizer.search.ends import EndConfiguration, ends_of
@@ -57,14 +58,18 @@ def layers_of(asked: WorkRound) -> list[Layer]:
     return [first, *others]
 
 
-def _layer(asked: WorkRound, name: str, field: str, target: object, arms: Sequence[Arm], branch: object) -> Layer:
+def _layer(
+    asked: WorkRound, name: str, field: str, target: Target, arms: Sequence[Arm], branch: BranchFilter | None
+) -> Layer:
     """The layer of a target that is come to and left with the `arms`."""
-    problem = Problem(arm=arms[0], start=target, goal=target, branch=branch, windings=asked.windings)  # type: ignore[arg-type]
+    problems = [
+        Problem(arm=arm, start=target, goal=target, branch=branch, windings=asked.windings)
+        for arm in {id(arm): arm for arm in arms}.values()
+    ]
+    problem = problems[0]
     found, _ = ends_of(PreparedProblem.of(problem), name, problem.goal)
     q = np.array([end.q for end in found])
-    ruled = [
-        check_configurations(PreparedProblem.of(problem if arm is arms[0] else _with(problem, arm)), q) for arm in arms
-    ]
+    ruled = [check_configurations(PreparedProblem.of(each), q) for each in problems]
     either = [next((each for each in causes if each is not None), None) for causes in zip(*ruled, strict=True)]
     raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in found], either)
     held = [end for end, cause in zip(found, either, strict=True) if cause is None]
@@ -82,10 +87,6 @@ def _layer(asked: WorkRound, name: str, field: str, target: object, arms: Sequen
     kinematics = inverse_kinematics_for(asked.arm.robot)
     given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
     return Layer(name, held, positions, end, turns, given or (kinematics is not None and kinematics.complete))
-
-
-def _with(problem: Problem, arm: Arm) -> Problem:
-    return Problem(arm=arm, start=problem.start, goal=problem.goal, branch=problem.branch, windings=problem.windings)
 
 
 def _nodes(end: EndConfiguration, windings: bool, middle: Array) -> list[tuple[float, ...]]:
