@@ -252,4 +252,4 @@ class CycleResponse(Answer):
     baselines: list[CycleBaseline] = part("The same round in other ways; without what was not found in time.")
     certificate: RoundCertificate = part("Independent check of all moves.")
     warnings: list[str] = described(f"{WARNINGS} Each names its move.", None, [])
-    search: CycleSearch = part("Effort of the search.")
+    search: CycleSearch = part("Size and effort of the search for the round.")

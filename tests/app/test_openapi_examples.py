@@ -79,8 +79,8 @@ def test_every_body_has_an_example() -> None:
         assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
 
 
-# a front of dozens of durations
-SLOW = "post /pareto application/json branch_switch"
+# a front of dozens of durations, and a round among obstacles with a path for each of dozens of legs
+SLOW = ("post /pareto application/json branch_switch", "post /cycle application/json pick_and_place")
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def robot(client: TestClient) -> str:
     return "added"
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n == SLOW else n for n in BODIES])
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES])
 def test_body_is_answered(name: str, client: TestClient, study: str, robot: str) -> None:
     operation, media_type, example = BODIES[name]
     content, url = example["value"], operation.path.format(id=study, name=robot)

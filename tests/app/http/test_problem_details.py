@@ -37,6 +37,9 @@ ERRORS: list[JoulepathError] = [
     exceptions.StartInCollision([COLLIDING]),
     exceptions.GoalInCollision([COLLIDING, replace(COLLIDING, depth=0.01)]),
     exceptions.NoCollisionFreeTrajectory([CANDIDATE], HIT, "left/up/flip", "left/up/no_flip"),
+    exceptions.StopInCollision("stops/pick", [COLLIDING]),
+    exceptions.NoSequence("stops/place", ["left/up/flip"], ["left/up/no_flip"]),
+    exceptions.RoundTooShort(5.5, 0.9),
 ]
 
 

@@ -33,7 +33,7 @@ BEYOND = 0.15
 SAME = 1e-6
 
 
-@pytest.fixture(params=["panda", "iiwa14", "xarm7"], scope="module")
+@pytest.fixture(params=long_but(["panda", "iiwa14"], ["panda", "iiwa14", "xarm7"]), scope="module")
 def robot(request: pytest.FixtureRequest) -> Robot:
     return load_robot(request.param)
 

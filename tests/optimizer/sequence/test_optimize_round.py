@@ -73,7 +73,7 @@ def energy_of(asked: WorkRound, k: int, start: Array, goal: Array) -> float:
     return optimize(problem).energy.electrical.total
 
 
-@pytest.mark.parametrize("seed", long_but(range(2), range(100)))
+@pytest.mark.parametrize("seed", long_but(range(1), range(100)))
 def test_it_is_the_least_of_all_chains(seed: int) -> None:
     """Two or three stops with two or three branches each, every chain by `optimize`."""
     asked = pick_and_place(seed, 3, windings=False)
@@ -144,6 +144,7 @@ def test_a_heavier_part_costs_more_and_an_open_round_less() -> None:
     assert open_ < least < more
 
 
+@pytest.mark.long
 def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> None:
     first, *others = poses(4, 3)
     stops = [Stop(name=str(k), target=pose) for k, pose in enumerate(others)]
@@ -170,7 +171,7 @@ def test_one_of_several_targets_is_chosen_for_the_whole_round() -> None:
     assert found.moves[0].solution.goal.q.shape == (6,)
 
 
-@pytest.mark.parametrize("others", long_but([1], [1, 8]))
+@pytest.mark.parametrize("others", [pytest.param(8, marks=pytest.mark.long), 0])
 def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others: int) -> None:
     """Its configurations are samples: never `optimal`, and what fixed postures need is above the bound."""
     robot = load_robot("panda")
@@ -201,7 +202,7 @@ def _member(ends: list[EndConfiguration], rng: np.random.Generator) -> Array:
             return q
 
 
-@pytest.mark.parametrize("readings", [40, 200, 1000, 4000])
+@pytest.mark.parametrize("readings", long_but([40, 1000], [40, 200, 1000, 4000]))
 def test_a_deadline_gives_the_best_round_so_far_or_says_so(readings: int) -> None:
     """A clock that counts its readings passes the deadline anywhere; what comes out is certified all the same."""
     asked = replace(pick_and_place(1, 3, windings=False), deadline=float(readings))
