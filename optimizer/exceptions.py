@@ -178,26 +178,27 @@ def in_collision(name: str, branches: Sequence[CollidingBranch]) -> InCollision:
 
 
 class NoSequence(JoulepathError):
-    """Every stop of a round can be reached, but no chain of configurations: there is no motion to `stop`.
+    """Every stop of a round can be reached, but no chain of configurations leads over all stops: none to `stop`.
 
-    `reached` are the labels of the configurations before it that can be come to, `open` those of its own.
+    `reached` are the labels of the configurations before it to which a chain leads, `open` those of its own.
     """
 
     def __init__(self, stop: str, reached: Sequence[str], open_: Sequence[str]) -> None:
         super().__init__(
-            f"Every stop can be reached, but no round: there is no motion within the limits to {stop} from any "
-            "configuration that can be come to. Move this stop or the one before it, relax a limit, leave `branch` out "
-            "or set `windings` true."
+            f"The arm can be at every stop, but no round was found: from no configuration to which the moves before "
+            f"lead was a motion within the limits found to {stop}. Move this stop or the one before it, relax a limit, "
+            "leave `branch` out or set `windings` true."
         )
         self.stop, self.reached, self.open = stop, list(reached), list(open_)
 
 
 class RoundTooShort(JoulepathError):
-    """No round is found that is that fast; `shortest` [s] is the duration of the fastest one, of which `dwells` [s]."""
+    """No round that fast was found; `shortest` [s] is the duration of the fastest one found, of which `dwells` [s]."""
 
     def __init__(self, shortest: float, dwells: float) -> None:
         super().__init__(
-            f"The fastest round takes {shortest:.4f} s, of which it dwells {dwells:.4g} s: allow at least as much time."
+            f"The fastest round found takes {shortest:.4f} s, of which it dwells {dwells:.4g} s: allow at least as "
+            "much."
         )
         self.shortest, self.dwells = shortest, dwells
 

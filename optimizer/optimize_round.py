@@ -9,9 +9,15 @@ from optimizer.deadline import Clock
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.sequence.proven_bound import proven_bound
-from optimizer.sequence.round_baselines import controller_default, move_by_move, of_chain, shared_alike
+from optimizer.sequence.round_baselines import (
+    controller_default,
+    fastest_then_wait,
+    move_by_move,
+    of_chain,
+    same_factor,
+)
 from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
+from optimizer.sequence.round_solution import Move, RoundSolution
 from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Solution
 
@@ -36,9 +42,9 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
             nodes = greedy
         moving = [search.solutions[each] for each in search.pairs(nodes)]
         own = sum(each.duration for each in moving) + asked.dwelling
-        duration, price = _duration_asked(asked, own), 0.0
+        duration, price = asked.nearest_duration(own), 0.0
         bound, timed, timing = proven_bound(asked, search.legs, search.end), None, None
-        if duration is not None:
+        if duration != own:
             timing = TimedSearch(search, duration)
             timed = timing.run(nodes)
             nodes = timed.nodes
@@ -46,14 +52,15 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
             moving = [search.solve_in(*each, length) for each, length in shares]
             # energies of nearly fastest moves are flat: rounding must not turn the price's sign
             price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
-            bound = max(bound, timing.bound(price))
         moves = _moves(search, nodes, moving, timed)
-        ours = sum(each.solution.energy.electrical.total + each.dwell_energy + each.wait_energy for each in moves)
-        compared: list[RoundBaseline | None] = [
+        ours = sum(each.energy for each in moves)
+        compared = [
             None if greedy is None else of_chain(search, greedy, ours),
             controller_default(search, nodes[0], ours),
-            *(() if timing is None or timed is None else shared_alike(timing, timed, ours)),
         ]
+        if timing is not None:
+            bound = max(bound, timing.bound(price, ours))
+            compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
         complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
         return RoundSolution(
             status="optimal" if _is_done(search, timing, timed, moves) and complete else "feasible",
@@ -64,15 +71,6 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
             complete=complete,
             wall_time=clock() - began,
         )
-
-
-def _duration_asked(asked: WorkRound, own: float) -> float | None:
-    """The duration [s] that a round of its `own` duration must be brought to; None if it may have its own."""
-    if asked.duration_min is not None and own < asked.duration_min:
-        return asked.duration_min
-    if asked.duration_max is not None and own > asked.duration_max:
-        return asked.duration_max
-    return None
 
 
 def _is_done(search: RoundSearch, timing: TimedSearch | None, timed: Timed | None, moves: list[Move]) -> bool:
@@ -89,24 +87,23 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: 
     names = [START, *(stop.name for stop in asked.stops), START]
     for (k, _, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
-        dwell = asked.stops[k].dwell if k < len(asked.stops) else 0.0
-        waits = timed is not None and timed.at == k
+        wait, wait_energy = (0.0, 0.0) if timed is None or timed.at != k else (timed.shared.waited, timed.wait_energy)
         moves.append(
             Move(
                 start=names[k],
                 goal=names[k + 1],
                 arm=asked.arms[k],
-                arm_after=asked.arms[min(k + 1, len(asked.stops))],
+                arm_after=asked.arm_after(k),
                 solution=solution,
                 t0=t0,
-                dwell=dwell,
+                dwell=asked.dwell_after(k),
                 dwell_energy=float(leg.dwell[g]),
-                wait=timed.shared.waited if waits and timed is not None else 0.0,
-                wait_energy=timed.wait_energy if waits and timed is not None else 0.0,
+                wait=wait,
+                wait_energy=wait_energy,
                 pairs=leg.kind.size,
                 kinds=len(leg.pair),
                 solved=len(leg.solved),
             )
         )
-        t0 += solution.duration + dwell + moves[-1].wait
+        t0 += moves[-1].duration
     return moves

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from app.cli import terminal
-from app.cli.answer import FILE, OUTPUT, answered, compile_kernel_of, content_of, new_id, parsed, validated, write
+from app.cli.answer import FILE, OUTPUT
+from app.cli.search import proof, search
 
 
 @click.command(
@@ -27,24 +27,13 @@ def cycle(file: str, output: Path | None) -> None:
     from app.schemas.cycle import CycleRequest
     from app.tasks.cycle import CycleTask
 
-    request_id = new_id()
-    request = validated(CycleRequest, content_of(file), request_id)
-    with terminal.progress("Loading the compiled kernel of the robot"):
-        compile_kernel_of(request.robot)
-    with terminal.progress(f"Optimising for at most {request.deadline:g} s"):
-        answer = answered(CycleTask(request, request_id), request.deadline, request_id)
-    write(answer, output)
-    terminal.summary(lambda: summary_of(parsed(answer)))
+    search(CycleRequest, CycleTask, file, output, summary_of)
 
 
 def summary_of(answer: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
-    energy = answer["energy"]
     return {
-        "energy": f"{energy['electrical']['total']:.4g} J electrical",
-        "duration": f"{answer['duration']:.4g} s",
-        "status": answer["status"],
-        "lower bound": f"{energy['lower_bound']:.4g} J",
-        "gap": f"{energy['optimality_gap']:.1%}",
+        "energy": f"{answer['energy']['electrical']['total']:.4g} J electrical",
+        **proof(answer),
         **{f"saved against {each['name']}": f"{each['saving']:.1%}" for each in answer["baselines"]},
     }

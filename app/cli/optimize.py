@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from app.cli import terminal
-from app.cli.answer import FILE, OUTPUT, answered, compile_kernel_of, content_of, new_id, parsed, validated, write
+from app.cli.answer import FILE, OUTPUT
+from app.cli.search import proof, search
 
 
 @click.command(
@@ -29,25 +29,14 @@ def optimize(file: str, output: Path | None) -> None:
     from app.schemas.request import OptimizeRequest
     from app.tasks.optimize import OptimizeTask
 
-    request_id = new_id()
-    request = validated(OptimizeRequest, content_of(file), request_id)
-    with terminal.progress("Loading the compiled kernel of the robot"):
-        compile_kernel_of(request.robot)
-    with terminal.progress(f"Optimising for at most {request.deadline:g} s"):
-        answer = answered(OptimizeTask(request, request_id), request.deadline, request_id)
-    write(answer, output)
-    terminal.summary(lambda: summary_of(parsed(answer)))
+    search(OptimizeRequest, OptimizeTask, file, output, summary_of)
 
 
 def summary_of(answer: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
-    energy = answer["energy"]
-    total = energy[answer["objective"]]["total"]
+    total = answer["energy"][answer["objective"]]["total"]
     return {
         "energy": f"{total:.4g} J {answer['objective']}",
-        "duration": f"{answer['duration']:.4g} s",
-        "status": answer["status"],
-        "lower bound": f"{energy['lower_bound']:.4g} J",
-        "gap": f"{energy['optimality_gap']:.1%}",
+        **proof(answer),
         "branch": f"{answer['branch']['start']['label']} to {answer['branch']['goal']['label']}",
     }

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field, Tag
 
 from app.schemas.arm import ArmRequest, Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH
-from app.schemas.request import Branch, Holding, Target, by_kind
+from app.schemas.request import SECONDS_OR_RANGE, Branch, DurationRange, Holding, Target
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
 from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
@@ -48,21 +48,14 @@ class StopRequest(Request):
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
 
 
-class TimeRange(Request):
+class TimeRange(DurationRange):
     """Bounds on the duration of a round; each is optional."""
 
     min: LongTime | None = described("Smallest duration. Null: no bound.", "s", 10.0, default=None)
     max: LongTime | None = described("Largest duration. Null: no bound.", "s", 12.0, default=None)
 
 
-RoundTime = Annotated[
-    Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")],
-    Discriminator(
-        by_kind,
-        custom_error_type="duration",
-        custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
-    ),
-]
+RoundTime = Annotated[Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange, Tag("range")], SECONDS_OR_RANGE]
 
 
 class CycleRequest(ArmRequest):

@@ -83,14 +83,13 @@ def by_kind(value: Any) -> str | None:
     return "range" if isinstance(value, dict | Request) else None
 
 
-Duration = Annotated[
-    Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")],
-    Discriminator(
-        by_kind,
-        custom_error_type="duration",
-        custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
-    ),
-]
+SECONDS_OR_RANGE = Discriminator(
+    by_kind,
+    custom_error_type="duration",
+    custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
+)
+
+Duration = Annotated[Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")], SECONDS_OR_RANGE]
 
 
 class Branch(Request):

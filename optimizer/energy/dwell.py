@@ -38,7 +38,7 @@ def linear_dwells(cycle: Cycle, arm: Arm, hold: Array) -> list[LinearDwell]:
     """The intervals of [0, cycle.time] on which dwell(T) is linear, in order, for holding powers `hold` (...) [W]."""
     if cycle.hold == "motors":
         return [LinearDwell(0.0, cycle.time, hold, hold * cycle.time)]
-    brake, kink = np.full_like(hold, _brake_power(cycle, arm)), cycle.time - cycle.brake_delay
+    brake, kink = np.full_like(hold, brake_power(cycle, arm)), cycle.time - cycle.brake_delay
     early = LinearDwell(0.0, kink, brake, hold * cycle.brake_delay + brake * kink)
     late = LinearDwell(max(kink, 0.0), cycle.time, hold, hold * cycle.time)
     return [interval for interval in (early, late) if interval.t_max > interval.t_min]
@@ -51,7 +51,7 @@ def dwell_energy(cycle: Cycle, arm: Arm, hold: float, duration: float) -> float:
     """
     wait = max(cycle.time - duration, 0.0)
     by_motors = wait if cycle.hold == "motors" else min(wait, cycle.brake_delay)
-    return hold * by_motors + _brake_power(cycle, arm) * (wait - by_motors)
+    return hold * by_motors + brake_power(cycle, arm) * (wait - by_motors)
 
 
 def holding_power(arm: Arm, tau: Array) -> Array:
@@ -60,5 +60,6 @@ def holding_power(arm: Arm, tau: Array) -> Array:
     return np.asarray(arm.base_power + joints.sum(axis=-1))
 
 
-def _brake_power(cycle: Cycle, arm: Arm) -> float:
+def brake_power(cycle: Cycle, arm: Arm) -> float:
+    """Power [W] that the arm draws in all while its brakes hold it."""
     return arm.base_power if cycle.brake_power is None else cycle.brake_power

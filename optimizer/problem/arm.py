@@ -211,3 +211,9 @@ class Arm:
             raise InvalidProblem("limits.position", "limits.position may only tighten the robot's own range.")
         if (limits.q_min >= limits.q_max).any():
             raise InvalidProblem("limits.position", "limits.position.lower must be below limits.position.upper.")
+
+    def check_rating(self, field: str, mass: float) -> None:
+        """Raises InvalidProblem for `field` if a payload of `mass` [kg] exceeds the robot's rating."""
+        if mass > self.robot.rated_payload:
+            rating = self.robot.rated_payload
+            raise InvalidProblem(field, f"{field} exceeds the robot's rating: give at most {rating:g} kg.")

@@ -82,15 +82,14 @@ class WorkRound:
         for k, stop in enumerate(self.stops):
             if not 0 <= stop.dwell <= LONGEST_DURATION:
                 raise InvalidProblem(f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s.")
-            mass = 0.0 if stop.payload is None else stop.payload.mass
-            _check_rating(f"stops.{k}.payload.mass", mass, self.arm)
-        _check_rating("payload.mass", self.arm.payload.mass, self.arm)
+            self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
+        self.arm.check_rating("payload.mass", self.arm.payload.mass)
         if self.arm.bus.mode == "storage":
             raise InvalidProblem("bus.mode", "A round has no energy storage on the bus: use another mode.")
         for name in ("sample_period", "deadline"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
-        self.dwell(0)  # checks how the arm dwells
+        self._check_holding()
         self._check_duration()
 
     def _check_names(self) -> None:
@@ -102,6 +101,12 @@ class WorkRound:
             raise InvalidProblem(
                 f"stops.{repeated - 1}.name", f"Give each stop a name of its own; {START!r} is the start's."
             )
+
+    def _check_holding(self) -> None:
+        try:
+            self.waiting(1.0)
+        except InvalidProblem as error:
+            raise InvalidProblem(error.field.replace("cycle", "hold"), str(error).replace("cycle", "hold")) from None
 
     def _check_duration(self) -> None:
         for value in (self.duration_min, self.duration_max):
@@ -127,14 +132,18 @@ class WorkRound:
             arms.append(arms[-1] if stop.payload is None else replace(arms[-1], payload=stop.payload))
         return arms
 
-    def dwell(self, stop: int) -> Cycle | None:
-        """The dwell at a stop, as the wait after a motion of no duration; None if there is none."""
-        length = self.stops[stop].dwell
-        try:
-            cycle = Cycle(length or 1.0, self.hold, self.brake_delay, self.brake_power)
-        except InvalidProblem as error:
-            raise InvalidProblem(error.field.replace("cycle", "hold"), str(error).replace("cycle", "hold")) from None
-        return cycle if length else None
+    def arm_after(self, move: int) -> Arm:
+        """The arm with what it carries after a move: at the stop, or in the start configuration after the last one."""
+        return self.arms[min(move + 1, len(self.stops))]
+
+    def dwell_after(self, move: int) -> float:
+        """Time [s] of the dwell after a move: none after the one back to the start."""
+        return self.stops[move].dwell if move < len(self.stops) else 0.0
+
+    def nearest_duration(self, duration: float) -> float:
+        """The duration [s] within the bounds of the time that is nearest to another one."""
+        most = np.inf if self.duration_max is None else self.duration_max
+        return min(max(duration, self.duration_min or 0.0), most)
 
 
 def _full_target(arm: Arm, field: str, target: Target) -> Target:
@@ -147,9 +156,3 @@ def _full_target(arm: Arm, field: str, target: Target) -> Target:
         raise OutsideLimits(field, error.joint, error.value, error.lower, error.upper) from None
     except InvalidProblem as error:
         raise InvalidProblem(error.field.replace("goal", field, 1), str(error).replace("goal", field, 1)) from None
-
-
-def _check_rating(field: str, mass: float, arm: Arm) -> None:
-    if mass > arm.robot.rated_payload:
-        rating = arm.robot.rated_payload
-        raise InvalidProblem(field, f"{field} exceeds the robot's rating: give at most {rating:g} kg.")

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory
+from optimizer.exceptions import DeadlineExceeded, NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
@@ -68,11 +68,7 @@ class Run:
         checkpoint()
         least = min(candidate.shortest for candidate in self.incumbent.candidates)
         self.incumbent.longest = max(least, problem.duration_min or 0.0)
-        if problem.arm.payload.mass > problem.arm.robot.rated_payload:
-            rating = problem.arm.robot.rated_payload
-            raise InvalidProblem(
-                "payload.mass", f"payload.mass exceeds the robot's rating: give at most {rating:g} kg."
-            )
+        problem.arm.check_rating("payload.mass", problem.arm.payload.mass)
 
     def solution(self) -> Solution:
         """The motion of least energy that the certificate confirms. Raises the errors of `optimize`."""

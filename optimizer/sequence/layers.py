@@ -61,7 +61,7 @@ def layers_of(asked: WorkRound) -> list[Layer]:
 def _layer(
     asked: WorkRound, name: str, field: str, target: Target, arms: Sequence[Arm], branch: BranchFilter | None
 ) -> Layer:
-    """The layer of a target that is come to and left with the `arms`."""
+    """The layer of a target to which, and from which, the `arms` move."""
     problems = [
         Problem(arm=arm, start=target, goal=target, branch=branch, windings=asked.windings)
         for arm in {id(arm): arm for arm in arms}.values()

@@ -13,9 +13,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from optimizer.deadline import Deadline
-from optimizer.exceptions import NoSequence
+from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoSequence
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.legs import Leg
+from optimizer.trajectories.spline import Spline
 
 # share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
 SHARE_OF_A_LEG = 1 / 8
@@ -33,8 +34,34 @@ class LazySearch(ABC):
         self._chain = LeastChain([leg.cost for leg in self.legs], closed)
 
     @abstractmethod
+    def attempt(self, k: int, s: int, g: int) -> float | None:
+        """What a motion of a pair needs [J], the dwell left out: inf if none is found, None once the time is up."""
+
+    @abstractmethod
+    def motion(self, k: int, s: int, g: int) -> Spline | None:
+        """The motion that `attempt` found for a pair; None if it found none."""
+
     def try_kind(self, k: int, s: int, g: int) -> None:
-        """Give the kind of a pair what its motion needs; leave it as it is once the time is up."""
+        """Give the kind of a pair what its motion needs; leave it as it is once the time is up.
+
+        Where the range of a joint is in the way of a pair, the pair of its kind that is farthest from the limits is
+        tried, too: the first one has a value of its own then.
+        """
+        leg = self.legs[k]
+        kind = int(leg.kind[s, g])
+        value = self.attempt(k, s, g)
+        centre_s, centre_g = leg.pair[kind].tolist()
+        if value is not None and (s, g) != (centre_s, centre_g) and leg.is_near_a_limit(self.motion(k, s, g)):
+            if np.isfinite(value):
+                leg.set_pair(s, g, value)
+            value = self.attempt(k, centre_s, centre_g)
+        if value is not None:
+            leg.set_kind(kind, value)
+
+    def late(self) -> float | None:
+        """What a leg for which the time was too short is worth: without its share of it, no other is tried."""
+        self.cut_short = True
+        return None if self.search_end.passed else np.inf
 
     def pairs(self, nodes: list[int]) -> Iterator[tuple[int, int, int]]:
         """Leg, start node and goal node of each move of a chain."""
@@ -44,15 +71,20 @@ class LazySearch(ABC):
         """What a chain needs as far as it is known, dwells included."""
         return float(sum(self.legs[k].cost[s, g] for k, s, g in self.pairs(nodes)))
 
+    def dwells(self, nodes: list[int]) -> float:
+        """Energy [J] of the dwells of a chain."""
+        return sum(float(self.legs[k].dwell[g]) for k, _, g in self.pairs(nodes))
+
     def explore(self) -> list[int]:
         """The nodes of the least chain, all of its legs solved; once the time is up, of the least solved one.
 
-        If none is solved by then, those of the least chain. Raises NoSequence.
+        If none is solved by then, those of the least chain. Raises NoSequence, or DeadlineExceeded if some leg that
+        might close the gap was given too little time.
         """
         while True:
             _, nodes = self._chain.find()
             if not nodes:
-                raise self._no_sequence()
+                raise self._no_chain()
             open_ = [(k, s, g) for k, s, g in self.pairs(nodes) if not self.legs[k].known(s, g)]
             if not open_:
                 return nodes
@@ -72,8 +104,10 @@ class LazySearch(ABC):
             costs.append(np.where(known, leg.cost, np.inf))
         return LeastChain(costs, self.closed).find()[1]
 
-    def _no_sequence(self) -> NoSequence:
-        """The error for no chain; it names the first stop that none comes to."""
+    def _no_chain(self) -> JoulepathError:
+        """The error for no chain; it names the first stop to which none leads."""
+        if self.cut_short:
+            return DeadlineExceeded([])
         reached = np.zeros(len(self.legs[0].start.q))
         for leg in self.legs:
             after = (reached[:, None] + leg.cost).min(axis=0)

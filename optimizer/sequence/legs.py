@@ -8,7 +8,7 @@ the range of a joint can tell pairs of a kind apart: where it does, a pair has a
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,11 +19,14 @@ from optimizer.exceptions import InvalidProblem
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.lower_bound import lower_bounds, priced_bounds
 from optimizer.sequence.layers import Layer
+from optimizer.trajectories.spline import Spline
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000
 # kinds between two looks at the deadline: some ten milliseconds
 KINDS_PER_CHECK = 2048
+# rad: a motion whose control points are farther from the limits is not held back by them
+NEAR_LIMIT = 1e-3
 
 
 @dataclass(eq=False)
@@ -31,7 +34,8 @@ class Leg:
     """All motions from one layer to the next.
 
     `kind` (s, g) numbers the kinds of the pairs; `pair` (k, 2) is the pair of each kind that is farthest from the
-    joints' limits. `bound` (k,) [J] are proven. `cost` (s, g) [J] is the bound of a pair that is not solved, the energy
+    joints' limits, `displacement` (k, nq) [rad] and `gain` (k,) [J] of potential energy are those of the kinds, and
+    `bound` (k,) [J] is proven. `cost` (s, g) [J] is the bound of a pair that is not solved, the energy
     found of one that is, and inf of one without a motion; with it comes the `dwell` (g,) [J] at the goal. `solved` has
     the energies of kinds, `exact` those of pairs, without the dwell.
     """
@@ -41,6 +45,8 @@ class Leg:
     goal: Layer
     kind: npt.NDArray[np.intp]
     pair: npt.NDArray[np.intp]
+    displacement: Array
+    gain: Array
     bound: Array
     dwell: Array
     cost: Array
@@ -57,8 +63,11 @@ class Leg:
                 f"of at most {MOST_PAIRS}: give fewer targets, a `branch`, or `windings` false.",
             )
         kind, pair = _kinds(start, goal, prepared)
-        bound = _bounds(prepared, start, goal, pair, lambda *of: lower_bounds(prepared, *of)[0])
-        return cls(prepared, start, goal, kind, pair, bound, dwell, bound[kind] + dwell)
+        potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
+        gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
+        displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
+        bound = _bounds(lambda x, gain: lower_bounds(prepared, x, gain)[0], displacement, gain)
+        return cls(prepared, start, goal, kind, pair, displacement, gain, bound, dwell, bound[kind] + dwell)
 
     def priced(self, price: float, longest: float) -> Leg:
         """The same leg with what energy + price · duration needs, of motions of at most `longest` [s]; none solved.
@@ -66,12 +75,17 @@ class Leg:
         `price` [W]; dwells last as long as they do.
         """
         bound = _bounds(
-            self.prepared, self.start, self.goal, self.pair,
-            lambda displacement, gain: priced_bounds(self.prepared, displacement, gain, price, longest),
-        )  # fmt: skip
-        return Leg(
-            self.prepared, self.start, self.goal, self.kind, self.pair, bound, self.dwell, bound[self.kind] + self.dwell
+            lambda x, gain: priced_bounds(self.prepared, x, gain, price, longest), self.displacement, self.gain
         )
+        return replace(self, bound=bound, cost=bound[self.kind] + self.dwell, solved={}, exact={})
+
+    def is_near_a_limit(self, motion: Spline | None) -> bool:
+        """Whether a motion comes to the end of a joint's range, or there is none: another pair of its kind may need
+        less then."""
+        if motion is None:
+            return True
+        limits, points = self.prepared.arm.active_limits, motion.control_points
+        return bool((points < limits.q_min + NEAR_LIMIT).any() or (points > limits.q_max - NEAR_LIMIT).any())
 
     def known(self, s: int, g: int) -> bool:
         """Whether the pair, or another one of its kind, is solved."""
@@ -109,19 +123,10 @@ def _kinds(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.ND
     return of_pair.reshape(code.shape), np.column_stack(np.unravel_index(order[first], code.shape))
 
 
-def _bounds(
-    prepared: PreparedProblem,
-    start: Layer,
-    goal: Layer,
-    pair: npt.NDArray[np.intp],
-    bound: Callable[[Array, Array], Array],
-) -> Array:
+def _bounds(bound: Callable[[Array, Array], Array], displacement: Array, gain: Array) -> Array:
     """Proven lower bounds (k,) [J] of the kinds, by a `bound` on joint displacements and gains of potential energy."""
-    potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
-    gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
-    displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
     bounds = []
-    for low in range(0, len(pair), KINDS_PER_CHECK):
+    for low in range(0, len(gain), KINDS_PER_CHECK):
         checkpoint()
         part = slice(low, low + KINDS_PER_CHECK)
         bounds.append(bound(displacement[part], gain[part]))

@@ -61,23 +61,26 @@ def _solved(
 
 
 class PricedSearch(LazySearch):
-    """The search of the least chain at a price of time [W]; `motions` are those found, by leg and kind."""
+    """The search of the least chain at a price of time [W]; `motions` are those found, by leg, start and goal node."""
 
     def __init__(self, legs: Sequence[Leg], closed: bool, price: float, longest: float, search_end: Deadline) -> None:
         super().__init__([leg.priced(price, longest) for leg in legs], closed, search_end)
         self.price, self.longest = price, longest
-        self.motions: dict[tuple[int, int], PricedMotion] = {}
+        self.motions: dict[tuple[int, int, int], PricedMotion] = {}
 
-    def try_kind(self, k: int, s: int, g: int) -> None:
-        """Solve a pair for its kind."""
-        leg = self.legs[k]
+    def attempt(self, k: int, s: int, g: int) -> float | None:
+        """Energy + price · duration of a pair's motion [J]; inf if none is found, None once the time is up."""
         deadline = self.search_end.within(SHARE_OF_A_LEG * self.search_end.left)
-        found = priced_motion(leg, s, g, self.price, self.longest, deadline)
-        if found is None and self.search_end.passed:
-            self.cut_short = True
-            return
-        self.failed |= found is None
-        kind = int(leg.kind[s, g])
-        if found is not None:
-            self.motions[k, kind] = found
-        leg.set_kind(kind, np.inf if found is None else found.energy + self.price * found.duration)
+        found = priced_motion(self.legs[k], s, g, self.price, self.longest, deadline)
+        if found is None and deadline.passed:
+            return self.late()
+        if found is None:
+            self.failed = True
+            return np.inf
+        self.motions[k, s, g] = found
+        return found.energy + self.price * found.duration
+
+    def motion(self, k: int, s: int, g: int) -> Spline | None:
+        """The motion of a pair; None if none was found."""
+        found = self.motions.get((k, s, g))
+        return None if found is None else found.spline

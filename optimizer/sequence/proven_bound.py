@@ -9,7 +9,6 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.deadline import Deadline
-from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.candidates import Candidate
@@ -18,6 +17,7 @@ from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.layers import Layer
 from optimizer.sequence.legs import Leg
+from optimizer.sequence.rests import least_holding_power, rest_energy
 
 
 def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> float:
@@ -35,9 +35,7 @@ def _costs(asked: WorkRound, k: int, leg: Leg, deadline: Deadline) -> Array:
     if not open_start and not open_goal:
         return costs
     least = _of_curves(leg, deadline) if leg.start.complete and leg.goal.complete else _of_any(leg)
-    cycle = asked.dwell(k) if k < len(asked.stops) else None
-    arm = asked.arms[min(k + 1, len(asked.stops))]
-    dwell = 0.0 if cycle is None else dwell_energy(cycle, arm, float(holding_power(arm, np.zeros(arm.robot.nq))), 0.0)
+    dwell = rest_energy(asked, k, asked.dwell_after(k), least_holding_power(asked, k))
     if open_goal:
         costs = np.hstack([costs, np.full((len(costs), 1), least + dwell)])
     if open_start:
@@ -47,12 +45,9 @@ def _costs(asked: WorkRound, k: int, leg: Leg, deadline: Deadline) -> Array:
 
 def _of_curves(leg: Leg, deadline: Deadline) -> float:
     """Bound [J] on the motions of a leg of which an end is any member of a self-motion."""
-    ends = [(leg.start.ends, leg.goal.ends[:1]), (leg.start.ends[:1], leg.goal.ends)]
-    for side, layer in enumerate((leg.start, leg.goal)):
-        on_curve = [end for end in layer.ends if end.sampled][:1]
-        if on_curve:
-            # with one of these, every end on the other side makes a pair that counts
-            ends.append((on_curve, leg.goal.ends) if side == 0 else (leg.start.ends, on_curve))
+    some = [next((end for end in layer.ends if end.sampled), layer.ends[0]) for layer in (leg.start, leg.goal)]
+    # paired with one on a curve, every end of the other side counts
+    ends = [(leg.start.ends, some[1:]), (some[:1], leg.goal.ends)]
     pairs = [Candidate(s, g, s.q, g.q) for starts, goals in ends for s, g in product(starts, goals)]
     return self_motion_bound(leg.prepared, pairs, deadline)
 
@@ -71,7 +66,7 @@ def _levels(leg: Leg, layer: Layer) -> tuple[float, float]:
     But for full turns, which change none, they differ from a known one by at most half a turn in each joint.
     """
     known = [leg.prepared.potential(end.q) for end in layer.ends]
-    if layer.complete:
+    if layer.complete and not layer.sampled:
         return min(known), max(known)
     reach = np.pi * float(potential_rates(leg.prepared.model, leg.prepared.arm.gravity).sum())
     return max(known) - reach, min(known) + reach

@@ -6,13 +6,13 @@ from __future__ import annotations
 import numpy as np
 
 from optimizer.exceptions import DeadlineExceeded
-from optimizer.search.baselines import baselines, nearest
-from optimizer.search.baselines import saving as saving_of
+from optimizer.search.baselines import baselines, nearest, saving
 from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import RoundBaseline
-from optimizer.sequence.timed_round import Timed, TimedSearch
+from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName
+from optimizer.sequence.time_sharing import duration_of
+from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Baseline
-from optimizer.trajectories.spline import lasting
+from optimizer.trajectories.spline import Spline, lasting
 
 
 def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
@@ -23,8 +23,7 @@ def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
     """
     nodes = [start]
     for k, leg in enumerate(search.legs):
-        goals = [start] if search.asked.closed and k == len(search.legs) - 1 else range(len(leg.goal.q))
-        s = nodes[-1]
+        s, goals = nodes[-1], _goals(search, k, start)
         while True:
             # the dwell is no part of the move
             g = min(goals, key=lambda each: float(leg.cost[s, each] - leg.dwell[each]))
@@ -45,29 +44,36 @@ def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
     return nodes if all(each in search.solutions for each in search.pairs(nodes)) else None
 
 
-def shared_alike(timing: TimedSearch, timed: Timed, ours: float) -> list[RoundBaseline]:
-    """The same round with every move slowed or sped up alike, and with the fastest moves and a wait."""
-    search, asked = timing.search, timing.asked
-    free = [search.solutions.get(each) for each in search.pairs(timed.nodes)]
-    found = list[RoundBaseline]()
-    known = [each.trajectory.spline for each in free if each is not None]
-    if len(known) == len(free):
-        factor = timing.time / sum(spline.duration for spline in known)
-        splines = [lasting(spline, spline.duration * factor) for spline in known]
-        energies = [
-            leg.prepared.energy(spline).electrical.total for leg, spline in zip(search.legs, splines, strict=True)
-        ]
-        dwells = sum(float(search.legs[k].dwell[g]) for k, _, g in search.pairs(timed.nodes))
-        total = sum(energies) + dwells
-        # slower than a motion within the limits is within them, but for torques against gravity, which do not change
-        found.append(
-            RoundBaseline("same_factor", timing.time + asked.dwelling, total, factor >= 1, saving_of(ours, total))
-        )
-    fastest = timing.fastest_then_waiting(timed)
-    if fastest is not None:
-        duration, total = fastest
-        found.append(RoundBaseline("fastest_then_wait", duration, total, True, saving_of(ours, total)))
-    return found
+def same_factor(timing: TimedSearch, nodes: list[int], ours: float) -> RoundBaseline | None:
+    """The chain's moves of least energy, all of them slowed or sped up by one factor; None if some are not known."""
+    search = timing.search
+    free = [search.solutions.get(each) for each in search.pairs(nodes)]
+    own = [each.trajectory.spline for each in free if each is not None]
+    if len(own) < len(free):
+        return None
+    factor = timing.time / sum(spline.duration for spline in own)
+    return _in_time(timing, "same_factor", nodes, [lasting(spline, spline.duration * factor) for spline in own], ours)
+
+
+def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: float) -> RoundBaseline | None:
+    """The chain's moves as fast as they can be, all the time that is left waited out; None if some are not found."""
+    fast = timing.fastest(nodes)
+    if fast is None or duration_of(fast) > timing.time:
+        return None
+    return _in_time(timing, "fastest_then_wait", nodes, [each.spline for each in fast], ours)
+
+
+def _in_time(
+    timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: float
+) -> RoundBaseline:
+    """The baseline of a chain with given motions; the time that they leave is waited out where it draws least."""
+    search = timing.search
+    pairs = list(zip(search.pairs(nodes), splines, strict=True))
+    _, wait = timing.cheapest_wait(nodes, timing.time - sum(spline.duration for spline in splines))
+    moving = sum(search.legs[k].prepared.energy(spline).electrical.total for (k, _, _), spline in pairs)
+    total = moving + search.dwells(nodes) + wait
+    held = all(search.confirms(*pair, spline) for pair, spline in pairs)
+    return RoundBaseline(name, timing.time + timing.asked.dwelling, total, held, saving(ours, total))
 
 
 def of_chain(search: RoundSearch, nodes: list[int], ours: float) -> RoundBaseline | None:
@@ -78,9 +84,9 @@ def of_chain(search: RoundSearch, nodes: list[int], ours: float) -> RoundBaselin
     moves = [search.solutions[each] for each in search.pairs(nodes)]
     theirs = search.cost(nodes)
     duration = sum(move.duration for move in moves) + search.asked.dwelling
-    if not _takes_the_time(search, duration):
+    if search.asked.nearest_duration(duration) != duration:
         return None
-    return RoundBaseline("move_by_move", duration, theirs, True, saving_of(ours, theirs))
+    return RoundBaseline("move_by_move", duration, theirs, True, saving(ours, theirs))
 
 
 def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBaseline | None:
@@ -90,7 +96,7 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
     """
     node, total, duration, held = start, 0.0, 0.0, True
     for k, leg in enumerate(search.legs):
-        goals = [start] if search.asked.closed and k == len(search.legs) - 1 else list(range(len(leg.goal.q)))
+        goals = _goals(search, k, start)
         prepared, q_start = leg.prepared, leg.start.q[node]
         q_goal = nearest(prepared.problem, q_start, leg.goal.q[goals])
         node = next(g for g in goals if (leg.goal.q[g] == q_goal).all())
@@ -108,12 +114,12 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
         duration += move.duration
         held &= move.within_limits
     duration += search.asked.dwelling
-    if not _takes_the_time(search, duration):
+    if search.asked.nearest_duration(duration) != duration:
         return None
-    return RoundBaseline("controller_default", duration, total, held, saving_of(ours, total))
+    return RoundBaseline("controller_default", duration, total, held, saving(ours, total))
 
 
-def _takes_the_time(search: RoundSearch, duration: float) -> bool:
-    """Whether a round of a duration [s] takes the time that is asked for."""
-    asked = search.asked
-    return (asked.duration_min or 0.0) <= duration <= (asked.duration_max or np.inf)
+def _goals(search: RoundSearch, move: int, start: int) -> list[int]:
+    """The nodes to which a move may lead: a closed round ends in the node `start` from which it went out."""
+    last = search.asked.closed and move == len(search.legs) - 1
+    return [start] if last else list(range(len(search.legs[move].goal.q)))

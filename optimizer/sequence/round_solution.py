@@ -37,6 +37,16 @@ class Move:
     kinds: int
     solved: int
 
+    @property
+    def duration(self) -> float:
+        """Duration [s] of the move, the dwell and the wait."""
+        return self.solution.duration + self.dwell + self.wait
+
+    @property
+    def energy(self) -> float:
+        """Electrical energy [J] of the move, the dwell and the wait."""
+        return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
+
 
 RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait"]
 
@@ -72,7 +82,7 @@ class RoundSolution:
     @property
     def duration(self) -> float:
         """Duration of the round, dwells and waiting included [s]."""
-        return sum(move.solution.duration + move.dwell + move.wait for move in self.moves)
+        return sum(move.duration for move in self.moves)
 
     @cached_property
     def energy(self) -> Energy:

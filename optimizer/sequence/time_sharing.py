@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from optimizer.deadline import Deadline
 from optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from optimizer.sequence.legs import Leg
-from optimizer.sequence.priced_search import PricedMotion, fastest_motion, priced_motion
+from optimizer.sequence.priced_search import PricedMotion, priced_motion
 from optimizer.trajectories.spline import Spline
 
 # W: prices of time that are tried where it is short; at the last, motions are nearly as fast as they can be
 PRICES = (20.0, 100.0, 500.0, 2500.0)
-# share of the price of waiting that a slower move must save more than: to creep is no better than to wait
-CREEPING = 2e-3
+# relative: a slower move must save more than a wait draws by this share, or else the time is waited out
+WORTH_SLOWING = 2e-3
 # relative: durations that add up to the time within this are stretched by the rest; and most prices tried
 SHARED, MOST_PRICES = 1e-3, 14
 
@@ -40,7 +40,7 @@ class Shared:
     @classmethod
     def of(cls, price: float, motions: Sequence[PricedMotion]) -> Shared:
         """The durations and energies of motions."""
-        return cls(price, [each.duration for each in motions], sum(each.energy for each in motions))
+        return cls(price, [each.duration for each in motions], energy_of(motions))
 
     @property
     def moving(self) -> float:
@@ -73,17 +73,13 @@ class TimeSharing:
         self.guesses = [motion.spline for motion in motions]
         return Shared.of(price, motions)
 
-    def fastest(self) -> Shared:
-        """The moves as fast as they can be. Raises NoTrajectory, or DeadlineExceeded."""
-        motions = [self._checked(fastest_motion(self.legs[k], s, g, self.deadline)) for k, s, g in self.pairs]
-        return Shared.of(PRICES[-1], motions)
-
-    def fill(self, time: float, waiting: float) -> Shared:
+    def fill(self, time: float, waiting: float, fastest: Sequence[PricedMotion]) -> Shared:
         """The moves that need the least energy with a wait that draws `waiting` [W], in exactly `time` [s].
 
-        Raises NoTrajectory if the moves cannot be that fast, or DeadlineExceeded.
+        `fastest` are the moves as fast as they can be, in no more than this time. Raises NoTrajectory, or
+        DeadlineExceeded.
         """
-        slow = self.at(-waiting * (1 - CREEPING))
+        slow = self.at(-waiting * (1 - WORTH_SLOWING))
         if slow.moving <= time:
             return Shared(-waiting, slow.lengths, slow.energy, time - slow.moving)
         for price in PRICES:
@@ -91,17 +87,14 @@ class TimeSharing:
             if fast.moving <= time:
                 return self._between(slow, fast, time)
             slow = fast
-        fast = self.fastest()
-        if fast.moving > time:
-            raise NoTrajectory([])
-        return _mixed(slow, fast, time)
+        return _mixed(slow, Shared.of(PRICES[-1], fastest), time)
 
     def _between(self, slow: Shared, fast: Shared, time: float) -> Shared:
         """The moves at a price between two, one of which is too slow: by the Illinois method."""
         above, below = slow.moving - time, fast.moving - time
         for _ in range(MOST_PRICES):
             if -(fast.moving - time) <= SHARED * time:
-                stretch = time / fast.moving
+                stretch = time / fast.moving if fast.moving else 1.0
                 return Shared(fast.price, [length * stretch for length in fast.lengths], fast.energy)
             middle = self.at(fast.price - below * (slow.price - fast.price) / (above - below))
             if middle.moving > time:
@@ -117,8 +110,18 @@ class TimeSharing:
         return found
 
 
+def duration_of(motions: Sequence[PricedMotion]) -> float:
+    """Duration [s] of motions one after the other."""
+    return sum(each.duration for each in motions)
+
+
+def energy_of(motions: Sequence[PricedMotion]) -> float:
+    """Energy [J] of motions."""
+    return sum(each.energy for each in motions)
+
+
 def _mixed(slow: Shared, fast: Shared, time: float) -> Shared:
-    """Durations between those of two, so that they add up to the time; energies are convex, and not above the chord."""
+    """Durations between those of two, so that they add up to the time; the energy is that of the chord, an estimate."""
     share = (time - fast.moving) / (slow.moving - fast.moving)
     lengths = [a + share * (b - a) for a, b in zip(fast.lengths, slow.lengths, strict=True)]
     price = (fast.energy - slow.energy) / (slow.moving - fast.moving)

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array
-from optimizer.energy.dwell import dwell_energy
 from optimizer.exceptions import DeadlineExceeded, NoTrajectory, RoundTooShort
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.sequence.chains import LeastChain
-from optimizer.sequence.priced_search import PricedSearch
-from optimizer.sequence.round_search import RoundSearch, holding_powers
-from optimizer.sequence.time_sharing import PRICES, Shared, TimeSharing
+from optimizer.sequence.priced_search import PricedMotion, PricedSearch, fastest_motion
+from optimizer.sequence.rests import holding_powers, long_wait_powers, rest_energy
+from optimizer.sequence.round_search import RoundSearch
+from optimizer.sequence.time_sharing import PRICES, Shared, TimeSharing, duration_of
 from optimizer.trajectories.spline import Spline
 
 # chains that are tried, each better than the one before at the price of time that shares this one's
@@ -43,27 +43,30 @@ class Timed:
 
 
 class TimedSearch:
-    """The search for the round of least energy in a time [s], from the `search` of the round in its own time."""
+    """The search for the round of least energy in a time [s], from the `search` of the round in its own time.
+
+    `exact`: no other chain can be better, as far as the price tells.
+    """
 
     def __init__(self, search: RoundSearch, duration: float) -> None:
         self.search, self.asked, self.legs = search, search.asked, search.legs
         self.time = duration - self.asked.dwelling
-        self.longest = min(max(self.time, LEAST_DURATION), LONGEST_DURATION)
+        self.longest = _longest_move(self.time)
         self.exact = True
+        self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
 
     def run(self, nodes: list[int]) -> Timed:
-        """The best round found from that of a chain on. Raises RoundTooShort, or DeadlineExceeded."""
+        """The best round found from that of a chain on. Raises RoundTooShort, NoTrajectory or DeadlineExceeded."""
         best = self._of(nodes, [self.search.solutions[each].trajectory.spline for each in self.search.pairs(nodes)])
         if best is None:
             best = self._of_the_fastest()
         for _ in range(MOST_CHAINS):
-            price = best.shared.price
-            priced = PricedSearch(self.legs, self.asked.closed, price, self.longest, self.search.search_end)
+            priced = self._priced(best.shared.price, self.longest)
             chain = priced.explore()
             self.exact &= not (priced.cut_short or priced.failed)
             if chain == best.nodes:
                 return best
-            other = self._of(chain, [None] * len(self.legs))
+            other = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
             if other is None or other.energy > best.energy * (1 - BETTER):
                 # another chain is as good at this price, and worse in this time
                 self.exact = False
@@ -72,79 +75,104 @@ class TimedSearch:
         self.exact = False
         return best
 
-    def _of_the_fastest(self) -> Timed:
-        """The chain that can be fastest, with its time shared. Raises RoundTooShort."""
-        end = self.search.search_end
-        chain = PricedSearch(self.legs, self.asked.closed, PRICES[-1], LONGEST_DURATION, end).explore()
-        guesses = [None] * len(self.legs)
-        found = self._of(chain, guesses)
-        if found is not None:
-            return found
-        fast = TimeSharing(self.legs, list(self.search.pairs(chain)), guesses, self.longest, end).fastest()
-        dwells = self.asked.dwelling
-        raise RoundTooShort(fast.moving + dwells, dwells)
+    def _priced(self, price: float, longest: float) -> PricedSearch:
+        return PricedSearch(self.legs, self.asked.closed, price, longest, self.search.search_end)
 
-    def fastest_then_waiting(self, timed: Timed) -> tuple[float, float] | None:
-        """Duration [s] and energy [J] of the same chain as fast as it can be, all the time that is left waited out."""
-        pairs, guesses = list(self.search.pairs(timed.nodes)), [None] * len(self.legs)
-        try:
-            fast = TimeSharing(self.legs, pairs, guesses, self.longest, self.search.end).fastest()
-        except (NoTrajectory, DeadlineExceeded):
-            return None
-        if fast.moving > self.time:
-            return None
-        _, wait = self._cheapest_wait(timed.nodes, self.time - fast.moving)
-        return self.time + self.asked.dwelling, fast.energy + self._dwells(timed.nodes) + wait
+    def _of_the_fastest(self) -> Timed:
+        """The chain that is nearly the fastest, with its time shared. Raises RoundTooShort or NoTrajectory."""
+        priced = self._priced(PRICES[-1], LONGEST_DURATION)
+        chain = priced.explore()
+        fast = self.fastest(chain)
+        if fast is None:
+            raise NoTrajectory([])
+        if duration_of(fast) > self.time:
+            if priced.cut_short:
+                raise DeadlineExceeded([])
+            raise RoundTooShort(duration_of(fast) + self.asked.dwelling, self.asked.dwelling)
+        found = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
+        if found is None:
+            raise NoTrajectory([])
+        return found
+
+    def fastest(self, nodes: list[int]) -> list[PricedMotion] | None:
+        """The moves of a chain as fast as they can be; None if some are not found."""
+        found = list[PricedMotion]()
+        for each in self.search.pairs(nodes):
+            if each not in self._fastest:
+                self._fastest[each] = fastest_motion(self.legs[each[0]], *each[1:], self.search.search_end)
+            motion = self._fastest[each]
+            if motion is None:
+                return None
+            found.append(motion)
+        return found
 
     def _of(self, nodes: list[int], guesses: Sequence[Spline | None]) -> Timed | None:
-        """A chain with its time shared; None if it cannot be that fast."""
-        waiting = min(float(self.powers(k)[nodes[k + 1]]) for k in range(len(self.legs)))
-        sharing = TimeSharing(self.legs, list(self.search.pairs(nodes)), guesses, self.longest, self.search.search_end)
+        """A chain with its time shared; None if no motions that fast are found."""
+        fast = self.fastest(nodes)
+        if fast is None or duration_of(fast) > self.time:
+            return None
+        pairs, end = list(self.search.pairs(nodes)), self.search.search_end
+        waiting = min(float(self._powers(k)[g]) for k, _, g in pairs)
         try:
-            shared = sharing.fill(self.time, waiting)
+            shared = TimeSharing(self.legs, pairs, guesses, self.longest, end).fill(self.time, waiting, fast)
         except NoTrajectory:
             return None
-        at, wait = self._cheapest_wait(nodes, shared.waited)
-        return Timed(nodes, shared, at, wait, shared.energy + self._dwells(nodes) + wait)
+        at, wait = self.cheapest_wait(nodes, shared.waited)
+        return Timed(nodes, shared, at, wait, shared.energy + self.search.dwells(nodes) + wait)
 
-    def _dwells(self, nodes: list[int]) -> float:
-        """Energy [J] of the dwells of a chain."""
-        return sum(float(self.legs[k].dwell[g]) for k, _, g in self.search.pairs(nodes))
-
-    def _cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
+    def cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
         """The move after which a wait [s] draws least, and its energy [J] beside the dwell there."""
         energies = [self._wait_energy(nodes, k, waited) for k in range(len(self.legs))]
         return int(np.argmin(energies)), min(energies)
 
-    def powers(self, k: int) -> Array:
-        """Power (n,) [W] of a long wait after move k, in each configuration of its goal."""
-        asked = self.asked
-        if asked.hold == "motors":
-            return self._holding(k)
-        arm = asked.arms[min(k + 1, len(asked.stops))]
-        return np.full(len(self.legs[k].goal.q), arm.base_power if asked.brake_power is None else asked.brake_power)
-
-    def _holding(self, k: int) -> Array:
-        return holding_powers(self.asked.arms[min(k + 1, len(self.asked.stops))], self.legs[k].goal)
-
-    def _wait_energy(self, nodes: list[int], at: int, waited: float) -> float:
+    def _wait_energy(self, nodes: list[int], move: int, waited: float) -> float:
         """Energy [J] of a wait beside the dwell after a move."""
         if waited <= 0:
             return 0.0
-        asked, node = self.asked, nodes[at + 1]
-        dwell = asked.stops[at].dwell if at < len(asked.stops) else 0.0
-        arm = asked.arms[min(at + 1, len(asked.stops))]
-        whole = dwell_energy(asked.waiting(dwell + waited), arm, float(self._holding(at)[node]), 0.0)
-        return whole - float(self.legs[at].dwell[node])
+        node, dwell = nodes[move + 1], self.asked.dwell_after(move)
+        hold = float(holding_powers(self.asked, move, self.legs[move].goal)[node])
+        return rest_energy(self.asked, move, dwell + waited, hold) - float(self.legs[move].dwell[node])
 
-    def bound(self, price: float) -> float:
-        """Lower bound [J] on all rounds of this duration, by a price [W] of time.
+    def _powers(self, move: int) -> Array:
+        return long_wait_powers(self.asked, move, self.legs[move].goal)
 
-        -inf where some configurations are not known.
+    def bound(self, price: float, ours: float) -> float:
+        """Lower bound [J] on all rounds in the time that is asked for, by a price [W] of time: not above what we found,
+        `ours` [J].
+
+        At a price below 0 it holds for every longer time, too, and above 0 for every shorter one. -inf where some
+        configurations are not known.
         """
         if any(layer.sampled or not layer.complete for leg in self.legs for layer in (leg.start, leg.goal)):
             return -np.inf
-        least = min(float(np.minimum(self.powers(k), self._holding(k)).min()) for k in range(len(self.legs)))
-        price = max(price, -least)
-        costs = [leg.priced(price, self.longest).cost for leg in self.legs]
-        return LeastChain(costs, self.asked.closed).find()[0] - price * self.time
+        # neither a wait on motors nor one on brakes may gain by the price
+        powers = [
+            f(self.asked, k, leg.goal) for k, leg in enumerate(self.legs) for f in (holding_powers, long_wait_powers)
+        ]
+        price = max(price, -min(float(each.min()) for each in powers))
+        longest = self._longest_below(ours)
+        return min(self._least(price, longest) - price * self.time, ours)
+
+    def _longest_below(self, ours: float) -> float:
+        """Longest duration [s] of a move in any round that needs less than `ours` [J] and takes no longer than asked.
+
+        Every second draws at least what the electronics do: a round with a move of duration T needs base · T more than
+        the least chain of Σ (E - base · T).
+        """
+        most = self.asked.duration_max
+        longest = LONGEST_DURATION if most is None else _longest_move(most - self.asked.dwelling)
+        base = self.asked.arm.base_power
+        if longest <= self.longest or base <= 0:
+            return longest
+        beside = self._least(-base, longest)
+        return float(np.clip((ours - beside) / base, LEAST_DURATION, longest))
+
+    def _least(self, price: float, longest: float) -> float:
+        """Least sum [J] of bounds on energy + price · duration of a chain's moves, each of at most `longest` [s]."""
+        costs = [leg.priced(price, longest).cost for leg in self.legs]
+        return LeastChain(costs, self.asked.closed).find()[0]
+
+
+def _longest_move(time: float) -> float:
+    """Longest duration [s] of one move where all of them take `time` [s]."""
+    return min(max(time, LEAST_DURATION), LONGEST_DURATION)

@@ -1,4 +1,4 @@
-"""One thread for linear algebra, as `optimize` has it: several cost small matrices more than they give."""
+"""What all tests of the library share: one thread for linear algebra, and the kernel of the default robot."""
 
 from __future__ import annotations
 
@@ -7,8 +7,18 @@ from collections.abc import Iterator
 import pytest
 from threadpoolctl import threadpool_limits
 
+from models.registry import load_robot
+from optimizer.energy.kernel_cache import compile_kernel
+
 
 @pytest.fixture(scope="session", autouse=True)
 def _one_thread() -> Iterator[None]:
+    """As `optimize` has it: several threads cost small matrices more than they give."""
     with threadpool_limits(limits=1, user_api="blas"):
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled() -> None:
+    """Many motions take a while without it."""
+    compile_kernel(load_robot("ur5e"))

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from optimizer.certificate import certify
-from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import (
     DeadlineExceeded,
     DurationTooShort,
@@ -39,11 +38,6 @@ from tests.optimizer.moves import (
     torques,
 )
 from tests.selection import long_but
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _compiled() -> None:
-    compile_kernel(ROBOT)
 
 
 @pytest.mark.parametrize("method", ["bspline", "time_scaling"])

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.problem.arm import Payload
 from tests.optimizer.answers import CONDITIONS, CONVERGED, ROUNDING, SYMMETRY, shortest, solved
 from tests.optimizer.moves import (
@@ -21,11 +20,6 @@ from tests.optimizer.moves import (
     fixed,
     problem,
 )
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _compiled() -> None:
-    compile_kernel(ROBOT)
 
 
 @pytest.mark.parametrize(

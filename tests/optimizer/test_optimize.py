@@ -13,7 +13,6 @@ import pinocchio as pin
 import pytest
 from scipy.interpolate import BSpline
 
-from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import (
     DurationTooShort,
     JoulepathError,
@@ -39,11 +38,6 @@ from tests.optimizer.moves import (
     torques,
 )
 from tests.selection import long_but
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _compiled() -> None:
-    compile_kernel(ROBOT)
 
 
 @pytest.mark.parametrize(

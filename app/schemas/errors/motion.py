@@ -154,21 +154,22 @@ class StopInCollision(_InCollision):
 
 
 class NoSequence(ProblemDetails):
-    """Every stop of the round can be reached, but no chain of arm configurations leads through all of them within the
-    limits. Move `stop` or the stop before it, relax a limit, leave `branch` out or set `windings` to true."""
+    """Every stop of the round can be reached, but no chain of motions within the limits was found through all of them.
+    Move `stop` or the stop before it, relax a limit, leave `branch` out or set `windings` to true."""
 
     type: Literal["/problems/no-sequence"] = fixed("type", "/problems/no-sequence")
     title: Literal["No sequence of arm configurations"] = fixed("title", "No sequence of arm configurations")
     status: Literal[422] = fixed("status", 422)
     stop: str = described(
-        "The first stop that no motion comes to: `start`, or `stops/` and a name.", None, "stops/place"
+        "The first stop to which no motion was found: `start`, or `stops/` and a name.", None, "stops/place"
     )
-    reached: list[str] = described("Branches at the stop before it that motions come to.", None, [LABEL])
+    reached: list[str] = described("Branches at the stop before it to which motions lead.", None, [LABEL])
     open: list[str] = described("Branches of this stop.", None, [LABEL])
 
 
 class CycleTooShort(ProblemDetails):
-    """No round was found that is as fast as `time` asks for: the fastest takes `shortest`. Allow at least as much."""
+    """No round was found that is as fast as `time` asks for: the fastest one found takes `shortest`. Allow at least as
+    much."""
 
     type: Literal["/problems/cycle-too-short"] = fixed("type", "/problems/cycle-too-short")
     title: Literal["Cycle too short"] = fixed("title", "Cycle too short")

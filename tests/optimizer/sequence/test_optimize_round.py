@@ -55,9 +55,7 @@ def assert_true(asked: WorkRound, found: RoundSolution) -> None:
     assert electrical.total == pytest.approx(own, rel=ROUNDING)
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-3)
     assert found.lower_bound <= electrical.total
-    assert found.duration == pytest.approx(
-        found.moves[-1].t0 + found.moves[-1].solution.duration + found.moves[-1].dwell
-    )
+    assert found.duration == pytest.approx(found.moves[-1].t0 + found.moves[-1].duration)
     names = ["start", *(stop.name for stop in asked.stops), *(["start"] if asked.closed else [])]
     assert [move.start for move in found.moves] == names[:-1] and [move.goal for move in found.moves] == names[1:]
     if asked.closed:

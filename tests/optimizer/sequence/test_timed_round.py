@@ -10,21 +10,24 @@ from typing import Any
 import numpy as np
 import pytest
 
+from optimizer.energy.dwell import holding_power
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, JoulepathError, RoundTooShort
 from optimizer.optimize import optimize
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
-from optimizer.problem.work_round import WorkRound
+from optimizer.problem.work_round import Stop, WorkRound
 from optimizer.sequence.layers import layers_of
 from optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.clocks import CountingClock
-from tests.optimizer.moves import AMPLE, fixed
+from tests.optimizer.moves import AMPLE, fixed, torques
 from tests.optimizer.sequence.rounds import HOME, pick_and_place
 from tests.optimizer.sequence.test_optimize_round import assert_true
 from tests.selection import long_but
 
 ROUNDING = 1e-9
+# rad
+TURN = np.array([0.9, -0.3, 0.2, 0.0, 0.1, 0.4])
 # relative: an optimum found from another guess
 CONVERGED = 2e-3
 ASKED = pick_and_place(1, 2, windings=False)
@@ -171,6 +174,29 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
         else:
             assert found.lower_bound <= total
             assert found.energy.electrical.total <= total * (1 + CONVERGED)
+
+
+@pytest.mark.parametrize("hold", [{}, {"hold": "brakes", "brake_power": 1.0}], ids=str)
+def test_a_least_time_is_bounded_for_longer_rounds_and_longer_moves_too(hold: dict[str, Any]) -> None:
+    """Of a least time alone, the bound holds for rounds that take longer, and for moves that take longer than it."""
+    asked = WorkRound(
+        arm=ASKED.arm, start=HOME, stops=[Stop(name="turned", target=HOME + TURN)], deadline=AMPLE, **hold
+    )
+    least = 1.5 * optimize_round(asked).duration
+    bound = optimize_round(replace(asked, duration_min=least)).lower_bound
+
+    @cache
+    def moving(k: int, duration: float) -> float:
+        ends = [HOME, HOME + TURN][:: 1 - 2 * k]
+        task = Problem(arm=asked.arm, start=ends[0], goal=ends[1], windings=False, deadline=AMPLE, **fixed(duration))
+        return optimize(task).energy.electrical.total
+
+    ends, still = np.array([HOME, HOME + TURN]), np.zeros((2, 6))
+    tau = torques(Problem(arm=asked.arm, start=HOME, goal=HOME), ends, still, still)
+    waiting = 1.0 if hold else float(holding_power(asked.arm, tau).min())
+    for durations in product([0.4 * least, 0.7 * least, 1.1 * least, 3.0 * least], repeat=2):
+        waited = max(least - sum(durations), 0.0)
+        assert bound <= sum(moving(k, t) for k, t in enumerate(durations)) + waiting * waited
 
 
 @pytest.mark.parametrize("readings", long_but([3000], [500, 3000, 10_000]))
