@@ -71,7 +71,7 @@ def test_duration_bounds_are_kept(method: str) -> None:
     [
         {},
         {"method": "time_scaling"},
-        {"limits": limits(v_max=0.8)},
+        pytest.param({"limits": limits(v_max=0.8)}, marks=pytest.mark.long),
         {"payload": PAYLOAD, "limits": limits(tau_max=[60, 100, 60, 14, 14, 14])},
         pytest.param({"objective": "mechanical"}, marks=pytest.mark.long),
         {"goal": tcp_pose(GOAL)},

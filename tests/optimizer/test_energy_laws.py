@@ -20,6 +20,7 @@ from tests.optimizer.moves import (
     fixed,
     problem,
 )
+from tests.selection import long_but
 
 
 @pytest.mark.parametrize(
@@ -84,7 +85,7 @@ def test_lifting_costs_more_than_lowering() -> None:
     assert up.energy.electrical.total > down.energy.electrical.total + potential_gain
 
 
-@pytest.mark.parametrize("duration", [None, 1.6])
+@pytest.mark.parametrize("duration", long_but([1.6], [None, 1.6]))
 def test_relaxing_limits_never_costs_energy(duration: float | None) -> None:
     """Tighter by a quarter at a time, of each kind: the energy does not fall, and the bound holds at every step."""
     durations = fixed(duration) if duration else {}

@@ -126,7 +126,7 @@ def test_some_branches_in_collision_are_candidates_ruled_out(client: TestClient)
 def test_no_way(client: TestClient) -> None:
     # a wall outwards from the base, between start and goal, higher and wider than the arm reaches
     wall = {"name": "post", "shape": "box", "size": [1.4, 0.02, 3.0], "margin": 0.0, "pose": at(-0.85, 0.0, 1.0)}
-    request = EXAMPLES["over_a_post"] | {"method": "time_scaling", "scene": {"obstacles": [wall]}}
+    request = EXAMPLES["over_a_post"] | {"method": "time_scaling", "scene": {"obstacles": [wall]}, "deadline": 3.0}
     content = refused(client.post("/optimize", json=request), problems.NoCollisionFreeTrajectory)
     assert "post" in content["pair"] and content["depth"] > 0 and content["time"] > 0
     assert content["candidates"][0]["status"] == "failed" and "post and" in content["candidates"][0]["reason"]

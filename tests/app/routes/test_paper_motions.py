@@ -53,6 +53,7 @@ def test_twelve_rows_are_proportional_with_the_links_of_table_2s_arm(client: Tes
     assert most_within(PRINTED / powers, 0.08) == 12
 
 
+@pytest.mark.long
 def test_the_page_is_what_the_command_makes() -> None:
     text = paper.PAGE.read_text()
     there = text.split(paper.BEGIN)[1].split(paper.END)[0].strip().splitlines()

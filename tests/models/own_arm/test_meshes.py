@@ -23,6 +23,7 @@ from models.registry import load_robot
 from models.robot import Array, LinkCapsule
 from tests.models.own_arm.arms import RICH, RICH_ARM, robot
 from tests.models.test_capsule_cover import meshes as arm_folder
+from tests.selection import long_but
 
 NAMED = RICH.replace('"forearm.stl"', '"package://cell/meshes/forearm.stl" scale="0.001 0.001 0.001"')
 # [mm], as a drawing program writes it
@@ -45,7 +46,7 @@ def volume(axis: Array, radius: float) -> float:
     return float(np.pi * radius**2 * (np.linalg.norm(axis[1] - axis[0]) + 4 / 3 * radius))
 
 
-@pytest.mark.parametrize("link", range(7))
+@pytest.mark.parametrize("link", long_but(range(3), range(7)))
 def test_a_capsule_holds_every_triangle_of_a_link(link: int) -> None:
     """Of a real arm; and it is not much larger than it has to be: than 2.6 times the hull."""
     surface = link_surfaces(arm_folder("ur5e"), "ur5e", link)["visual"]
@@ -56,7 +57,7 @@ def test_a_capsule_holds_every_triangle_of_a_link(link: int) -> None:
     assert volume(axis, radius) < 2.6 * ConvexHull(points).volume
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", long_but(range(2), range(5)))
 def test_a_capsule_is_found_again(seed: int) -> None:
     """Points on a capsule: none is smaller, and the search comes within 2 % of its volume."""
     rng = np.random.default_rng(seed)

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import product
+from typing import Any
 
 import coal
 import numpy as np
@@ -57,6 +58,11 @@ FOOT = {"ur5e": 0.074, "ur3e": 0.03, "ur10e": 0.074, "ur16e": 0.074}
 def here(pairs: Iterable[tuple[str, int, int]]) -> list[tuple[str, int, int]]:
     """The pairs of robots whose meshes are here."""
     return sorted(pair for pair in pairs if pair[0] in FOUND)
+
+
+def first_quick(pairs: list[tuple[str, int, int]]) -> list[Any]:
+    """The pairs as parameters of a test, all but the first `long`."""
+    return [pytest.param(pair, marks=pytest.mark.long if k else ()) for k, pair in enumerate(pairs)]
 
 
 def hull(robot: Robot, link: int) -> Array:
@@ -124,9 +130,7 @@ def levers(robot: Robot, second: int, points: Array) -> tuple[float, float]:
     return float((np.linalg.norm(centre[:, :2], axis=1) + radius).max()), own
 
 
-@pytest.mark.parametrize(
-    "pair", [*here(BY_HULLS), *(pytest.param(pair, marks=pytest.mark.long) for pair in here(BY_MESHES))], ids=str
-)
+@pytest.mark.parametrize("pair", first_quick([*here(BY_HULLS), *here(BY_MESHES)]), ids=str)
 def test_links_that_never_meet(pair: tuple[str, int, int]) -> None:
     name, first, second = pair
     robot = load_robot(name)
@@ -167,7 +171,7 @@ def assert_apart(distance: Callable[[Array], Array], reach: float, kept: float) 
         cells = (cells[:, None] + half * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])).reshape(-1, 2)
 
 
-@pytest.mark.parametrize("pair", here(BY_SURFACE), ids=str)
+@pytest.mark.parametrize("pair", first_quick(here(BY_SURFACE)), ids=str)
 def test_base_and_upper_arm_never_meet(pair: tuple[str, int, int]) -> None:
     """The pan joint turns about the axis of the cylinder: only the lift joint changes the distance."""
     name, foot = pair[0], FOOT[pair[0]]

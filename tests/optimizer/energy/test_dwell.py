@@ -81,7 +81,7 @@ def test_its_pieces_are_its_value(cycle: Cycle) -> None:
         assert values
 
 
-@pytest.mark.parametrize("name", long_but(("motors", "cheap brakes", "late brakes"), CYCLES))
+@pytest.mark.parametrize("name", long_but(("late brakes",), CYCLES))
 def test_no_duration_is_better(name: str) -> None:
     """Brute force: motions optimised for fixed durations, each with its wait by hand; certified, above the bound."""
     cycle = CYCLES[name]

@@ -161,7 +161,7 @@ def test_arcs_are_what_the_limits_leave(robot: Robot, arm: RedundantArm) -> None
 
 
 @pytest.mark.parametrize("joint", [1, 3, 5])
-@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3])
+@pytest.mark.parametrize("off", long_but([0.0, 1e-8, 1e-5], [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3]))
 def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
     robot: Robot, arm: RedundantArm, joint: int, off: float
 ) -> None:

@@ -73,7 +73,7 @@ def planned_path(prepared: PreparedProblem) -> Array:
 @pytest.mark.parametrize(
     ("method", "states"),
     long_but(
-        [(method, FEW_STATES) for method in ("bspline", "time_scaling", "polynomial_ga")],
+        [(method, FEW_STATES) for method in ("time_scaling", "polynomial_ga")],
         product(METHODS, (FEW_STATES, planned_paths.MOST_STATES)),
     ),
 )
@@ -89,7 +89,7 @@ def test_the_error_names_the_colliding_pair(method: MethodName, states: int, mon
     assert result.collision is not None and WALL.name in result.collision.pair
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", long_but(("bspline", "uniform_scaling"), METHODS))
 def test_every_method_passes_the_post(method: MethodName) -> None:
     solution = optimize(blocked(method, POST))
     assert solution.certificate.valid

@@ -219,7 +219,7 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("condition", long_but(("tool and payload", "time scaling", "mechanical"), CONDITIONS))
+@pytest.mark.parametrize("condition", long_but(("tool and payload", "time scaling"), CONDITIONS))
 def test_holds_under(condition: str) -> None:
     """Every other setting with a cone about a tool axis: in place, within the cone, above the bound."""
     given = {"payload": Payload(mass=0.5)} | CONDITIONS[condition]
@@ -298,7 +298,7 @@ def test_respects_the_deadline() -> None:
     assert any(each.status == "unvisited" for each in solution.candidates)
 
 
-@pytest.mark.parametrize("count", long_but((3,), (3, 4)))
+@pytest.mark.parametrize("count", long_but((2,), (2, 3, 4)))
 def test_a_front_follows_a_goal_that_turns(count: int) -> None:
     """Every point of a front goes where its own duration is cheapest: none is beaten by a longer one's motion."""
     # with little idle power, time costs little: slower motions need less energy

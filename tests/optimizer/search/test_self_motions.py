@@ -81,7 +81,7 @@ def test_the_answer_is_the_best_of_the_curve(count: int) -> None:
             assert answer.lower_bound <= energy(other)
 
 
-@pytest.mark.parametrize("joint", [2, 4])
+@pytest.mark.parametrize("joint", long_but([4], [2, 4]))
 def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None:
     """The elbow's also those on it. On the wrist's, more configurations reach the pose, and the answer may be less."""
     energies = []
@@ -101,7 +101,7 @@ def test_answers_next_to_a_singularity_are_those_beside_them(joint: int) -> None
     [
         {},
         pytest.param({"cycle": Cycle(time=4.0, hold="motors")}, marks=pytest.mark.long),
-        {"objective": "mechanical", "duration_max": 2.0},
+        pytest.param({"objective": "mechanical", "duration_max": 2.0}, marks=pytest.mark.long),
         pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],
     ids=["electrical", "cycle", "mechanical", "isolated"],
@@ -139,6 +139,7 @@ def bound_to(asked: Problem, member: Array) -> float | None:
     return min(each.lower_bound for each in candidates)
 
 
+@pytest.mark.long
 def test_between_two_curves() -> None:
     other = STRETCHED + np.array([-0.8, 0.3, -0.5, 0.2, 0.0, 0.1])
     answer = solved(tcp_pose(STRETCHED), tcp_pose(other), windings=False)

@@ -44,7 +44,13 @@ def test_as_good_as_the_best_of_many_starts() -> None:
     assert optimize(task).energy.mechanical.total <= row["energy"] * (1 + PROMISED)
 
 
-@pytest.mark.parametrize("given", [{"objective": "mechanical", "duration_max": 1.5}, {"bus": Bus(mode="isolated")}])
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"objective": "mechanical", "duration_max": 1.5},
+        pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
+    ],
+)
 def test_sharper_corners_need_less(given: dict[str, Any]) -> None:
     incumbent = explored(**given)
     before = incumbent.best()
