@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from optimizer import Arm, Problem, load_robot, pareto
 
-POINTS = 5
+POINTS = 4
 
 start = np.radians([0, -30, 60, -120, -90, 0])
 goal = np.radians([40, -100, 60, -50, -90, 0])

@@ -133,7 +133,7 @@ def test_no_way(client: TestClient) -> None:
     assert content["start"] == content["candidates"][0]["start"]
 
 
-@pytest.mark.parametrize("methods", long_but([["bspline", "uniform_scaling"]], [["bspline", "uniform_scaling"], FAST]))
+@pytest.mark.parametrize("methods", long_but([["uniform_scaling"]], [["uniform_scaling"], FAST]))
 def test_a_scan_voxels_and_a_mesh_file_are_obstacles(client: TestClient, methods: list[str]) -> None:
     """All three at once, by a free and by a fixed path; Pinocchio's replay keeps off every point."""
     request = EXAMPLES["past_a_scan"]

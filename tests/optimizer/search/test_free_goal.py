@@ -313,7 +313,7 @@ def test_a_front_follows_a_goal_that_turns(count: int) -> None:
     "given",
     [
         pytest.param({"cycle": Cycle(time=4.0, hold="motors")}, marks=pytest.mark.long),
-        {"cycle": Cycle(time=4.0, hold="brakes", brake_delay=0.3)},
+        pytest.param({"cycle": Cycle(time=4.0, hold="brakes", brake_delay=0.3)}, marks=pytest.mark.long),
         pytest.param({"bus": Bus(mode="storage", capacity=20.0, efficiency=0.9)}, marks=pytest.mark.long),
         pytest.param({"bus": Bus(mode="isolated")}, marks=pytest.mark.long),
     ],

@@ -34,7 +34,7 @@ def both(asked: Problem) -> tuple[Solution, Solution]:
     return optimize(asked), optimize(replace(asked, bound="tight"))
 
 
-QUICK = {"as it comes", "duration near the shortest", "wait with brakes"}
+QUICK = {"as it comes", "duration near the shortest"}
 
 
 @pytest.mark.parametrize("name", long_but(QUICK, CASES))

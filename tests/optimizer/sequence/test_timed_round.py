@@ -148,6 +148,10 @@ def test_too_little_time_says_how_much_the_fastest_round_takes(factor: float) ->
         optimize_round(in_time(ASKED, factor * free().duration))
     assert refusal.value.shortest == pytest.approx(shortest(), rel=1e-3)
     assert shortest() < free().duration and refusal.value.dwells == ASKED.dwelling
+
+
+@pytest.mark.long
+def test_a_time_just_above_the_shortest_is_met() -> None:
     assert optimize_round(in_time(ASKED, 1.001 * shortest())).duration == pytest.approx(1.001 * shortest())
 
 
