@@ -24,7 +24,8 @@ from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.pose import Pose
-from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.problem.stops import Stop
+from optimizer.problem.work_round import WorkRound
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()

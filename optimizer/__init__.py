@@ -13,6 +13,7 @@ from optimizer.exceptions import (
     NoSequence,
     NoTrajectory,
     OutsideLimits,
+    PathInfeasible,
     RoundTooShort,
     SingularPose,
     TorqueInfeasible,
@@ -25,10 +26,13 @@ from optimizer.pareto import Front, pareto
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.line import Line
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
+from optimizer.problem.stops import Stop
 from optimizer.problem.targets import AnyOf
-from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.problem.tool_path import ToolPath
+from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_solution import RoundSolution
 from optimizer.solution import Solution
 
@@ -42,10 +46,12 @@ __all__ = [
     "Front",
     "InvalidProblem",
     "JoulepathError",
+    "Line",
     "NoReachableTarget",
     "NoSequence",
     "NoTrajectory",
     "OutsideLimits",
+    "PathInfeasible",
     "Payload",
     "Pose",
     "Problem",
@@ -54,6 +60,7 @@ __all__ = [
     "SingularPose",
     "Solution",
     "Stop",
+    "ToolPath",
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",

@@ -20,6 +20,7 @@ from optimizer.energy.losses import breakdown, relative_error
 from optimizer.kinematics.orientation_tolerance import excess_angle
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Arm
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -34,6 +35,8 @@ from optimizer.trajectories.spline import Spline
 
 # instants of the grid between two looks at the deadline: some ten milliseconds
 BLOCK = 5000
+# most instants at which a motion is compared with its tool path
+ON_PATH = 20_000
 # time [s] per instant, at least, of the whole certificate, and of what follows the torques
 WHOLE, REST = 3e-6, 1.5e-6
 
@@ -55,7 +58,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         energy = energy.with_dwell(dwell)
     clearance = proven_clearance(collision_model(arm), spline) if arm.collisions else None
     return Certificate(
-        worst_ratio=replay.limit_ratios | replay.path_ratios,
+        worst_ratio=replay.limit_ratios | replay.path_ratios | replay.tool_path_ratios(problem),
         start_error=replay.end_error(single(problem.start), q_start, replay.q[0]),
         goal_error=replay.end_error(single(problem.goal), q_goal, replay.q[-1]),
         rest_error=replay.rest_error,
@@ -150,6 +153,28 @@ class _Replay:
             speeds = [_greatest_speed(twists[elbow.link], end) for end in elbow.axis]
             ratios["elbow_speed"] = _worst(*speeds) / arm.elbow_speed
         return ratios
+
+    def tool_path_ratios(self, problem: Problem) -> dict[str, float]:
+        """The worst deviations from the tool path over their tolerances, between the samples, too.
+
+        From one sample to the next the TCP leaves the chord between them by at most an eighth of its acceleration times
+        the squared time, and so does the path; the rotation likewise. Both are taken from second differences.
+        """
+        path = problem.tool_path
+        if path is None:
+            return {}
+        ends = (problem.start, problem.goal)
+        T_start, T_goal = (each.T if isinstance(each, Pose) else self.tcp_pose(np.asarray(each)) for each in ends)
+        course = ToolCourse.of(path, T_start, T_goal)
+        instants = np.append(np.arange(0, len(self.q) - 1, len(self.q) // ON_PATH + 1), len(self.q) - 1)
+        T = np.array([self.tcp_pose(self.q[k]) for k in instants])
+        checkpoint()
+        position, rotation = course.deviation(T)
+        between = 2 * float(np.linalg.norm(np.diff(T[:, :3], n=2, axis=0), axis=(1, 2)).max(initial=0.0)) / 8
+        return {
+            "path_position": float(position.max() + between) / path.position_tolerance,
+            "path_rotation": float(rotation.max() + between) / path.rotation_tolerance,
+        }
 
     def _link_motions(self, rotating: bool, moving: list[int]) -> tuple[Array, dict[int, Array]]:
         """Rotations (k, 3, 3) of the last link in the base frame, if `rotating`, and the motions of the links `moving`.

@@ -14,6 +14,7 @@ JoulepathError
 │   └── StopInCollision
 ├── DurationTooShort
 ├── RoundTooShort
+├── PathInfeasible          no configuration leads along the whole tool path
 ├── TorqueInfeasible        the arm cannot hold or move the load
 ├── NoSequence              no chain of configurations through a round
 ├── NoTrajectory            every candidate failed
@@ -201,6 +202,32 @@ class RoundTooShort(JoulepathError):
             "much."
         )
         self.shortest, self.dwells = shortest, dwells
+
+
+@dataclass(frozen=True)
+class PathAttempt:
+    """A branch at the start of a tool path, the share of the path to which it leads, and what stops it there."""
+
+    label: str
+    followed: float
+    reason: str
+
+
+class PathInfeasible(JoulepathError):
+    """No configuration at the start of a tool path leads along all of it; `attempts` say how far each one gets.
+
+    `path` is the name of it, `length` [m] its length, a radian of turning counted as a quarter of a metre.
+    """
+
+    def __init__(self, length: float, attempts: Sequence[PathAttempt], path: str = "path") -> None:
+        self.length, self.path = length, path
+        self.attempts = sorted(attempts, key=lambda each: -each.followed)[:MOST_BRANCHES]
+        best = self.attempts[0]
+        way = "the path" if path == "path" else path
+        super().__init__(
+            f"The arm cannot follow {way} to its end from any configuration: {best.label} gets {best.followed:.1%} of "
+            f"the way and ends there ({best.reason}). Move it, divide it, or widen limits.position."
+        )
 
 
 class DurationTooShort(JoulepathError):

@@ -7,7 +7,7 @@ import time
 
 from optimizer.deadline import Clock
 from optimizer.linear_algebra import one_thread
-from optimizer.problem.work_round import START, WorkRound
+from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.proven_bound import proven_bound
 from optimizer.sequence.round_baselines import (
     controller_default,
@@ -84,23 +84,18 @@ def _is_done(search: RoundSearch, timing: TimedSearch | None, timed: Timed | Non
 def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: Timed | None) -> list[Move]:
     """The moves of a chain, in their order."""
     asked, t0, moves = search.asked, 0.0, list[Move]()
-    names = [START, *(stop.name for stop in asked.stops), START]
     for (k, _, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
         wait, wait_energy = (0.0, 0.0) if timed is None or timed.at != k else (timed.shared.waited, timed.wait_energy)
         moves.append(
             Move(
-                start=names[k],
-                goal=names[k + 1],
-                arm=asked.arms[k],
-                arm_after=asked.arm_after(k),
+                planned=asked.moves[k],
                 solution=solution,
                 t0=t0,
-                dwell=asked.dwell_after(k),
                 dwell_energy=float(leg.dwell[g]),
                 wait=wait,
                 wait_energy=wait_energy,
-                pairs=leg.kind.size,
+                pairs=int((leg.kind >= 0).sum()),
                 kinds=len(leg.pair),
                 solved=len(leg.solved),
             )

@@ -10,7 +10,11 @@ import numpy as np
 from models.robot import Array
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.plant import Plant
+from optimizer.kinematics.course_tracing import Trace, joint_path, traces
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.solution import Energy
 from optimizer.surroundings import Surroundings
@@ -42,6 +46,29 @@ class PreparedProblem(Plant):
     def path(self) -> PathConstraints | None:
         """Constraints along the path except clearance; None if there are none."""
         return path_constraints_of(self.arm)
+
+    @cached_property
+    def course(self) -> ToolCourse | None:
+        """The course of the problem's tool path; None if there is none."""
+        path, ends = self.problem.tool_path, (self.problem.start, self.problem.goal)
+        if path is None:
+            return None
+        T_start, T_goal = (each.T if isinstance(each, Pose) else tcp_pose(self.arm, np.asarray(each)) for each in ends)
+        return ToolCourse.of(path, T_start, T_goal)
+
+    @cached_property
+    def traces(self) -> dict[bytes, Trace]:
+        """The tool path as it was followed from starts q (nq,) [rad], by the bytes of these."""
+        return {}
+
+    def joint_path(self, q_start: Array) -> Spline | None:
+        """The joints' path over [0, 1] along the tool path, from q_start (nq,) [rad]; None if they cannot follow it."""
+        assert self.course is not None
+        key = q_start.tobytes()
+        if key not in self.traces:
+            (self.traces[key],) = traces(self.arm, self.course, q_start[None])
+        trace = self.traces[key]
+        return joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
 
     def satisfies_path_constraints(self, q: Array, v: Array) -> bool:
         """Whether samples q [rad], v [rad/s] (k, nq) of a motion satisfy the path constraints and do not collide."""

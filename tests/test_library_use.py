@@ -19,11 +19,13 @@ PUBLIC = {
     "Front",
     "InvalidProblem",
     "JoulepathError",
+    "Line",
     "ConeOrientedPose",
     "NoReachableTarget",
     "NoSequence",
     "NoTrajectory",
     "OutsideLimits",
+    "PathInfeasible",
     "Payload",
     "Pose",
     "Problem",
@@ -32,6 +34,7 @@ PUBLIC = {
     "SingularPose",
     "Solution",
     "Stop",
+    "ToolPath",
     "TorqueInfeasible",
     "UnknownRobot",
     "UnreachablePose",
@@ -55,7 +58,7 @@ def test_the_public_names_are_a_promise() -> None:
 def test_one_except_clause_catches_every_error() -> None:
     exported = [getattr(optimizer, name) for name in PUBLIC]
     errors = [each for each in exported if isinstance(each, type) and issubclass(each, BaseException)]
-    assert len(errors) == 13
+    assert len(errors) == 14
     assert all(issubclass(error, optimizer.JoulepathError) for error in errors)
 
 

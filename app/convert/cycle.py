@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from app.convert.arm import to_arm, to_payload
 from app.convert.fields import fields
 from app.convert.request import to_branch, to_target
 from app.convert.solution import energy_fields, optimality_gap
 from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
+from app.schemas.path import Line as LineRequest
 from app.schemas.response import Clearance
 from optimizer.exceptions import InvalidProblem
-from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.problem.line import Line
+from optimizer.problem.stops import Stop
+from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_solution import Move, RoundSolution
 from optimizer.solution import Solution
 
@@ -55,7 +60,19 @@ def _to_stop(k: int, stop: asked.StopRequest) -> Stop:
         dwell=stop.dwell,
         payload=payload,
         branch=to_branch(stop.branch),
+        approach=_to_line(f"stops.{k}.approach", stop.approach),
+        retreat=_to_line(f"stops.{k}.retreat", stop.retreat),
+        obstacles_ignored=stop.obstacles_ignored,
     )
+
+
+def _to_line(field: str, line: LineRequest | None) -> Line | None:
+    if line is None:
+        return None
+    try:
+        return Line(direction=np.array(line.direction), distance=line.distance, frame=line.frame, speed=line.speed)
+    except InvalidProblem as error:
+        raise InvalidProblem(f"{field}.{error.field}", str(error)) from None
 
 
 def to_cycle_response(
@@ -95,10 +112,10 @@ def to_cycle_response(
 def _warnings(found: RoundSolution) -> list[str]:
     """Warnings of the round, then those of single moves, which they name."""
     of_all = [] if found.complete else [MISSED]
-    if found.moves[0].arm.robot.default_motion is None:
+    if found.moves[0].planned.arm.robot.default_motion is None:
         of_all.append(NO_DEFAULT_MOTION)
     return of_all + [
-        f"{move.start} to {move.goal}: {words}"
+        f"{move.planned.start} to {move.planned.goal}: {words}"
         for move in found.moves
         for words in certified_warnings(move.solution)
         if words != NO_DEFAULT_MOTION
@@ -108,11 +125,11 @@ def _warnings(found: RoundSolution) -> list[str]:
 def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
     """The entries of a move, and of the dwell and the wait after it."""
     solution = move.solution
-    start = {**fields(solution.start, "label", "q", "target"), "stop": move.start}
-    goal = {**fields(solution.goal, "label", "q", "target"), "stop": move.goal}
-    legs = [
+    start = {**fields(solution.start, "label", "q", "target"), "stop": move.planned.start}
+    goal = {**fields(solution.goal, "label", "q", "target"), "stop": move.planned.goal}
+    legs: list[dict[str, Any]] = [
         {
-            "kind": "move",
+            "kind": "move" if move.planned.line is None else "line",
             "start": start,
             "goal": goal,
             "t0": move.t0,
@@ -120,13 +137,13 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
             "electrical": solution.energy.electrical.total,
             "mechanical": solution.energy.mechanical.total,
             "lower_bound": solution.lower_bound,
-            "payload_mass": move.arm.payload.mass,
+            "payload_mass": move.planned.arm.payload.mass,
             "answer": store(solution),
         }
     ]
     t0 = move.t0 + solution.duration
     for kind, length, energy in (
-        ("dwell", move.dwell, move.dwell_energy),
+        ("dwell", move.planned.dwell, move.dwell_energy),
         ("wait", move.wait, move.wait_energy),
     ):
         if length > 0:
@@ -140,7 +157,7 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
                     "electrical": energy,
                     "mechanical": 0.0,
                     "lower_bound": energy,
-                    "payload_mass": move.arm_after.payload.mass,
+                    "payload_mass": move.planned.arm_after.payload.mass,
                     "answer": None,
                 }
             )
@@ -149,8 +166,11 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
 
 
 def _worst_ratio(found: RoundSolution) -> dict[str, float]:
-    ratios = [move.solution.certificate.worst_ratio for move in found.moves]
-    return {name: max(each[name] for each in ratios) for name in ratios[0]}
+    worst: dict[str, float] = {}
+    for move in found.moves:
+        for name, ratio in move.solution.certificate.worst_ratio.items():
+            worst[name] = max(ratio, worst.get(name, ratio))
+    return worst
 
 
 def _clearance(found: RoundSolution) -> dict[str, Any] | None:
@@ -160,5 +180,5 @@ def _clearance(found: RoundSolution) -> dict[str, Any] | None:
         clearance = move.solution.certificate.clearance
         if clearance is not None and (nearest is None or clearance.min_clearance < nearest["min_clearance"]):
             nearest = {**fields(clearance, *Clearance.model_fields), "leg": leg}
-        leg += 1 + (move.dwell > 0) + (move.wait > 0)
+        leg += 1 + (move.planned.dwell > 0) + (move.wait > 0)
     return nearest

@@ -9,11 +9,13 @@ from app.convert.pose import to_pose
 from app.schemas import request as asked
 from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
 from app.schemas.orientation import InCone
+from app.schemas.path import Path
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import LONGEST_DURATION, Problem
 from optimizer.problem.targets import AnyOf, Single, Target
+from optimizer.problem.tool_path import ToolPath
 from optimizer.replay.sampler import MOST_SAMPLES
 
 
@@ -23,10 +25,12 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
     shortest, longest = _duration_bounds(request)
+    path = request.path
     return Problem(
         start=to_target(request.start),
         goal=to_target(request.goal),
-        arm=to_arm(request),
+        arm=to_arm(request) if path is None else to_arm(request).no_faster_than(path.speed),
+        tool_path=None if path is None else to_tool_path(path),
         method=request.method,
         objective=request.objective,
         duration_min=shortest,
@@ -37,6 +41,16 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         bound=request.bound,
         sample_period=request.sample_period,
         deadline=deadline,
+    )
+
+
+def to_tool_path(path: Path) -> ToolPath:
+    """The tool path of the library. Raises InvalidProblem."""
+    return ToolPath(
+        via=[to_pose(pose.position, pose) for pose in path.via],
+        blend=path.blend,
+        position_tolerance=path.tolerance.position,
+        rotation_tolerance=path.tolerance.rotation,
     )
 
 

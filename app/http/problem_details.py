@@ -47,6 +47,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.GoalInCollision: problems.GoalInCollision,
     optimizer_errors.StopInCollision: problems.StopInCollision,
     optimizer_errors.NoSequence: problems.NoSequence,
+    optimizer_errors.PathInfeasible: problems.PathInfeasible,
     optimizer_errors.DurationTooShort: problems.DurationTooShort,
     optimizer_errors.RoundTooShort: problems.CycleTooShort,
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
@@ -125,4 +126,6 @@ def _own_field(error: Exception, name: str) -> Any:
         return [unreachable_fields(target) for target in value]
     if name == "branches":
         return [fields(branch, *problems.CollidingBranch.model_fields) for branch in value]
+    if name == "attempts":
+        return [fields(attempt, "label", "followed", "reason") for attempt in value]
     return [candidate_fields(candidate) for candidate in value] if name == "candidates" else value

@@ -44,6 +44,7 @@ MOST_ITERATIONS = 2**31 - 1
         201: {"headers": CREATED_HEADERS},
         **problem_responses(
             *MOTION_PROBLEMS,
+            problems.PathInfeasible,
             problems.InvalidTable,
             problems.KeyReused,
             problems.UnknownStudy,

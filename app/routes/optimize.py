@@ -10,6 +10,7 @@ from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
+from app.schemas import errors as problems
 from app.schemas.request import OptimizeRequest
 from app.schemas.response import OptimizeResponse
 from app.tasks.optimize import OptimizeTask
@@ -21,7 +22,7 @@ router = APIRouter(tags=["motion"])
     "/optimize",
     summary="The motion of least energy",
     response_model=OptimizeResponse,
-    responses=problem_responses(*MOTION_PROBLEMS),
+    responses=problem_responses(*MOTION_PROBLEMS, problems.PathInfeasible),
 )
 async def optimize(
     request: Request,

@@ -51,5 +51,6 @@ CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.TorqueInfeasible,
     problems.CycleTooShort,
     problems.NoSequence,
+    problems.PathInfeasible,
 )
 """Of a request for a round."""

@@ -22,7 +22,9 @@ router = APIRouter(tags=["motion"])
     "/whatif",
     summary="The energy of a motion on a changed arm",
     response_model=WhatifResponse,
-    responses=problem_responses(*MOTION_PROBLEMS, problems.InvalidTable, problems.StoreUnavailable),
+    responses=problem_responses(
+        *MOTION_PROBLEMS, problems.PathInfeasible, problems.InvalidTable, problems.StoreUnavailable
+    ),
 )
 async def whatif(
     request: Request,

@@ -9,20 +9,22 @@ from pydantic import Field, Tag
 from app.schemas.arm import ArmRequest, Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH
+from app.schemas.path import Line
 from app.schemas.request import SECONDS_OR_RANGE, Branch, DurationRange, Holding, Target
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
 from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.scene import MOST_OBSTACLES
 from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
 from optimizer.solution import Objective
 
-StopName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
+PlainName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
 
 
 class StopRequest(Request):
     """A stop: the arm comes to rest at the target, and may take up or put down a payload."""
 
-    name: StopName | None = described(
+    name: PlainName | None = described(
         "Name of the stop, different from those of the others. Null: its number, from 1.", None, "pick", default=None
     )
     target: Target = described(
@@ -42,6 +44,24 @@ class StopRequest(Request):
         None,
         {"elbow": "up"},
         default=None,
+    )
+    approach: Line | None = described(
+        "Straight line of the TCP into the stop. The arm rests at its outer end. Null: none.",
+        None,
+        {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
+        default=None,
+    )
+    retreat: Line | None = described(
+        "Straight line of the TCP out of the stop. The arm rests at its outer end. Null: none.",
+        None,
+        {"direction": [0.0, 0.0, -1.0], "distance": 0.08},
+        default=None,
+    )
+    obstacles_ignored: Annotated[list[PlainName], Field(max_length=MOST_OBSTACLES)] = described(
+        "Names of obstacles that do not count at the stop and on its lines, like the part that is grasped.",
+        None,
+        ["part"],
+        default=[],
     )
 
 
@@ -149,16 +169,22 @@ class RoundEnergy(MotionEnergy):
 
 
 class StopConfiguration(Configuration):
-    """The arm configuration at a stop."""
+    """The arm configuration at a place of the round."""
 
-    stop: str = described("Name of the stop; `start` for the start.", None, "pick")
+    stop: str = described(
+        "Name of the stop, with `/approach` or `/retreat` at the outer end of its line; `start` for the start.",
+        None,
+        "pick",
+    )
 
 
 class CycleLeg(Response):
-    """A move from one stop to the next, the dwell at a stop, or a wait after it."""
+    """A move from one place to the next, the dwell at a stop, or a wait."""
 
-    kind: Literal["move", "dwell", "wait"] = described(
-        "`move`; `dwell` at a stop; `wait` there for what is left of the time.", None, "move"
+    kind: Literal["move", "line", "dwell", "wait"] = described(
+        "`move`; `line` into or out of a stop; `dwell` at a stop; `wait` there for what is left of the time.",
+        None,
+        "move",
     )
     start: StopConfiguration = part("Where it begins.")
     goal: StopConfiguration = part("Where it ends; of a dwell and a wait, where it began.")

@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
+from app.schemas.path import Path
 from optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
 from optimizer.replay.sampler import MOST_SAMPLES
 from optimizer.solution import Objective
@@ -227,6 +228,13 @@ class OptimizeRequest(MotionRequest):
         None,
         "bspline",
         default="bspline",
+    )
+    path: Path | None = described(
+        "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. `method` and "
+        "`windings` do not matter. Null: the motion is free.",
+        None,
+        {"tolerance": {"position": 1e-4}},
+        default=None,
     )
     bound: BoundEffort = described(
         "Effort for `lower_bound`. `tight`: the candidates whose bound is below the energy of the answer get a second, "

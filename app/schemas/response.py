@@ -216,8 +216,8 @@ class UnreachableTarget(Response):
 
 
 class WorstRatio(Response):
-    """Largest value / limit over all joints and instants: at most 1 + 1e-6. The last three are present only if the
-    request limits them."""
+    """Largest value / limit over all joints and instants: at most 1 + 1e-6. What follows `torque` is there only if the
+    request limits it."""
 
     position: float = described("Joint position: distance from the middle of the range / half of the range.", "1", 0.61)
     velocity: float = described("Joint velocity.", "1", 0.74)
@@ -229,6 +229,15 @@ class WorstRatio(Response):
     )
     tcp_speed: float | None = described("Speed of the TCP.", "1", 1.0, default=None)
     elbow_speed: float | None = described("Speed of the elbow.", "1", 0.71, default=None)
+    path_position: float | None = described(
+        "Distance of the TCP from the path / `tolerance.position`, between the samples, too.", "1", 0.02, default=None
+    )
+    path_rotation: float | None = described(
+        "Angle of the tool from that of the path / `tolerance.rotation`, between the samples, too.",
+        "1",
+        0.01,
+        default=None,
+    )
 
 
 class EndError(Response):

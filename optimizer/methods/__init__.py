@@ -10,9 +10,10 @@ from optimizer.methods.lagrange import Lagrange
 from optimizer.methods.method import Method
 from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.methods.time_scaling import TimeScaling
+from optimizer.methods.tool_path_motion import ToolPathMotion
 from optimizer.methods.uniform_scaling import UniformScaling
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import MethodName
+from optimizer.problem.problem import MethodName, Problem
 
 METHODS: dict[MethodName, type[Method]] = {
     "bspline": FreeSpline,
@@ -23,6 +24,11 @@ METHODS: dict[MethodName, type[Method]] = {
 }
 
 
+def method_of(problem: Problem) -> type[Method]:
+    """The method of a problem; along a tool path there is one way."""
+    return METHODS[problem.method] if problem.tool_path is None else ToolPathMotion
+
+
 def solver_for(
     prepared: PreparedProblem,
     q_start: Array,
@@ -31,4 +37,4 @@ def solver_for(
     interval: DurationInterval | None = None,
 ) -> Method:
     """The solver of the problem's method for a candidate from q_start to q_goal (nq,) in an interval of durations."""
-    return METHODS[prepared.problem.method](prepared, q_start, q_goal, deadline, interval)
+    return method_of(prepared.problem)(prepared, q_start, q_goal, deadline, interval)

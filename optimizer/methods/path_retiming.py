@@ -38,13 +38,15 @@ from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline, lasting, least_time_scale, spline_of
 
 # control values of the time scaling, and how many more control points than the path the motion has, up to a number
-SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 72
+SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 200
 # instants per control point at which the motion is fitted to the path, and points per knot span that bound the rates
 FITTED, RATE_POINTS = 3, 4
 # first durations tried, in multiples of the shortest one of the quintic time scaling
 TIME_SCALES = (1.02, 1.2, 1.5, 2.0, 3.0, 4.5)
 # SLSQP ends when a step changes the cost by less than this share; and after so many iterations
 PROGRESS, MOST_ITERATIONS = 1e-6, 80
+# SLSQP's effort grows with the constraints: it has those whose slack 1 - ratio² fell below this, and more in each round
+NEAR, MOST_ROUNDS = 0.75, 6
 # times that an NLP is solved with limits tightened after the solve before
 REPAIRS = 6
 # the largest excess of a constraint, as a ratio of the limit, that the repair between the nodes can still undo
@@ -66,11 +68,16 @@ class RetimingState:
 
 
 class PathRetiming:
-    """Time scalings of `path`, a spline over [0, 1], in an interval of durations."""
+    """Time scalings of `path`, a spline over [0, 1], in an interval of durations.
 
-    def __init__(self, prepared: PreparedProblem, path: Spline, interval: DurationInterval) -> None:
+    The motion has `more` control points than the path.
+    """
+
+    def __init__(
+        self, prepared: PreparedProblem, path: Spline, interval: DurationInterval, more: int = MORE_POINTS
+    ) -> None:
         self.prepared, self.path, self.interval = prepared, path, interval
-        self.space = bspline.uniform(min(len(path.control_points) + MORE_POINTS, MOST_POINTS))
+        self.space = bspline.uniform(min(len(path.control_points) + more, MOST_POINTS))
         self.scaling = bspline.uniform(SCALING_POINTS)
         at = np.linspace(0.0, 1.0, FITTED * self.space.n)
         self._instants = self.scaling.matrix(at)
@@ -172,14 +179,27 @@ class RetimingProgram:
         # the control values rise from 0 to 1, so the scaling does
         self._rising = np.eye(m + 1, m) - np.eye(m + 1, m, -1)
         self._scale = 1 / max(abs(self.state(first).cost), 1e-9)
+        # the constraints that the NLP has: those that a motion came near, and the order of the control values
+        self._rows = np.zeros(len(self.state(first).slack), dtype=bool)
+        self._rows[-(m + 1) :] = True
 
     def solve(self) -> tuple[Array, int]:
         """The variables where SLSQP ends, and its iterations."""
+        x, iterations = self.first, 0
+        for _ in range(MOST_ROUNDS):
+            self._rows |= self.state(x).slack < NEAR
+            x, spent = self._solve(x)
+            iterations += spent
+            if self.excess(x) <= FEASIBLE:
+                break
+        return x, iterations
+
+    def _solve(self, x: Array) -> tuple[Array, int]:
         t_min, t_max = self.retiming.interval.t_min, self.retiming.interval.t_max
-        control = self.first[:-1]
+        control = x[:-1]
         found = minimize(
             self._cost,
-            self.first,
+            x,
             jac=self._gradient,
             bounds=Bounds(np.append(0 * control, np.log(t_min)), np.append(0 * control + 1, np.log(t_max))),
             constraints=NonlinearConstraint(self._slack, 0.0, np.inf, jac=self._slopes),
@@ -196,10 +216,10 @@ class RetimingProgram:
         return self._scale * self.state(x).gradient
 
     def _slack(self, x: Array) -> Array:
-        return self.state(x).slack
+        return self.state(x).slack[self._rows]
 
     def _slopes(self, x: Array) -> Array:
-        return self.state(x).slopes
+        return self.state(x).slopes[self._rows]
 
     def excess(self, x: Array) -> float:
         """The largest excess of a constraint over its limit, as a ratio of the limit."""

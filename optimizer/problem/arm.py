@@ -212,6 +212,11 @@ class Arm:
         if (limits.q_min >= limits.q_max).any():
             raise InvalidProblem("limits.position", "limits.position.lower must be below limits.position.upper.")
 
+    def no_faster_than(self, tcp_speed: float | None) -> Arm:
+        """The same arm, whose TCP is no faster than this [m/s] either; None changes nothing."""
+        speeds = [speed for speed in (self.tcp_speed, tcp_speed) if speed is not None]
+        return replace(self, tcp_speed=min(speeds, default=None))
+
     def check_rating(self, field: str, mass: float) -> None:
         """Raises InvalidProblem for `field` if a payload of `mass` [kg] exceeds the robot's rating."""
         if mass > self.robot.rated_payload:

@@ -11,8 +11,10 @@ import numpy as np
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
-from optimizer.problem.targets import Target, members, validated
+from optimizer.problem.targets import AnyOf, Target, members, validated
+from optimizer.problem.tool_path import ToolPath
 from optimizer.solution import Objective
 
 MethodName = Literal["bspline", "time_scaling", "lagrange", "uniform_scaling", "polynomial_ga"]
@@ -33,6 +35,9 @@ class Problem:
     leaves it to the optimiser. With a `cycle` the arm waits at the goal until the end of the cycle, and the motion
     lasts no longer than the cycle.
 
+    With a `tool_path` the TCP goes along it from `start` to `goal`, which are a pose or joint positions each: only the
+    branch and the timing are free, and `method` and `windings` do not matter.
+
     `branch` restricts the inverse kinematics branches of start and goal. With `windings` the goal may also be a full
     turn of a joint away. With the `bound` "tight" more time goes into the lower bounds of what could still beat the
     answer. `sample_period` [s] is that of the returned samples. After `deadline` [s] of wall time the best verified
@@ -49,6 +54,7 @@ class Problem:
     duration_min: float | None = None
     duration_max: float | None = None
     cycle: Cycle | None = None
+    tool_path: ToolPath | None = None
     branch: BranchFilter | None = None
     windings: bool = True
     bound: BoundEffort = "normal"
@@ -64,6 +70,10 @@ class Problem:
                 raise InvalidProblem("duration", "duration must be a positive number of seconds.")
         if self.duration_min is not None and self.duration_max is not None and self.duration_min > self.duration_max:
             raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
+        if self.tool_path is not None:
+            for name in ("start", "goal"):
+                if isinstance(getattr(self, name), AnyOf | ConeOrientedPose):
+                    raise InvalidProblem(name, f"With a path, {name} must be one pose or joint positions.")
         if self.cycle is not None:
             if self.duration_min is not None and self.duration_min > self.cycle.time:
                 raise InvalidProblem("duration", "The shortest duration must not exceed cycle.time.")

@@ -9,12 +9,13 @@ from functools import cached_property
 import numpy as np
 
 from optimizer.exceptions import InvalidProblem, OutsideLimits
-from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle, Hold
 from optimizer.problem.names import check_name, first_repeated
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.stops import APPROACH, RETREAT, PlannedMove, Stop, moves_over
 from optimizer.problem.targets import Target, members, validated
 
 MOST_STOPS = 100
@@ -22,21 +23,6 @@ MOST_STOPS = 100
 LONGEST_ROUND = 36_000.0
 # name of the configuration from which the round starts, and of a closed round's end
 START = "start"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stop:
-    """A target at which the arm comes to rest, for `dwell` [s].
-
-    `payload` is carried from here on, the dwell included: grasped, or released with a payload without mass; None leaves
-    it unchanged. `branch` restricts the inverse kinematics branches of this stop.
-    """
-
-    name: str
-    target: Target
-    dwell: float = 0.0
-    payload: Payload | None = None
-    branch: BranchFilter | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,13 +79,20 @@ class WorkRound:
         self._check_duration()
 
     def _check_names(self) -> None:
-        names = [stop.name for stop in self.stops]
-        for k, name in enumerate(names):
-            check_name(f"stops.{k}.name", name)
-        repeated = first_repeated([START, *names])
+        for k, stop in enumerate(self.stops):
+            check_name(f"stops.{k}.name", stop.name)
+            unknown = [name for name in stop.obstacles_ignored if name not in self.arm.scene.names]
+            if unknown:
+                raise InvalidProblem(
+                    f"stops.{k}.obstacles_ignored", f"There is no obstacle named {unknown[0]!r} in scene.obstacles."
+                )
+        places = [(0, START), *((k, name) for k, stop in enumerate(self.stops) for name in stop.places)]
+        repeated = first_repeated([name for _, name in places])
         if repeated is not None:
             raise InvalidProblem(
-                f"stops.{repeated - 1}.name", f"Give each stop a name of its own; {START!r} is the start's."
+                f"stops.{places[repeated][0]}.name",
+                f"Give each stop a name of its own. {START!r} is the start's, and a stop's name with {APPROACH} or "
+                f"{RETREAT} is that of the outer end of its line.",
             )
 
     def _check_holding(self) -> None:
@@ -132,13 +125,16 @@ class WorkRound:
             arms.append(arms[-1] if stop.payload is None else replace(arms[-1], payload=stop.payload))
         return arms
 
-    def arm_after(self, move: int) -> Arm:
-        """The arm with what it carries after a move: at the stop, or in the start configuration after the last one."""
-        return self.arms[min(move + 1, len(self.stops))]
-
-    def dwell_after(self, move: int) -> float:
-        """Time [s] of the dwell after a move: none after the one back to the start."""
-        return self.stops[move].dwell if move < len(self.stops) else 0.0
+    @cached_property
+    def moves(self) -> list[PlannedMove]:
+        """The moves of the round in their order, those along lines included."""
+        moves, place = list[PlannedMove](), START
+        for stop, before, after in zip(self.stops, self.arms, self.arms[1:], strict=False):
+            moves += moves_over(stop, place, before, after)
+            place = moves[-1].goal
+        if self.closed:
+            moves.append(PlannedMove(place, START, self.arms[-1], self.arms[-1]))
+        return moves
 
     def nearest_duration(self, duration: float) -> float:
         """The duration [s] within the bounds of the time that is nearest to another one."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from optimizer.certificate import certify
 from optimizer.deadline import Deadline
-from optimizer.methods import METHODS
+from optimizer.methods import method_of
 from optimizer.methods.method import Method, SolveResult
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
@@ -52,7 +52,7 @@ class Incumbent:
     @property
     def method(self) -> type[Method]:
         """The problem's method."""
-        return METHODS[self.problem.method]
+        return method_of(self.problem)
 
     @property
     def uses_storage(self) -> bool:

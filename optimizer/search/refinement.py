@@ -12,6 +12,7 @@ from optimizer.search.attempts import solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
+from optimizer.search.path_baselines import path_baselines
 from optimizer.search.sharpening import sharpen
 from optimizer.solution import Baseline, BaselineName
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
@@ -67,6 +68,8 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
     Only the method's `guess_baselines` are initial guesses. If one still needs less energy and is of the method's own
     kind (`accepted_baselines`), it becomes the answer itself: what another parametrisation does better is not.
     """
+    if incumbent.problem.tool_path is not None:
+        return path_baselines(incumbent, best)
     for last, fine in ((False, False), (False, True), (True, True)):
         table, q_nearest = _table(incumbent, best)
         usable = incumbent.method.accepted_baselines if last else incumbent.method.guess_baselines

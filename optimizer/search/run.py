@@ -23,6 +23,7 @@ from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_missed
+from optimizer.search.path_ends import path_candidates
 from optimizer.search.refinement import compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.self_motion_bound import self_motion_bound
@@ -61,9 +62,12 @@ class Run:
 
     def _prepare(self) -> None:
         problem, prepared = self.problem, self.incumbent.prepared
-        (starts, no_starts), (goals, no_goals) = (ends(prepared, name) for name in ("start", "goal"))
-        self.unreachable = no_starts + no_goals
-        self.incumbent.candidates = pairs(prepared, starts, goals)
+        if problem.tool_path is not None:
+            self.incumbent.candidates = path_candidates(prepared)
+        else:
+            (starts, no_starts), (goals, no_goals) = (ends(prepared, name) for name in ("start", "goal"))
+            self.unreachable = no_starts + no_goals
+            self.incumbent.candidates = pairs(prepared, starts, goals)
         bound(prepared, self.incumbent.candidates)
         checkpoint()
         least = min(candidate.shortest for candidate in self.incumbent.candidates)

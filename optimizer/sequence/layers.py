@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -13,7 +12,6 @@ from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target, members
@@ -43,25 +41,18 @@ class Layer:
         return any(end.sampled for end in self.ends)
 
 
-def layers_of(asked: WorkRound) -> list[Layer]:
-    """The layers of the start and of each stop; a closed round ends in the first one again.
+def layer_of(asked: WorkRound, place: str, field: str, target: Target, branch: BranchFilter | None) -> Layer:
+    """The layer of a target, held with every arm that comes to this place or leaves it.
 
-    Raises the errors of `optimize` for an end, which name `start` or `stops/NAME`; InvalidProblem for too many
-    configurations.
+    Raises the errors of `optimize` for an end, which name `start` or `stops/NAME`; InvalidProblem, with `field` named,
+    for too many configurations.
     """
-    arms = asked.arms
-    first = _layer(asked, START, "start", asked.start, [arms[0], *(arms[-1:] if asked.closed else [])], asked.branch)
-    others = [
-        _layer(asked, f"stops/{stop.name}", f"stops.{k}.target", stop.target, arms[k : k + 2], stop.branch)
-        for k, stop in enumerate(asked.stops)
+    name = place if place == START else f"stops/{place}"
+    arms = [
+        arm
+        for move in asked.moves
+        for arm in ([move.arm] * (place in (move.start, move.goal)) + [move.arm_after] * (place == move.goal))
     ]
-    return [first, *others]
-
-
-def _layer(
-    asked: WorkRound, name: str, field: str, target: Target, arms: Sequence[Arm], branch: BranchFilter | None
-) -> Layer:
-    """The layer of a target to which, and from which, the `arms` move."""
     problems = [
         Problem(arm=arm, start=target, goal=target, branch=branch, windings=asked.windings)
         for arm in {id(arm): arm for arm in arms}.values()

@@ -23,6 +23,8 @@ from optimizer.trajectories.spline import Spline
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000
+# nodes of a stop with lines: they make a matrix, of which the diagonal alone counts
+MOST_ON_LINE = 2000
 # kinds between two looks at the deadline: some ten milliseconds
 KINDS_PER_CHECK = 2048
 # rad: a motion whose control points are farther from the limits is not held back by them
@@ -33,11 +35,11 @@ NEAR_LIMIT = 1e-3
 class Leg:
     """All motions from one layer to the next.
 
-    `kind` (s, g) numbers the kinds of the pairs; `pair` (k, 2) is the pair of each kind that is farthest from the
-    joints' limits, `displacement` (k, nq) [rad] and `gain` (k,) [J] of potential energy are those of the kinds, and
-    `bound` (k,) [J] is proven. `cost` (s, g) [J] is the bound of a pair that is not solved, the energy
-    found of one that is, and inf of one without a motion; with it comes the `dwell` (g,) [J] at the goal. `solved` has
-    the energies of kinds, `exact` those of pairs, without the dwell.
+    `kind` (s, g) numbers the kinds of the pairs; it is -1 for one that no motion may connect. `pair` (k, 2) is the pair
+    of each kind that is farthest from the joints' limits, `displacement` (k, nq) [rad] and `gain` (k,) [J] of potential
+    energy are those of the kinds, and `bound` (k,) [J] is proven. `cost` (s, g) [J] is the bound of a pair that is not
+    solved, the energy found of one that is, and inf of one without a motion; with it comes the `dwell` (g,) [J] at the
+    goal. `solved` has the energies of kinds, `exact` those of pairs, without the dwell.
     """
 
     prepared: PreparedProblem
@@ -62,12 +64,37 @@ class Leg:
                 f"From {start.name} to {goal.name} there are {len(start.q) * len(goal.q)} pairs of arm configurations, "
                 f"of at most {MOST_PAIRS}: give fewer targets, a `branch`, or `windings` false.",
             )
-        kind, pair = _kinds(start, goal, prepared)
+        return cls._between(prepared, start, goal, *_kinds(start, goal, prepared), dwell)
+
+    @classmethod
+    def of_line(cls, prepared: PreparedProblem, start: Layer, goal: Layer, dwell: Array) -> Leg:
+        """The pairs of nodes of the same number, which a straight line of the TCP connects; a kind for each end."""
+        if len(start.q) > MOST_ON_LINE:
+            raise InvalidProblem(
+                "stops", f"{goal.name} has {len(start.q)} arm configurations, of at most {MOST_ON_LINE} with a line: "
+                "give fewer targets, a `branch`, or `windings` false.",
+            )  # fmt: skip
+        _, first, number = np.unique(start.end, return_index=True, return_inverse=True)
+        kind = np.full((len(start.q), len(goal.q)), -1)
+        np.fill_diagonal(kind, number)
+        return cls._between(prepared, start, goal, kind, np.column_stack([first, first]), dwell)
+
+    @classmethod
+    def _between(
+        cls,
+        prepared: PreparedProblem,
+        start: Layer,
+        goal: Layer,
+        kind: npt.NDArray[np.intp],
+        pair: npt.NDArray[np.intp],
+        dwell: Array,
+    ) -> Leg:
+        """The leg of given kinds, with their bounds."""
         potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
         gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
         displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
         bound = _bounds(lambda x, gain: lower_bounds(prepared, x, gain)[0], displacement, gain)
-        return cls(prepared, start, goal, kind, pair, displacement, gain, bound, dwell, bound[kind] + dwell)
+        return cls(prepared, start, goal, kind, pair, displacement, gain, bound, dwell, _costs(bound, kind, dwell))
 
     def priced(self, price: float, longest: float) -> Leg:
         """The same leg with what energy + price · duration needs, of motions of at most `longest` [s]; none solved.
@@ -77,7 +104,12 @@ class Leg:
         bound = _bounds(
             lambda x, gain: priced_bounds(self.prepared, x, gain, price, longest), self.displacement, self.gain
         )
-        return replace(self, bound=bound, cost=bound[self.kind] + self.dwell, solved={}, exact={})
+        return replace(self, bound=bound, cost=_costs(bound, self.kind, self.dwell), solved={}, exact={})
+
+    @property
+    def least_costs(self) -> Array:
+        """Proven lower bounds (s, g) [J] of all pairs, with the dwell at the goal."""
+        return _costs(self.bound, self.kind, self.dwell)
 
     def is_near_a_limit(self, motion: Spline | None) -> bool:
         """Whether a motion comes to the end of a joint's range, or there is none: another pair of its kind may need
@@ -121,6 +153,11 @@ def _kinds(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.ND
     of_pair = np.empty(code.size, dtype=np.intp)
     of_pair[order] = kind
     return of_pair.reshape(code.shape), np.column_stack(np.unravel_index(order[first], code.shape))
+
+
+def _costs(of_kind: Array, kind: npt.NDArray[np.intp], dwell: Array) -> Array:
+    """Values (s, g) [J] of all pairs from those of their kinds (k,), with the dwell (g,); inf for pairs of no kind."""
+    return np.where(kind < 0, np.inf, of_kind[kind] + dwell)
 
 
 def _bounds(bound: Callable[[Array, Array], Array], displacement: Array, gain: Array) -> Array:

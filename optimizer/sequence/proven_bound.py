@@ -30,12 +30,12 @@ def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> f
 
 
 def _costs(asked: WorkRound, k: int, leg: Leg, deadline: Deadline) -> Array:
-    costs = leg.bound[leg.kind] + leg.dwell
+    costs = leg.least_costs
     open_start, open_goal = (layer.sampled or not layer.complete for layer in (leg.start, leg.goal))
     if not open_start and not open_goal:
         return costs
     least = _of_curves(leg, deadline) if leg.start.complete and leg.goal.complete else _of_any(leg)
-    dwell = rest_energy(asked, k, asked.dwell_after(k), least_holding_power(asked, k))
+    dwell = rest_energy(asked, k, asked.moves[k].dwell, least_holding_power(asked, k))
     if open_goal:
         costs = np.hstack([costs, np.full((len(costs), 1), least + dwell)])
     if open_start:

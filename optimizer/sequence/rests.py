@@ -13,7 +13,7 @@ from optimizer.sequence.layers import Layer
 
 def holding_powers(asked: WorkRound, move: int, goal: Layer) -> Array:
     """Power (n,) [W] that holding the arm on its motors draws after a move, in each configuration of its goal."""
-    arm = asked.arm_after(move)
+    arm = asked.moves[move].arm_after
     still = np.zeros((len(goal.ends), arm.robot.nq))
     tau = Plant(arm).torques(np.array([end.q for end in goal.ends]), still, still)
     return np.asarray(holding_power(arm, tau)[goal.end])
@@ -23,21 +23,21 @@ def long_wait_powers(asked: WorkRound, move: int, goal: Layer) -> Array:
     """Power (n,) [W] of every further second of a long wait after a move, in each configuration of its goal."""
     if asked.hold == "motors":
         return holding_powers(asked, move, goal)
-    return np.full(len(goal.q), brake_power(asked.waiting(1.0), asked.arm_after(move)))
+    return np.full(len(goal.q), brake_power(asked.waiting(1.0), asked.moves[move].arm_after))
 
 
 def least_holding_power(asked: WorkRound, move: int) -> float:
     """Least power [W] that holding the arm draws after a move in any configuration: with no torque to hold."""
-    arm = asked.arm_after(move)
+    arm = asked.moves[move].arm_after
     return float(holding_power(arm, np.zeros(arm.robot.nq)))
 
 
 def rest_energy(asked: WorkRound, move: int, length: float, hold: float) -> float:
     """Energy [J] of a rest of `length` [s] after a move, where holding the arm on its motors draws `hold` [W]."""
-    return dwell_energy(asked.waiting(length), asked.arm_after(move), hold, 0.0) if length > 0 else 0.0
+    return dwell_energy(asked.waiting(length), asked.moves[move].arm_after, hold, 0.0) if length > 0 else 0.0
 
 
 def dwell_energies(asked: WorkRound, move: int, goal: Layer) -> Array:
     """Energy (n,) [J] of the dwell after a move, in each configuration of its goal."""
-    length = asked.dwell_after(move)
+    length = asked.moves[move].dwell
     return np.array([rest_energy(asked, move, length, hold) for hold in holding_powers(asked, move, goal).tolist()])

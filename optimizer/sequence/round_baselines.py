@@ -11,7 +11,7 @@ from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName
 from optimizer.sequence.time_sharing import duration_of
 from optimizer.sequence.timed_round import TimedSearch
-from optimizer.solution import Baseline
+from optimizer.solution import Baseline, Solution
 from optimizer.trajectories.spline import Spline, lasting
 
 
@@ -96,6 +96,14 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
     """
     node, total, duration, held = start, 0.0, 0.0, True
     for k, leg in enumerate(search.legs):
+        if search.asked.moves[k].line is not None:
+            # a controller's own line is not known: the line is ours
+            own = _line(search, k, node)
+            if own is None:
+                return None
+            total += float(leg.cost[node, node])
+            duration += own.duration
+            continue
         goals = _goals(search, k, start)
         prepared, q_start = leg.prepared, leg.start.q[node]
         q_goal = nearest(prepared.problem, q_start, leg.goal.q[goals])
@@ -117,6 +125,17 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
     if search.asked.nearest_duration(duration) != duration:
         return None
     return RoundBaseline("controller_default", duration, total, held, saving(ours, total))
+
+
+def _line(search: RoundSearch, move: int, node: int) -> Solution | None:
+    """The certified motion along a line; None if there is none, or the time is up."""
+    key = (move, node, node)
+    if key not in search.solutions:
+        try:
+            search.finish(*key)
+        except DeadlineExceeded:
+            return None
+    return search.solutions.get(key)
 
 
 def _goals(search: RoundSearch, move: int, start: int) -> list[int]:

@@ -4,6 +4,7 @@ certified, as `optimize` does it."""
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,14 +14,15 @@ from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
-from optimizer.problem.work_round import WorkRound
+from optimizer.problem.tool_path import ToolPath
+from optimizer.problem.work_round import START, WorkRound
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
-from optimizer.sequence.layers import Layer, layers_of
+from optimizer.sequence.layers import Layer, layer_of
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
+from optimizer.sequence.lines import layers_with_lines
 from optimizer.sequence.rests import dwell_energies
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
@@ -43,16 +45,16 @@ class RoundSearch(LazySearch):
         try:
             with watch(self.end):
                 layers = layers_of(asked)
-                stops = [*layers, *(layers[:1] if asked.closed else [])]
-                legs = [self._leg(k, stops[k], stops[k + 1]) for k in range(len(stops) - 1)]
+                layers += layers[:1] if asked.closed else []
+                legs = [self._leg(k, *both) for k, both in enumerate(pairwise(layers))]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
         super().__init__(legs, asked.closed, self.end.earlier_by(RESERVED * asked.deadline))
 
     def _leg(self, k: int, start: Layer, goal: Layer) -> Leg:
-        asked = self.asked
-        problem = self._problem(asked.arms[k], start.q[0], goal.q[0], asked.deadline)
-        return Leg.of(PreparedProblem.of(problem), start, goal, dwell_energies(asked, k, goal))
+        prepared = PreparedProblem.of(self._problem(k, start.q[0], goal.q[0], self.asked.deadline))
+        make = Leg.of if self.asked.moves[k].line is None else Leg.of_line
+        return make(prepared, start, goal, dwell_energies(self.asked, k, goal))
 
     def run(self) -> list[int]:
         """The nodes of the chain of least energy, whose motions are all in `solutions`.
@@ -74,7 +76,7 @@ class RoundSearch(LazySearch):
         """
         leg = self.legs[k]
         time = SHARE_OF_A_LEG * self.search_end.left
-        run = Run(self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], time), clock=self.clock)
+        run = Run(self._problem(k, leg.start.q[s], leg.goal.q[g], time), clock=self.clock)
         try:
             run.prepare()
         except DeadlineExceeded:
@@ -104,7 +106,7 @@ class RoundSearch(LazySearch):
         """Whether the certificate confirms a motion of a pair."""
         leg = self.legs[k]
         q_start, q_goal = leg.start.q[s], leg.goal.q[g]
-        problem = self._problem(self.asked.arms[k], q_start, q_goal, self.asked.deadline)
+        problem = self._problem(k, q_start, q_goal, self.asked.deadline)
         return certify(problem, spline, q_start, q_goal, leg.prepared.energy(spline)).valid
 
     def solve_in(self, k: int, s: int, g: int, duration: float) -> Solution:
@@ -112,7 +114,7 @@ class RoundSearch(LazySearch):
         leg = self.legs[k]
         if self.end.passed:
             raise DeadlineExceeded([])
-        problem = self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], self.end.left)
+        problem = self._problem(k, leg.start.q[s], leg.goal.q[g], self.end.left)
         fixed = replace(problem, duration_min=duration, duration_max=duration)
         return Run(fixed, clock=self.clock).solution()
 
@@ -124,7 +126,7 @@ class RoundSearch(LazySearch):
         run = self._runs.pop((k, s, g), None)
         try:
             if run is None:
-                problem = self._problem(self.asked.arms[k], leg.start.q[s], leg.goal.q[g], self.end.left)
+                problem = self._problem(k, leg.start.q[s], leg.goal.q[g], self.end.left)
                 found = Run(problem, clock=self.clock).solution()
             else:
                 found = run.search()
@@ -136,14 +138,25 @@ class RoundSearch(LazySearch):
         leg.set_pair(s, g, found.energy.electrical.total)
         self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
 
-    def _problem(self, arm: Arm, q_start: Array, q_goal: Array, time: float) -> Problem:
+    def _problem(self, k: int, q_start: Array, q_goal: Array, time: float) -> Problem:
         asked = self.asked
         return Problem(
-            arm=arm,
+            arm=asked.moves[k].arm,
             start=q_start,
             goal=q_goal,
             method=asked.method,
+            tool_path=None if asked.moves[k].line is None else ToolPath(),
             windings=False,
             sample_period=asked.sample_period,
             deadline=max(time, LEAST_TIME),
         )
+
+
+def layers_of(asked: WorkRound) -> list[Layer]:
+    """The layers of all places of a round in their order, the start first. Raises the errors of `layer_of`, and
+    PathInfeasible."""
+    layers = [layer_of(asked, START, "start", asked.start, asked.branch)]
+    for k, stop in enumerate(asked.stops):
+        at = layer_of(asked, stop.name, f"stops.{k}.target", stop.target, stop.branch)
+        layers += layers_with_lines(asked, stop, at)
+    return layers

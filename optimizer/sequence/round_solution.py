@@ -10,26 +10,22 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.problem.arm import Arm
+from optimizer.problem.stops import PlannedMove
 from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, Solution
 
 
 @dataclass(frozen=True)
 class Move:
-    """One move from stop `start` to `goal`, by name, by `arm`; and the dwell after it, by `arm_after`.
+    """One move as it was `planned`, with its `solution`.
 
-    It begins at `t0` [s] of the round; `dwell` [s] is held after it, which draws `dwell_energy` [J], and `wait` [s]
-    after that, which draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so
-    many were `solved`.
+    It begins at `t0` [s] of the round. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
+    draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
+    `solved`.
     """
 
-    start: str
-    goal: str
-    arm: Arm
-    arm_after: Arm
+    planned: PlannedMove
     solution: Solution
     t0: float
-    dwell: float
     dwell_energy: float
     wait: float
     wait_energy: float
@@ -40,7 +36,7 @@ class Move:
     @property
     def duration(self) -> float:
         """Duration [s] of the move, the dwell and the wait."""
-        return self.solution.duration + self.dwell + self.wait
+        return self.solution.duration + self.planned.dwell + self.wait
 
     @property
     def energy(self) -> float:

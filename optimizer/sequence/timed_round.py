@@ -129,7 +129,7 @@ class TimedSearch:
         """Energy [J] of a wait beside the dwell after a move."""
         if waited <= 0:
             return 0.0
-        node, dwell = nodes[move + 1], self.asked.dwell_after(move)
+        node, dwell = nodes[move + 1], self.asked.moves[move].dwell
         hold = float(holding_powers(self.asked, move, self.legs[move].goal)[node])
         return rest_energy(self.asked, move, dwell + waited, hold) - float(self.legs[move].dwell[node])
 

@@ -74,6 +74,11 @@ def trapezoid(limits: Limits, q_start: Array, q_goal: Array, duration: float) ->
     return _trapezoid(q_start, q_goal, duration, blend)
 
 
+def even_speed(duration: float) -> SampledMotion:
+    """A trapezoid of speed in `duration` [s] of one coordinate from 0 to 1, with ramps of a third each."""
+    return _trapezoid(np.zeros(1), np.ones(1), duration, duration / 3)
+
+
 def blend_time(limits: Limits, displacement: Array, duration: Array) -> Array:
     """Time (...,) [s] for which a trapezoid of speed accelerates, and decelerates, over `displacement` (..., nq) [rad].
 

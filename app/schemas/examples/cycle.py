@@ -58,4 +58,38 @@ CYCLE_EXAMPLES: dict[str, Example] = {
             "hold": {"hold": "brakes", "brake_delay": 0.5, "brake_power": 12.0},
         },
     },
+    "out_of_a_tray": {
+        "summary": "Out of a tray, with lines into and out of the stops",
+        "description": "The gripper goes straight down to the part and lifts it straight up; the part itself is no "
+        "obstacle there. It is put down on a shelf the same way.",
+        "value": {
+            "start": {"q": HOME},
+            "stops": [
+                {
+                    "name": "pick",
+                    "target": _down(0.45, -0.25, 0.12),
+                    "dwell": 0.3,
+                    "payload": PART,
+                    "approach": {"direction": [0.0, 0.0, 1.0], "distance": 0.12},
+                    "retreat": {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 0.12, "speed": 0.5},
+                    "obstacles_ignored": ["part"],
+                },
+                {
+                    "name": "place",
+                    "target": _down(0.1, 0.5, 0.25),
+                    "dwell": 0.3,
+                    "payload": None,
+                    "approach": {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
+                    "retreat": {"direction": [0.0, 0.0, -1.0], "distance": 0.08},
+                },
+            ],
+            "windings": False,
+            "scene": {
+                "obstacles": [
+                    {"name": "table", "shape": "box", "size": [1.6, 1.6, 0.1], "pose": at(0.0, 0.0, -0.1)},
+                    {"name": "part", "shape": "box", "size": [0.06, 0.06, 0.1], "pose": at(0.45, -0.25, 0.06)},
+                ]
+            },
+        },
+    },
 }

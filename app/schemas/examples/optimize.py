@@ -202,4 +202,29 @@ OPTIMIZE_EXAMPLES: dict[str, Example] = {
             "windings": False,
         },
     },
+    "glue_line": {
+        "summary": "A straight line of the tool at 0.1 m/s",
+        "description": "The nozzle follows a seam of 0.4 m within 0.1 mm and 0.1 degrees. The branch and the timing "
+        "are chosen.",
+        "value": {
+            "start": {"pose": {"position": [0.45, -0.2, 0.1], "quaternion": _DOWN}},
+            "goal": {"pose": {"position": [0.45, 0.2, 0.1], "quaternion": _DOWN}},
+            "tcp": _TCP,
+            "path": {"speed": 0.1},
+        },
+    },
+    "glue_corner": {
+        "summary": "Along two edges, with a rounded corner",
+        "description": "The tool follows both edges of a plate and rounds the corner between them within 30 mm. The "
+        "arm starts where it stands.",
+        "value": {
+            "start": {"q": HOME},
+            "goal": {"pose": {"position": [-0.3, -0.1, 0.3], "quaternion": _DOWN}},
+            "path": {
+                "via": [{"position": [-0.3, -0.35, 0.3], "quaternion": _DOWN}],
+                "blend": 0.03,
+                "tolerance": {"position": 0.0005, "rotation": 0.005},
+            },
+        },
+    },
 }

@@ -40,6 +40,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.StopInCollision("stops/pick", [COLLIDING]),
     exceptions.NoSequence("stops/place", ["left/up/flip"], ["left/up/no_flip"]),
     exceptions.RoundTooShort(5.5, 0.9),
+    exceptions.PathInfeasible(0.5, [exceptions.PathAttempt("left/up/flip", 0.6, "singular")]),
 ]
 
 

@@ -9,7 +9,8 @@ import pinocchio as pin
 
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.pose import Pose
-from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.problem.stops import Stop
+from optimizer.problem.work_round import WorkRound
 from tests.optimizer.moves import AMPLE, ROBOT
 
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -30,10 +30,11 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene
+from optimizer.problem.stops import Stop
 from optimizer.problem.targets import AnyOf
-from optimizer.problem.work_round import Stop, WorkRound
+from optimizer.problem.work_round import WorkRound
 from optimizer.search.ends import EndConfiguration
-from optimizer.sequence.layers import layers_of
+from optimizer.sequence.round_search import layers_of
 from optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, torques
@@ -56,8 +57,9 @@ def assert_true(asked: WorkRound, found: RoundSolution) -> None:
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=1e-3)
     assert found.lower_bound <= electrical.total
     assert found.duration == pytest.approx(found.moves[-1].t0 + found.moves[-1].duration)
-    names = ["start", *(stop.name for stop in asked.stops), *(["start"] if asked.closed else [])]
-    assert [move.start for move in found.moves] == names[:-1] and [move.goal for move in found.moves] == names[1:]
+    places = [(move.planned.start, move.planned.goal) for move in found.moves]
+    names = ["start", *(place for stop in asked.stops for place in stop.places), *(["start"] if asked.closed else [])]
+    assert places == list(pairwise(names))
     if asked.closed:
         assert (found.moves[-1].solution.goal.q == found.moves[0].solution.start.q).all()
     for baseline in found.baselines:
@@ -122,7 +124,7 @@ def test_move_by_move_is_what_successive_calls_of_optimize_give() -> None:
 def test_the_part_is_carried_where_it_is_and_held_while_the_arm_dwells() -> None:
     asked = pick_and_place(2, 2, windings=False)
     found = optimize_round(asked)
-    assert [move.arm.payload.mass for move in found.moves] == [0.0, 2.0, 0.0]
+    assert [move.planned.arm.payload.mass for move in found.moves] == [0.0, 2.0, 0.0]
     for k, move in enumerate(found.moves[:-1]):
         loaded = Problem(arm=asked.arms[k + 1], start=HOME, goal=HOME)
         q, still = move.solution.goal.q[None], np.zeros((1, 6))

@@ -16,8 +16,9 @@ from optimizer.optimize import optimize
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
-from optimizer.problem.work_round import Stop, WorkRound
-from optimizer.sequence.layers import layers_of
+from optimizer.problem.stops import Stop
+from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.round_search import layers_of
 from optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, fixed, torques
@@ -89,7 +90,7 @@ def test_no_other_way_to_share_the_time_is_cheaper() -> None:
     """Every move in every share of the time, on the same chain: a grid of durations, each by `optimize`."""
     found = timed(1.3)
     total = sum(move.solution.duration + move.wait for move in found.moves)
-    ends = [(move.arm, move.solution.start.q, move.solution.goal.q) for move in found.moves]
+    ends = [(move.planned.arm, move.solution.start.q, move.solution.goal.q) for move in found.moves]
     own = [move.solution.duration for move in found.moves]
     moving = found.energy.electrical.total - sum(move.dwell_energy for move in found.moves)
 
@@ -124,7 +125,7 @@ def test_brakes_make_waiting_cheap() -> None:
     assert_true(asked, braked)
     (waiting,) = (move for move in braked.moves if move.wait > 0)
     # where it dwells on its brakes already, a wait draws nothing but their power
-    assert waiting.dwell > 0.1 and waiting.wait_energy == pytest.approx(1.0 * waiting.wait, rel=ROUNDING)
+    assert waiting.planned.dwell > 0.1 and waiting.wait_energy == pytest.approx(1.0 * waiting.wait, rel=ROUNDING)
     assert braked.energy.electrical.total < 1.1 * free().energy.electrical.total
     assert braked.price_of_time == pytest.approx(-1.0)
 

@@ -1,0 +1,67 @@
+"""Paths that the TCP must follow."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.arm import Speed
+from app.schemas.common import Pose, Request, described
+from app.schemas.orientation import Axis
+from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
+from optimizer.problem.tool_path import LEAST_TOLERANCE, MOST_POINTS, POSITION_TOLERANCE, ROTATION_TOLERANCE
+
+SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
+
+
+class PathTolerance(Request):
+    """By how much the motion may be off its path."""
+
+    position: float = described(
+        "Largest distance of the TCP.", "m", 1e-4, default=POSITION_TOLERANCE, ge=LEAST_TOLERANCE, le=0.1
+    )
+    rotation: float = described(
+        "Largest angle of the tool.", "rad", 2e-3, default=ROTATION_TOLERANCE, ge=LEAST_TOLERANCE, le=0.5
+    )
+
+
+class Path(Request):
+    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis.
+
+    The branch and the timing are chosen; the tool is on the path from the start to the goal.
+    """
+
+    via: Annotated[list[Pose], Field(max_length=MOST_POINTS)] = described(
+        "Poses of the TCP between start and goal.",
+        None,
+        [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
+        default=[],
+    )
+    blend: float = described(
+        "Length of path before and after each pose of `via` on which a smooth curve replaces the corner. Needed with "
+        "`via`, as the arm cannot turn a sharp corner without a stop.",
+        "m",
+        0.02,
+        default=0.0,
+        ge=0,
+        le=1,
+    )
+    tolerance: PathTolerance = described(
+        "By how much the motion may be off the path.",
+        None,
+        {"position": 1e-4, "rotation": 2e-3},
+        default=PathTolerance(),
+    )
+    speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)
+
+
+class Line(Request):
+    """A straight line of the TCP into or out of a stop; the tool keeps its orientation."""
+
+    direction: Axis = described("Direction of the motion, of any length.", "1", [0.0, 0.0, 1.0])
+    frame: Literal["tcp", "base"] = described(
+        "Frame of `direction`: that of the TCP at the stop, or of the base.", None, "tcp", default="tcp"
+    )
+    distance: float = described("Length of the line.", "m", 0.08, ge=LEAST_DISTANCE, le=MOST_DISTANCE)
+    speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)

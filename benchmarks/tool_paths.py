@@ -1,0 +1,126 @@
+"""Paths of the tool: how many random ones can be followed, how exactly, how fast, and what the timing saves.
+
+    python -m benchmarks.tool_paths --count 50
+    python -m benchmarks.tool_paths --count 20 --corners
+
+From random configurations of a UR5e a straight line leads 0.1 to 0.5 m in a random direction, and the tool turns by up
+to 0.5 rad on the way. With `--corners` a second line of as much length follows, and the corner between them is rounded
+within 40 mm. `even speed` is the least energy of an even speed on the same path with ramps of a third each, over all
+durations within the limits on speed, acceleration and torque; its jerk is left out, as that of a ramp has no bound.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.statistics import Spread
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.energy.kernel_cache import compile_kernel
+from optimizer.energy.limited_torque import limited_torque
+from optimizer.exceptions import NoTrajectory, PathInfeasible
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.tool_path import ToolPath
+from optimizer.search.baselines import motion_energy
+from optimizer.search.path_baselines import along
+from optimizer.solution import Solution
+from optimizer.trajectories.time_scalings import even_speed
+
+MIDDLE = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+# spread of the joints of the start [rad], lengths [m], greatest turn [rad], blend of a corner [m]
+SPREAD, LENGTHS, TURN, BLEND = 0.8, (0.1, 0.5), 0.5, 0.04
+# durations of an even speed that are tried, in multiples of ours, and their number
+DURATIONS, TRIED = (0.5, 4.0), 200
+
+
+def tasks(seed: int, count: int, corners: bool) -> Iterator[Problem]:
+    """Paths, each drawn by a generator of its own, whether the arm can follow them or not."""
+    arm = Arm(robot=load_robot("ur5e"), collisions=False)
+    for k in range(count):
+        rng = np.random.default_rng([seed, k])
+        q = MIDDLE + rng.uniform(-SPREAD, SPREAD, 6)
+        via, goal = list[Pose](), _beyond(rng, tcp_pose(arm, q))
+        if corners:
+            via, goal = [Pose(goal)], _beyond(rng, goal)
+        path = ToolPath(via=via, blend=BLEND if corners else 0.0)
+        yield Problem(arm=arm, start=q, goal=Pose(goal), tool_path=path, deadline=60.0)
+
+
+def _beyond(rng: np.random.Generator, T: Array) -> Array:
+    """A pose at the end of a random line from another one."""
+    direction, turn = rng.normal(size=(2, 3))
+    goal = T.copy()
+    goal[:3, 3] += rng.uniform(*LENGTHS) * direction / np.linalg.norm(direction)
+    turned = Rotation.from_rotvec(rng.uniform(0, TURN) * turn / np.linalg.norm(turn))
+    goal[:3, :3] = turned.as_matrix() @ T[:3, :3]
+    return goal
+
+
+def even(problem: Problem, found: Solution) -> float:
+    """Least energy [J] of an even speed on the path of the answer."""
+    prepared, limits = PreparedProblem.of(problem), problem.arm.active_limits
+    path = prepared.joint_path(found.start.q)
+    assert path is not None
+    least = np.inf
+    for duration in found.trajectory.spline.duration * np.linspace(*DURATIONS, TRIED):
+        motion = along(path, even_speed(float(duration)))
+        tau = prepared.torques(motion.q, motion.v, motion.a)
+        limited = np.abs(limited_torque(problem.arm, tau, motion.v, motion.a)).max(axis=0)
+        peaks, most = (motion.peak_v, motion.peak_a, limited), (limits.v_max, limits.a_max, limits.tau_max)
+        if all((a <= b).all() for a, b in zip(peaks, most, strict=True)):
+            least = min(least, motion_energy(problem, motion, tau, prepared.potential).electrical.total)
+    return float(least)
+
+
+def main() -> None:
+    """Follows every path, and prints deviations, times and savings."""
+    arguments = parser(__doc__, seed=0)
+    arguments.add_argument("--count", type=int, default=50, help="paths (%(default)s)")
+    arguments.add_argument("--corners", action="store_true", help="two lines with a rounded corner")
+    given = arguments.parse_args()
+    on_one_core()
+    compile_kernel(load_robot("ur5e"))
+    with suppress(PathInfeasible, NoTrajectory):
+        optimize(next(tasks(given.seed + 1, 1, given.corners)))  # loads what the others find loaded
+    found: dict[str, list[float]] = {}
+    refused, failed = 0, 0
+    for problem in tasks(given.seed, given.count, given.corners):
+        began = time.perf_counter()
+        try:
+            answer = optimize(problem)
+        except PathInfeasible:
+            refused += 1
+            continue
+        except NoTrajectory:
+            failed += 1
+            continue
+        ratio, energy = answer.certificate.worst_ratio, answer.energy.electrical.total
+        row = {"time [s]": time.perf_counter() - began, "gap": 1 - answer.lower_bound / energy}
+        row["deviation [m]"] = ratio["path_position"] * ToolPath().position_tolerance
+        row["deviation [rad]"] = ratio["path_rotation"] * ToolPath().rotation_tolerance
+        row["saved against even speed"] = 1 - energy / even(problem, answer)
+        for name, value in row.items():
+            found.setdefault(name, []).append(float(value))
+    held = given.count - refused - failed
+    print(
+        f"{given.count} paths, seed {given.seed}: {held} followed and certified, {refused} refused, {failed} not found"
+    )
+    results = {name: Spread.of(values) for name, values in found.items()}
+    for name, spread in results.items():
+        print(f"{name:26s} {spread.formatted(digits=8 if 'deviation' in name else 3)}, least {spread.minimum:.3f}")
+    write_json(given.json, {"seed": given.seed, "count": given.count, "refused": refused, "failed": failed} | results)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""The course of a tool path: the pose of the TCP at every fraction of the way, and how far another pose is from it.
+
+On a straight part the position moves at an even rate and the orientation turns at an even rate about one axis. Within
+the blend of a corner the course is a Bézier curve of degree five between the two parts, with two derivatives in common
+with either: so the course has two continuous derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+
+# poses of the course that a pose is compared with first, for each part of it
+COMPARED = 200
+# a pose is looked for so many times as far ahead on the course as the motion and its tolerances reach
+AHEAD = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class ToolCourse:
+    """A course of n parts: `position` (n, 3) [m] and `rotation` (n) where each begins, `shift` (n, 3) [m] and `turn`
+    (n, 3) [rad] from there to its end, in the base frame; and `ends` (n + 1,), the way [m] at the ends of the parts."""
+
+    path: ToolPath
+    position: Array
+    rotation: Rotation
+    shift: Array
+    turn: Array
+    ends: Array
+
+    @classmethod
+    def of(cls, path: ToolPath, T_start: Array, T_goal: Array) -> ToolCourse:
+        """The course of a path from T_start to T_goal (4, 4).
+
+        Raises InvalidProblem if two of its poses are the same, or too near each other for the blend.
+        """
+        T = np.array([T_start, *(pose.T for pose in path.via), T_goal])
+        rotation = Rotation.from_matrix(T[:, :3, :3])
+        shift, turn = np.diff(T[:, :3, 3], axis=0), (rotation[1:] * rotation[:-1].inv()).as_rotvec()
+        way = np.hypot(np.linalg.norm(shift, axis=1), TURNING * np.linalg.norm(turn, axis=1))
+        for k, length in enumerate(way):
+            blended = path.blend * ((k > 0) + (k + 2 < len(T)))
+            if length < max(SAME_POSE, blended * (1 - 1e-9)):
+                raise InvalidProblem(
+                    f"path.via.{k}" if k + 2 < len(T) else "path",
+                    f"The last two poses of this path are {length:.4g} m apart: they must differ, and be at least as "
+                    f"far apart as path.blend takes of the way between them, {blended:.4g} m."
+                    if k + 2 == len(T)
+                    else f"This pose is {length:.4g} m from the one before: they must differ, and be at least as far "
+                    f"apart as path.blend takes of the way between them, {blended:.4g} m.",
+                )
+        return cls(path, T[:-1, :3, 3], rotation[:-1], shift, turn, np.concatenate([[0.0], np.cumsum(way)]))
+
+    @property
+    def length(self) -> float:
+        """Length of the way [m]; a radian of turning counts as TURNING."""
+        return float(self.ends[-1])
+
+    def poses(self, fraction: Array) -> Array:
+        """T_base_tcp (k, 4, 4) at fractions (k,) of the way."""
+        way = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * self.length
+        part = np.clip(np.searchsorted(self.ends, way, side="right") - 1, 0, len(self.shift) - 1)
+        position, rotation = self._on(part, way)
+        T = np.tile(np.eye(4), (len(way), 1, 1))
+        T[:, :3, 3], T[:, :3, :3] = position, rotation.as_matrix()
+        for corner in range(1, len(self.shift)):
+            near = np.flatnonzero(np.abs(way - self.ends[corner]) < self.path.blend)
+            if len(near):
+                T[near] = self._blended(corner, way[near])
+        return T
+
+    def _on(self, part: Array, way: Array) -> tuple[Array, Rotation]:
+        """Position and orientation on the line of a part, carried on beyond its ends, at a way [m] of the whole."""
+        share = ((way - self.ends[part]) / (self.ends[part + 1] - self.ends[part]))[:, None]
+        turned = Rotation.from_rotvec(share * self.turn[part]) * self.rotation[part]
+        return self.position[part] + share * self.shift[part], turned
+
+    def _blended(self, corner: int, way: Array) -> Array:
+        """Poses near a corner: what is left of the part before it goes to zero, and what is gone of the next one rises
+        from there, both smoothly."""
+        blend, lengths = self.path.blend, np.diff(self.ends)
+        x = (way - self.ends[corner] + blend) / (2 * blend)
+        left = (_fading(x) * blend / lengths[corner - 1])[:, None]
+        gone = (_fading(1 - x) * blend / lengths[corner])[:, None]
+        T = np.tile(np.eye(4), (len(way), 1, 1))
+        T[:, :3, 3] = self.position[corner] - left * self.shift[corner - 1] + gone * self.shift[corner]
+        before, after = (
+            Rotation.from_rotvec(-left * self.turn[corner - 1]),
+            Rotation.from_rotvec(gone * self.turn[corner]),
+        )
+        T[:, :3, :3] = (after * before * self.rotation[corner]).as_matrix()
+        return T
+
+    def deviation(self, T: Array) -> tuple[Array, Array]:
+        """How far poses T (k, 4, 4) of a motion are from the course: at most so many metres (k,) and radians (k,).
+
+        The motion must go all the way, and in its order: a pose is compared with the part of the course to which the
+        one before it leads. Infinite for all if the motion does not end where the course does.
+        """
+        at = np.linspace(0.0, 1.0, COMPARED * len(self.shift) + 1)
+        known, asked = _embedded(self.poses(at)), _embedded(T)
+        best = self._matched(at, known, asked)
+        on = self.poses(best)
+        position = np.asarray(np.linalg.norm(T[:, :3, 3] - on[:, :3, 3], axis=1))
+        turned = Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(on[:, :3, :3]).inv()
+        rotation = np.asarray(turned.magnitude())
+        if self.length * (1 - best[-1]) > self.path.position_tolerance + TURNING * self.path.rotation_tolerance:
+            return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
+        return position, rotation
+
+    def _matched(self, at: Array, known: Array, asked: Array) -> Array:
+        """Fractions (k,) of the way that are nearest to a motion, each a little after the one before.
+
+        `known` (m, 12) are the poses at fractions `at` (m,), `asked` (k, 12) those of the motion.
+        """
+        cell = float(np.linalg.norm(np.diff(known, axis=0), axis=1).max())
+        moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
+        reach = AHEAD * (self.path.position_tolerance + TURNING * self.path.rotation_tolerance)
+        ahead = np.ceil((AHEAD * moved + reach) / cell).astype(int) + 1
+        best, here = np.empty(len(asked)), 0
+        for k, pose in enumerate(asked):
+            low = known[max(here - 1, 0) : here + ahead[k] + 1]
+            start = max(here - 1, 0)
+            if len(low) < 2:
+                start, low = len(known) - 2, known[-2:]
+            chord = np.diff(low, axis=0)
+            share = np.clip(((pose - low[:-1]) * chord).sum(axis=1) / (chord**2).sum(axis=1), 0.0, 1.0)
+            missed = ((pose - low[:-1] - share[:, None] * chord) ** 2).sum(axis=1)
+            nearest = int(missed.argmin())
+            here = start + nearest
+            best[k] = at[here] + share[nearest] * (at[here + 1] - at[here])
+        return best
+
+
+def _fading(x: Array) -> Array:
+    """From 1 to 0 over [0, 1], as 1 - 2 x at first: the Bézier curve of the values 1, 3/5, 1/5, 0, 0, 0."""
+    y = 1 - x
+    return np.asarray(y**5 + 3 * x * y**4 + 2 * x**2 * y**3)
+
+
+def _embedded(T: Array) -> Array:
+    """Poses as points (k, 12), whose distances are those of the positions [m], and TURNING times those of rotations."""
+    return np.hstack([T[:, :3, 3], TURNING / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9)])

@@ -1,0 +1,51 @@
+"""A straight line of the TCP into or out of a stop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arrays import frozen
+
+LineFrame = Literal["tcp", "base"]
+# m: least and greatest length of a line
+LEAST_DISTANCE, MOST_DISTANCE = 1e-4, 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """The TCP moves by `distance` [m] along `direction` (3,), and its orientation stays.
+
+    The direction is a vector of any length in the `frame` of the TCP at the stop, or of the base. `speed` [m/s] bounds
+    the speed of the TCP on the line.
+
+    Raises InvalidProblem, with the field named.
+    """
+
+    direction: Array
+    distance: float
+    frame: LineFrame = "tcp"
+    speed: float | None = None
+
+    def __post_init__(self) -> None:
+        direction = frozen(self.direction, (3,), "direction")
+        object.__setattr__(self, "direction", direction)
+        if not np.linalg.norm(direction) > 1e-9:
+            raise InvalidProblem("direction", "direction must not be zero: give the vector along which the TCP moves.")
+        if not LEAST_DISTANCE <= self.distance <= MOST_DISTANCE:
+            raise InvalidProblem(
+                "distance", f"distance must be from {LEAST_DISTANCE:g} to {MOST_DISTANCE:g} m: {self.distance!r}."
+            )
+        if self.frame not in ("tcp", "base"):
+            raise InvalidProblem("frame", "frame must be tcp or base.")
+        if self.speed is not None and not (np.isfinite(self.speed) and self.speed > 0):
+            raise InvalidProblem("speed", "speed must be a positive number of metres per second.")
+
+    def shift(self, T_base_tcp: Array) -> Array:
+        """The way (3,) [m] of the TCP in the base frame, at a stop with the pose T_base_tcp (4, 4)."""
+        along = self.direction / np.linalg.norm(self.direction) * self.distance
+        return np.asarray(T_base_tcp[:3, :3] @ along if self.frame == "tcp" else along)

@@ -1,0 +1,87 @@
+"""The stops of a round, and the moves that lead over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.line import Line
+from optimizer.problem.scene import Scene
+from optimizer.problem.targets import Target
+
+# what follows the name of a stop in those of the outer ends of its lines
+APPROACH, RETREAT = "/approach", "/retreat"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stop:
+    """A target at which the arm comes to rest, for `dwell` [s].
+
+    `payload` is carried from here on, the dwell included: grasped, or released with a payload without mass; None leaves
+    it unchanged. `branch` restricts the inverse kinematics branches of this stop. The TCP moves along the line
+    `approach` into it and along `retreat` out of it, and rests at their outer ends; on these lines the obstacles named
+    in `obstacles_ignored` do not count.
+    """
+
+    name: str
+    target: Target
+    dwell: float = 0.0
+    payload: Payload | None = None
+    branch: BranchFilter | None = None
+    approach: Line | None = None
+    retreat: Line | None = None
+    obstacles_ignored: Sequence[str] = ()
+
+    @property
+    def places(self) -> list[str]:
+        """Names of the places at which the arm rests, in their order: the stop, and the outer ends of its lines."""
+        return [
+            *([self.name + APPROACH] if self.approach else []),
+            self.name,
+            *([self.name + RETREAT] if self.retreat else []),
+        ]
+
+
+@dataclass(frozen=True)
+class PlannedMove:
+    """A move of a round from one place to another, by their names, with `arm`; along a `line` if there is one.
+
+    After it `arm_after` rests, for `dwell` [s].
+    """
+
+    start: str
+    goal: str
+    arm: Arm
+    arm_after: Arm
+    dwell: float = 0.0
+    line: Line | None = None
+
+
+def moves_over(stop: Stop, place: str, before: Arm, after: Arm) -> list[PlannedMove]:
+    """The moves from `place` to a stop, and along its lines; `before` and `after` it the arm carries other payloads."""
+    moves, at_stop = list[PlannedMove](), _at(after, stop)
+    if stop.approach is not None:
+        outer = stop.name + APPROACH
+        moves.append(PlannedMove(place, outer, before, before))
+        on_line = _on_line(before, stop, stop.approach)
+        moves.append(PlannedMove(outer, stop.name, on_line, at_stop, stop.dwell, stop.approach))
+    else:
+        moves.append(PlannedMove(place, stop.name, before, at_stop, stop.dwell))
+    if stop.retreat is not None:
+        on_line = _on_line(after, stop, stop.retreat)
+        moves.append(PlannedMove(stop.name, stop.name + RETREAT, on_line, after, 0.0, stop.retreat))
+    return moves
+
+
+def _on_line(arm: Arm, stop: Stop, line: Line) -> Arm:
+    """The arm on a line of a stop: no faster than this allows."""
+    return _at(arm, stop).no_faster_than(line.speed)
+
+
+def _at(arm: Arm, stop: Stop) -> Arm:
+    """The arm at a stop and on its lines: without the obstacles that do not count there."""
+    if not stop.obstacles_ignored:
+        return arm
+    return replace(arm, scene=Scene([each for each in arm.scene.obstacles if each.name not in stop.obstacles_ignored]))

@@ -1,0 +1,56 @@
+"""A path that the TCP must follow: straight lines between poses, with smooth corners."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.pose import Pose
+
+MOST_POINTS = 20
+# finest tolerances [m, rad]: ten times what a motion may bend between two samples of its certificate
+LEAST_TOLERANCE = 1e-5
+# tolerances [m, rad] unless given: a tenth of a millimetre and of a degree
+POSITION_TOLERANCE, ROTATION_TOLERANCE = 1e-4, 1.745e-3
+# how much path [m] a radian of turning counts as: so a turn in place is a path, too
+TURNING = 0.25
+# poses that are nearer than this [m] along the path are one
+SAME_POSE = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToolPath:
+    """How the TCP goes from the start of a motion to its goal: straight, over the poses `via` in the base frame.
+
+    Between two poses the position moves straight and the orientation turns evenly about one axis. Within `blend` [m] of
+    path before and after a pose of `via`, a smooth curve leads past it. The motion may be off by at most
+    `position_tolerance` [m] and `rotation_tolerance` [rad].
+
+    Raises InvalidProblem, with the field named.
+    """
+
+    via: Sequence[Pose] = ()
+    blend: float = 0.0
+    position_tolerance: float = POSITION_TOLERANCE
+    rotation_tolerance: float = ROTATION_TOLERANCE
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "via", tuple(self.via))
+        if len(self.via) > MOST_POINTS:
+            raise InvalidProblem("path.via", f"A path must have at most {MOST_POINTS} poses between start and goal.")
+        for name in ("position_tolerance", "rotation_tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= LEAST_TOLERANCE):
+                field = f"path.tolerance.{name.removesuffix('_tolerance')}"
+                raise InvalidProblem(field, f"{field} must be at least {LEAST_TOLERANCE:g}.")
+        if not (np.isfinite(self.blend) and self.blend >= 0):
+            raise InvalidProblem("path.blend", "path.blend must be a length in metres, zero or more.")
+        if self.via and self.blend < self.position_tolerance:
+            raise InvalidProblem(
+                "path.blend",
+                "The arm cannot turn a sharp corner without a stop: give a path.blend of at least the position's "
+                f"tolerance, {self.position_tolerance:g} m, or one path for each line.",
+            )

@@ -1,0 +1,244 @@
+"""Motions along a path of the tool: on the path by Pinocchio's kinematics, and in its order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.certificate import certify
+from optimizer.exceptions import InvalidProblem, NoCollisionFreeTrajectory, PathInfeasible
+from optimizer.kinematics.tcp import tcp_pose as pose_of
+from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import Box, Obstacle, Scene
+from optimizer.problem.targets import AnyOf
+from optimizer.problem.tool_path import ToolPath
+from optimizer.solution import Solution
+from optimizer.trajectories.time_scalings import quintic_spline
+from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
+from tests.selection import long_but
+
+HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+ARM = Arm(robot=ROBOT, collisions=False)
+# rounding of distances [m, rad]
+ROUNDING = 1e-9
+QUARTER = Rotation.from_rotvec([0.0, 0.0, np.pi / 2])
+
+
+def moved(shift: list[float], turn: Rotation | None = None) -> Pose:
+    """The home pose, shifted in the base frame [m] and turned about the tool's own axes."""
+    T = tcp_pose(HOME).T.copy()
+    T[:3, 3] += shift
+    if turn is not None:
+        T[:3, :3] = T[:3, :3] @ turn.as_matrix()
+    return Pose(T)
+
+
+def along(goal: Pose, start: Any = HOME, **given: Any) -> Problem:
+    path = given.pop("path", ToolPath())
+    return Problem(**{"arm": ARM, "start": start, "goal": goal, "tool_path": path, "deadline": AMPLE} | given)
+
+
+def poses_of(found: Solution, count: int = 3000) -> Array:
+    """Poses (k, 4, 4) of the TCP between the samples of the certificate."""
+    spline = found.trajectory.spline
+    return np.array([tcp_pose(q).T for q in spline.curve(np.linspace(0.0, spline.duration, count))])
+
+
+LINES = {
+    "down": ([0.0, 0.0, -0.1], None),
+    "aside": ([0.0, 0.5, 0.0], None),
+    "with a turn": ([-0.1, 0.2, 0.1], QUARTER),
+    "a turn in place": ([0.0, 0.0, 0.0], QUARTER),
+    "a millimetre": ([0.001, 0.0, 0.0], None),
+}
+
+
+@pytest.mark.parametrize("name", long_but(("down", "with a turn"), LINES))
+def test_the_tool_is_on_the_line(name: str) -> None:
+    """By the definition of a line, not by the course's own measure."""
+    goal = moved(*LINES[name])
+    found = optimize(along(goal))
+    assert found.certificate.valid and found.lower_bound <= found.energy.electrical.total
+    T, (T_start, T_goal) = poses_of(found), (tcp_pose(HOME).T, goal.T)
+    shift, turn = T_goal[:3, 3] - T_start[:3, 3], Rotation.from_matrix(T_goal[:3, :3] @ T_start[:3, :3].T).as_rotvec()
+    share = (T[:, :3, 3] - T_start[:3, 3]) @ shift / (shift @ shift) if shift.any() else None
+    angles = (Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(T_start[:3, :3]).inv()).as_rotvec()
+    if share is None:
+        share = angles @ turn / (turn @ turn)
+    off = np.linalg.norm(T[:, :3, 3] - T_start[:3, 3] - share[:, None] * shift, axis=1)
+    assert off.max() < ToolPath().position_tolerance
+    assert np.linalg.norm(angles - share[:, None] * turn, axis=1).max() < ToolPath().rotation_tolerance
+    assert share[0] == pytest.approx(0.0, abs=1e-6) and share[-1] == pytest.approx(1.0, abs=1e-6)
+    assert (np.diff(share) > -1e-6).all()
+
+
+def test_a_corner_is_rounded_within_its_blend() -> None:
+    corner, goal = moved([0.0, 0.2, 0.0]), moved([0.0, 0.2, -0.15])
+    path = ToolPath(via=[corner], blend=0.03)
+    found = optimize(along(goal, path=path))
+    position, rotation = ToolCourse.of(path, tcp_pose(HOME).T, goal.T).deviation(poses_of(found))
+    assert found.certificate.valid
+    assert position.max() < path.position_tolerance and rotation.max() < path.rotation_tolerance
+    gap = np.linalg.norm(poses_of(found)[:, :3, 3] - corner.T[:3, 3], axis=1).min()
+    assert 0.001 < gap < path.blend
+    (even,) = found.baselines
+    assert even.name == "trapezoid" and even.saving > 0, "slow in the corner, fast beside it"
+
+
+def test_a_pose_finds_the_best_branch() -> None:
+    start, goal = moved([0.0, 0.0, 0.0]), moved([0.0, 0.0, -0.1])
+    found, given = optimize(along(goal, start)), optimize(along(goal))
+    assert found.status == "optimal" and len(found.candidates) > 1
+    assert found.energy.electrical.total <= given.energy.electrical.total * (1 + ROUNDING)
+
+
+def test_the_speed_of_the_tool_is_kept() -> None:
+    slow = optimize(along(moved([0.0, 0.3, 0.0]), arm=ARM.no_faster_than(0.2)))
+    assert slow.certificate.valid and slow.certificate.worst_ratio["tcp_speed"] > 0.99
+    assert slow.trajectory.spline.duration > 0.3 / 0.2
+
+
+def test_a_given_duration_is_met() -> None:
+    found = optimize(along(moved([0.0, 0.3, 0.0]), duration_min=1.7, duration_max=1.7))
+    assert found.trajectory.spline.duration == pytest.approx(1.7) and found.certificate.valid
+
+
+def test_seven_joints_follow_a_line() -> None:
+    arm = Arm(robot=load_robot("panda"), collisions=False)
+    start = np.array([0.0, -0.3, 0.1, -2.0, 0.0, 1.8, 0.7])
+    goal = pose_of(arm, start).copy()
+    goal[:3, 3] += [0.0, 0.2, -0.1]
+    found = optimize(Problem(arm=arm, start=start, goal=Pose(goal), tool_path=ToolPath(), deadline=AMPLE))
+    assert found.certificate.valid and found.certificate.worst_ratio["path_position"] < 1
+
+
+def test_what_is_out_of_reach_says_how_far_each_branch_gets() -> None:
+    with pytest.raises(PathInfeasible) as refusal:
+        optimize(along(moved([0.0, -1.0, 0.0]), moved([0.0, 0.0, 0.0])))
+    error = refusal.value
+    assert len(error.attempts) == 8 and {each.reason for each in error.attempts} == {"unreachable"}
+    followed = [each.followed for each in error.attempts]
+    assert followed == sorted(followed, reverse=True)
+    assert error.length == pytest.approx(1.0)
+    # a little less is followed
+    assert optimize(along(moved([0.0, 0.02 - followed[0], 0.0]), moved([0.0, 0.0, 0.0]))).certificate.valid
+
+
+def test_a_joint_range_in_the_way_is_named() -> None:
+    bounds = limits(q_min=HOME - 0.3, q_max=HOME + 0.3)
+    with pytest.raises(PathInfeasible) as refusal:
+        optimize(along(moved([0.0, 0.4, 0.0]), arm=replace(ARM, limits=bounds)))
+    assert [each.reason for each in refusal.value.attempts] == ["outside_limits"]
+    assert 0 < refusal.value.attempts[0].followed < 1
+
+
+def test_an_obstacle_on_the_line_is_hit() -> None:
+    at = moved([0.0, 0.25, 0.0]).T[:3, 3]
+    block = Obstacle("block", Box(np.array([0.05, 0.05, 0.3])), Pose.from_rotation(at, np.eye(3)).T)
+    with pytest.raises(NoCollisionFreeTrajectory) as refusal:
+        optimize(along(moved([0.0, 0.5, 0.0]), arm=Arm(robot=ROBOT, scene=Scene([block]))))
+    assert "block" in refusal.value.pair
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"path": ToolPath(), "start": tcp_pose(HOME)}, "path"),
+        ({"path": ToolPath(via=[moved([0.0, 0.2, 0.0])] * 2, blend=0.01)}, "path.via.1"),
+        ({"path": ToolPath(via=[moved([0.0, 0.01, 0.0])], blend=0.05)}, "path.via.0"),
+        ({"start": AnyOf((HOME,))}, "start"),
+    ],
+    ids=["no way", "a pose twice", "too near for the blend", "several targets"],
+)
+def test_a_path_that_is_none_names_its_field(given: dict[str, Any], field: str) -> None:
+    goal = tcp_pose(HOME) if field == "path" else moved([0.0, 0.2, 0.1])
+    with pytest.raises(InvalidProblem) as refusal:
+        optimize(along(goal, **given))
+    assert refusal.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"via": [moved([0.0, 0.2, 0.0])]}, "path.blend"),
+        ({"blend": -1.0}, "path.blend"),
+        ({"position_tolerance": 1e-7}, "path.tolerance.position"),
+        ({"rotation_tolerance": np.nan}, "path.tolerance.rotation"),
+    ],
+    ids=str,
+)
+def test_a_wrong_path_names_its_field(given: dict[str, Any], field: str) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        ToolPath(**given)
+    assert refusal.value.field == field
+
+
+def test_the_certificate_refuses_what_leaves_the_path() -> None:
+    """The straight line in joint space between the same ends is another curve of the tool."""
+    problem = along(moved([0.0, 0.5, 0.0]))
+    q_goal = optimize(problem).goal.q
+    spline = quintic_spline(HOME, q_goal, 2.0)
+    certificate = certify(problem, spline, HOME, q_goal, PreparedProblem.of(problem).energy(spline))
+    assert certificate.worst_ratio["path_position"] > 10 and not certificate.valid
+    free = replace(problem, tool_path=None)
+    assert certify(free, spline, HOME, q_goal, PreparedProblem.of(free).energy(spline)).valid
+
+
+def test_the_certificate_refuses_a_short_cut_of_a_loop() -> None:
+    """Out and back on nearly the same line: who stays at the start is on the path all the time, and does not go it."""
+    out, back = moved([0.0, 0.2, 0.0]), moved([0.0, 0.0, 0.001])
+    course = ToolCourse.of(ToolPath(via=[out], blend=0.02), tcp_pose(HOME).T, back.T)
+    fractions = np.linspace(0.0, 1.0, 500)
+    whole, (lazy, _) = course.poses(fractions), course.deviation(np.array([tcp_pose(HOME).T] * 50))
+    assert course.deviation(whole)[0].max() < course.path.position_tolerance and np.isinf(lazy).all()
+    half = whole[fractions < 0.3]
+    assert np.isinf(course.deviation(np.concatenate([half, half[::-1]]))[0]).all()
+
+
+def test_a_deviation_is_seen_for_what_it_is() -> None:
+    course = ToolCourse.of(ToolPath(), tcp_pose(HOME).T, moved([0.0, 0.3, 0.0]).T)
+    T = course.poses(np.linspace(0.0, 1.0, 400))
+    T[200, :3, 3] += [3e-4, 0.0, 4e-4]
+    T[100, :3, :3] = Rotation.from_rotvec([0.01, 0.0, 0.0]).as_matrix() @ T[100, :3, :3]
+    position, rotation = course.deviation(T)
+    assert position.argmax() == 200 and position.max() == pytest.approx(5e-4, rel=1e-3)
+    assert rotation.argmax() == 100 and rotation.max() == pytest.approx(0.01, rel=1e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(50))
+def test_random_lines_are_followed_or_refused(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    q = HOME + rng.uniform(-0.8, 0.8, 6)
+    T = tcp_pose(q).T.copy()
+    T[:3, 3] += rng.uniform(-0.3, 0.3, 3)
+    T[:3, :3] = Rotation.from_rotvec(rng.uniform(-0.5, 0.5, 3)).as_matrix() @ T[:3, :3]
+    try:
+        found = optimize(along(Pose(T), q))
+    except PathInfeasible:
+        return
+    assert found.certificate.valid
+    assert found.certificate.worst_ratio["path_position"] <= 1 and found.certificate.worst_ratio["path_rotation"] <= 1
+
+
+def test_work_without_friction_takes_the_longest_time() -> None:
+    given = {"objective": "mechanical", "duration_max": 2.0}
+    assert optimize(along(moved([0.0, 0.3, -0.1]), **given)).trajectory.spline.duration == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("duration", long_but([60.0], [20.0, 60.0, 300.0]))
+def test_a_slow_motion_keeps_to_the_path(duration: float) -> None:
+    """Where time costs next to nothing else, the optimal timing is uneven."""
+    found = optimize(along(moved([0.0, 0.3, -0.1]), duration_min=duration, duration_max=1.2 * duration))
+    assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
