@@ -4,19 +4,22 @@ stops that need the least energy together."""
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 from optimizer.deadline import Clock
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.proven_bound import proven_bound
 from optimizer.sequence.round_baselines import (
     controller_default,
     fastest_then_wait,
+    given_order,
     move_by_move,
     of_chain,
     same_factor,
 )
-from optimizer.sequence.round_search import RoundSearch
+from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
 from optimizer.sequence.round_solution import Move, RoundSolution
 from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Solution
@@ -26,51 +29,70 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
     """Find the round of least energy, every move of it certified against every limit.
 
     `clock` gives the time [s] for the deadline. Choosing a branch at one stop changes what the moves from there cost,
-    so that all stops are decided together. A round that must be faster or slower than the one of least energy shares
-    its time among the moves, and waits where that costs least.
+    so that all stops are decided together, and a free order with them. A round that must be faster or slower than the
+    one of least energy shares its time among the moves, and waits where that costs least.
 
     Raises the errors of `optimize` for an end, with the stop named; NoSequence if no chain of configurations goes
     round; RoundTooShort; DeadlineExceeded if the time is too short for any round.
     """
     with one_thread():
         began = clock()
-        search = RoundSearch(asked, clock)
-        nodes = search.run()
-        greedy = move_by_move(search, nodes[0])
-        if greedy is not None and search.cost(greedy) < search.cost(nodes):
-            # by what the search could not tell apart: motions that were not yet optimised to the end
-            nodes = greedy
-        moving = [search.solutions[each] for each in search.pairs(nodes)]
-        own = sum(each.duration for each in moving) + asked.dwelling
-        duration, price = asked.nearest_duration(own), 0.0
-        bound, timed, timing = proven_bound(asked, search.legs, search.end), None, None
-        if duration != own:
-            timing = TimedSearch(search, duration)
-            timed = timing.run(nodes)
-            nodes = timed.nodes
-            shares = zip(search.pairs(nodes), timed.shared.lengths, strict=True)
-            moving = [search.solve_in(*each, length) for each, length in shares]
-            # energies of nearly fastest moves are flat: rounding must not turn the price's sign
-            price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
-        moves = _moves(search, nodes, moving, timed)
-        ours = sum(each.energy for each in moves)
-        compared = [
-            None if greedy is None else of_chain(search, greedy, ours),
-            controller_default(search, nodes[0], ours),
-        ]
-        if timing is not None:
-            bound = max(bound, timing.bound(price, ours))
-            compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
-        complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
-        return RoundSolution(
-            status="optimal" if _is_done(search, timing, timed, moves) and complete else "feasible",
-            moves=moves,
-            lower_bound=bound,
-            price_of_time=price,
-            baselines=[each for each in compared if each is not None],
-            complete=complete,
+        if asked.order is None:
+            return replace(_in_given_order(asked, clock), wall_time=clock() - began)
+        orders = OrderSearch(asked, clock)
+        ordered = orders.run()
+        left = max(asked.deadline - (clock() - began), LEAST_TIME)
+        found = _in_given_order(replace(ordered, deadline=left), clock)
+        baseline = given_order(replace(asked, deadline=left), ordered, clock, found.energy.electrical.total)
+        # the bound of the best order does not hold for the others
+        return replace(
+            found,
+            status=found.status if orders.exact and found.price_of_time == 0 else "feasible",
+            lower_bound=min(orders.bound, found.lower_bound),
+            baselines=[*found.baselines, *([] if baseline is None else [baseline])],
             wall_time=clock() - began,
         )
+
+
+def _in_given_order(asked: WorkRound, clock: Clock) -> RoundSolution:
+    """The round of least energy over the stops in their order."""
+    search = RoundSearch(asked, clock)
+    nodes = search.run()
+    greedy = move_by_move(search, nodes[0])
+    if greedy is not None and search.cost(greedy) < search.cost(nodes):
+        # by what the search could not tell apart: motions that were not yet optimised to the end
+        nodes = greedy
+    moving = [search.solutions[each] for each in search.pairs(nodes)]
+    own = sum(each.duration for each in moving) + asked.dwelling
+    duration, price = asked.nearest_duration(own), 0.0
+    bound, timed, timing = proven_bound(asked, search.legs, search.end), None, None
+    if duration != own:
+        timing = TimedSearch(search, duration)
+        timed = timing.run(nodes)
+        nodes = timed.nodes
+        shares = zip(search.pairs(nodes), timed.shared.lengths, strict=True)
+        moving = [search.solve_in(*each, length) for each, length in shares]
+        # energies of nearly fastest moves are flat: rounding must not turn the price's sign
+        price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
+    moves = _moves(search, nodes, moving, timed)
+    ours = sum(each.energy for each in moves)
+    compared = [
+        None if greedy is None else of_chain(search, greedy, "move_by_move", ours),
+        controller_default(search, nodes[0], ours),
+    ]
+    if timing is not None:
+        bound = max(bound, timing.bound(price, ours))
+        compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
+    complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
+    return RoundSolution(
+        status="optimal" if _is_done(search, timing, timed, moves) and complete else "feasible",
+        moves=moves,
+        lower_bound=bound,
+        price_of_time=price,
+        baselines=[each for each in compared if each is not None],
+        complete=complete,
+        wall_time=0.0,
+    )
 
 
 def _is_done(search: RoundSearch, timing: TimedSearch | None, timed: Timed | None, moves: list[Move]) -> bool:

@@ -40,7 +40,7 @@ def to_arm(request: asked.ArmRequest) -> Arm:
         T_flange_tcp=to_matrix(request.tcp),
         payload=to_payload(request.payload),
         gravity=np.array(request.gravity),
-        limits=_to_limits(request.limits, robot),
+        limits=to_limits(request.limits, robot),
         friction=request.friction,
         inverter=Inverter(**{name: getattr(request.drives.inverter, name) for name in INVERTER_PARTS}),
         bus=_to_bus(request.bus),
@@ -77,11 +77,12 @@ def to_payload(payload: asked.Payload | None) -> Payload:
     return Payload(payload.mass, np.array(payload.com), inertia, shape)
 
 
-def _to_limits(limits: asked.Limits, robot: Robot) -> Limits:
+def to_limits(limits: asked.MoveLimits, robot: Robot) -> Limits:
+    """The limits of the library: those of the robot, with the given ones in their place. Raises InvalidProblem."""
     tighter = {
         name: _per_joint(f"limits.{public}", getattr(limits, public), robot.nq) for public, name in LIMIT_NAMES.items()
     }
-    if limits.position is not None:
+    if isinstance(limits, asked.Limits) and limits.position is not None:
         tighter["q_min"] = _per_joint("limits.position.lower", limits.position.lower, robot.nq)
         tighter["q_max"] = _per_joint("limits.position.upper", limits.position.upper, robot.nq)
     return robot.limits.tightened(**tighter)

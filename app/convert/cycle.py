@@ -7,15 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from app.convert.arm import to_arm, to_payload
+from app.convert.arm import to_arm, to_limits, to_payload
 from app.convert.fields import fields
 from app.convert.request import to_branch, to_target
 from app.convert.solution import energy_fields, optimality_gap
 from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
+from app.schemas.arm import MoveLimits
 from app.schemas.path import Line as LineRequest
 from app.schemas.response import Clearance
+from models.robot import Robot
 from optimizer.exceptions import InvalidProblem
+from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.line import Line
 from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
@@ -28,12 +31,12 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
 
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
-    time = request.time
+    time, arm = request.time, to_arm(request)
     least, most = (time.min, time.max) if isinstance(time, asked.TimeRange) else (time, time)
     return WorkRound(
-        arm=to_arm(request),
+        arm=arm,
         start=to_target(request.start),
-        stops=[_to_stop(k, stop) for k, stop in enumerate(request.stops)],
+        stops=[_to_stop(k, stop, arm.robot) for k, stop in enumerate(request.stops)],
         closed=request.closed,
         duration_min=least,
         duration_max=most,
@@ -43,15 +46,24 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
         hold=request.hold.hold,
         brake_delay=request.hold.brake_delay,
         brake_power=request.hold.brake_power,
+        wait=request.wait,
+        order=_to_order(request),
         sample_period=request.sample_period,
         deadline=deadline,
     )
 
 
-def _to_stop(k: int, stop: asked.StopRequest) -> Stop:
+def _to_order(request: asked.CycleRequest) -> FreeOrder | None:
+    if request.order == "given":
+        return None
+    return FreeOrder(before=[(first, second) for first, second in request.before], together=request.together)
+
+
+def _to_stop(k: int, stop: asked.StopRequest, robot: Robot) -> Stop:
     try:
         # left out: what is carried stays
         payload = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
+        limits = None if stop.limits == MoveLimits() else to_limits(stop.limits, robot)
     except InvalidProblem as error:
         raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
     return Stop(
@@ -60,6 +72,9 @@ def _to_stop(k: int, stop: asked.StopRequest) -> Stop:
         dwell=stop.dwell,
         payload=payload,
         branch=to_branch(stop.branch),
+        limits=limits,
+        tcp_speed=stop.limits.tcp_speed,
+        elbow_speed=stop.limits.elbow_speed,
         approach=_to_line(f"stops.{k}.approach", stop.approach),
         retreat=_to_line(f"stops.{k}.retreat", stop.retreat),
         obstacles_ignored=stop.obstacles_ignored,
@@ -84,7 +99,7 @@ def to_cycle_response(
     return {
         "id": request_id,
         **fields(request, "robot", "method"),
-        **fields(found, "duration", "status", "price_of_time"),
+        **fields(found, "order", "duration", "status", "price_of_time"),
         "energy": {
             **energy_fields(energy),
             "lower_bound": found.lower_bound,

@@ -8,7 +8,7 @@ from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
-from app.routes.parameters import deadline_of
+from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import CYCLE_PROBLEMS
 from app.schemas.cycle import CycleRequest, CycleResponse
 from app.store.store_answers import store_answers
@@ -21,18 +21,22 @@ router = APIRouter(tags=["motion"])
     "/cycle",
     summary="A round of stops with least energy",
     response_model=CycleResponse,
-    responses=problem_responses(*CYCLE_PROBLEMS),
+    responses={
+        200: {"content": {"text/csv": {"schema": {"type": "string"}}}},
+        **problem_responses(*CYCLE_PROBLEMS),
+    },
 )
 async def cycle(
     request: Request,
     body: CycleRequest,
+    wanted: WantedFormat,
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     store: ServiceStore,
 ) -> Response:
     """Finds the arm configuration at every stop of a round, and the motions between them, that need the least
     electrical energy together. The configuration at one stop decides what the moves from there cost, so that all are
-    chosen at once. Each move refers to its complete answer."""
-    task = CycleTask(body, request.state.id)
+    chosen at once. Each move refers to its complete answer. `Accept: text/csv` returns the samples of the round."""
+    task = CycleTask(body, request.state.id, wanted)
     result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
     return result_response(await store_answers(store, settings, "optimize", result))

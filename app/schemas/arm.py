@@ -73,7 +73,7 @@ class PositionLimits(Request):
     upper: AnglePerJoint | None = described("Largest joint position.", "rad", 3.0, default=None)
 
 
-class Limits(Request):
+class MoveLimits(Request):
     """Limits within those of the robot. One number applies to every joint, a list has one per joint. Null: the
     robot's."""
 
@@ -87,12 +87,18 @@ class Limits(Request):
         [120.0, 120.0, 120.0, 20.0, 20.0, 20.0],
         default=None,
     )
-    position: PositionLimits | None = described(
-        "Narrower joint range.", None, {"lower": -3.0, "upper": 3.0}, default=None
-    )
     tcp_speed: Speed | None = described("Largest speed of the TCP.", "m/s", 0.25, default=None)
     elbow_speed: Speed | None = described(
         "Largest speed of the elbow: of both ends of the axis of its capsule.", "m/s", 0.25, default=None
+    )
+
+
+class Limits(MoveLimits):
+    """Limits within those of the robot. One number applies to every joint, a list has one per joint. Null: the
+    robot's."""
+
+    position: PositionLimits | None = described(
+        "Narrower joint range.", None, {"lower": -3.0, "upper": 3.0}, default=None
     )
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag
+from pydantic import Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest, Payload
+from app.schemas.arm import ArmRequest, MoveLimits, Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH
 from app.schemas.path import Line
 from app.schemas.request import SECONDS_OR_RANGE, Branch, DurationRange, Holding, Target
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
+from optimizer.problem.free_order import MOST_FREE_STOPS
 from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
 from optimizer.problem.scene import MOST_OBSTACLES
@@ -44,6 +46,12 @@ class StopRequest(Request):
         None,
         {"elbow": "up"},
         default=None,
+    )
+    limits: MoveLimits = described(
+        "Limits of the moves into this stop, its line included, where they are tighter than those of the request.",
+        None,
+        {"acceleration": 5.0, "tcp_speed": 0.5},
+        default=MoveLimits(),
     )
     approach: Line | None = described(
         "Straight line of the TCP into the stop. The arm rests at its outer end. Null: none.",
@@ -79,7 +87,7 @@ RoundTime = Annotated[Annotated[LongTime, Tag("seconds")] | Annotated[TimeRange,
 
 
 class CycleRequest(ArmRequest):
-    """A round of stops, visited in their order. `payload` is what the arm carries to the first stop that changes it."""
+    """A round of stops. `payload` is what the arm carries to the first stop that changes it."""
 
     start: Target = described(
         "Where the arm rests before the first move: joint positions, a pose of the TCP, or one of several targets.",
@@ -87,7 +95,7 @@ class CycleRequest(ArmRequest):
         {"q": [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]},
     )
     stops: Annotated[list[StopRequest], Field(min_length=1, max_length=MOST_STOPS)] = described(
-        "The stops, in the order in which they are visited.",
+        "The stops; in the order in which they are visited, unless `order` is free.",
         None,
         [
             {
@@ -101,6 +109,31 @@ class CycleRequest(ArmRequest):
                 "payload": None,
             },
         ],
+    )
+    order: Literal["given", "free"] = described(
+        "`given`: the stops are visited in the order of `stops`. `free`: in the order that needs the least energy, for "
+        f"at most {MOST_FREE_STOPS} stops. The arm then carries the same between groups of stops as at the start.",
+        None,
+        "given",
+        default="given",
+    )
+    before: Annotated[list[Annotated[list[PlainName], Field(min_length=2, max_length=2)]], Field(max_length=132)] = (
+        described(
+            "With a free order: pairs of stops, of which the first is visited earlier than the second.",
+            None,
+            [["pick", "inspect"]],
+            default=[],
+        )
+    )
+    together: Annotated[
+        list[Annotated[list[PlainName], Field(min_length=2, max_length=MOST_FREE_STOPS)]],
+        Field(max_length=MOST_FREE_STOPS),
+    ] = described(
+        "With a free order: lists of stops that are visited one directly after the other, as they are listed, like the "
+        "one where a part is taken up and the one where it is put down.",
+        None,
+        [["pick", "place"]],
+        default=[],
     )
     closed: bool = described(
         "Whether the arm returns to the start after the last stop: to the same joint positions, full turns included.",
@@ -120,6 +153,12 @@ class CycleRequest(ArmRequest):
         None,
         {"hold": "brakes", "brake_delay": 0.5},
         default=Holding(),
+    )
+    wait: PlainName | None = described(
+        "Where time that is left over is waited out: `start`, or the name of a stop. Null: where that costs least.",
+        None,
+        "start",
+        default=None,
     )
     branch: Branch | None = described(
         "Allowed branches of the arm configurations at the start. Null: all branches.",
@@ -149,6 +188,12 @@ class CycleRequest(ArmRequest):
         ge=1e-3,
         le=LONGEST_DURATION,
     )
+
+    @model_validator(mode="after")
+    def _order_is_free(self) -> Self:
+        if self.order == "given" and (self.before or self.together):
+            raise PydanticCustomError("order", "`before` and `together` need `order` to be free")
+        return self
 
     @property
     def objective(self) -> Objective:
@@ -204,11 +249,12 @@ class CycleLeg(Response):
 class CycleBaseline(Response):
     """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked for."""
 
-    name: Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait"] = described(
+    name: Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"] = described(
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
         "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
-        "slowed or sped up alike; `fastest_then_wait`, the fastest moves and a wait.",
+        "slowed or sped up alike; `fastest_then_wait`, the fastest moves and a wait. With a free order, where it is "
+        "allowed: `given_order`, the best round in the order of `stops`.",
         None,
         "move_by_move",
     )
@@ -253,6 +299,7 @@ class CycleResponse(Answer):
     """The round of least energy, its moves, and its certificate."""
 
     method: MethodName = described("How the moves are parametrised.", None, "bspline")
+    order: list[str] = described("Names of the stops, as they are visited.", None, ["pick", "place"])
     duration: float = described("Duration of the round, dwells and waiting included.", "s", 8.3)
     status: Literal["optimal", "feasible"] = described(
         "`optimal`: every move converged, and no other chain of arm configurations has a lower bound below what was "

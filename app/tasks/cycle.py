@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from app.convert.cycle import to_cycle_response, to_work_round
+from app.convert.cycle_csv import to_cycle_csv
 from app.convert.solution import to_optimize_response
 from app.engine.result import TaskResult
 from app.schemas.cycle import CycleRequest
@@ -16,10 +18,11 @@ from optimizer.solution import Solution
 
 @dataclass(frozen=True)
 class CycleTask:
-    """A validated request and its id."""
+    """A validated request and its id; the media type of the answer is `wanted`."""
 
     request: CycleRequest
     request_id: str
+    wanted: Literal["json", "csv"] = "json"
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /cycle`, within about `deadline` seconds."""
@@ -28,4 +31,6 @@ class CycleTask:
         def store(solution: Solution) -> str:
             return collector.add(to_optimize_response(self.request, self.request_id, certified(solution)))
 
+        if self.wanted == "csv":
+            return TaskResult.of_csv(to_cycle_csv(found))
         return TaskResult.of_json(to_cycle_response(self.request, self.request_id, found, store), collector.stored)

@@ -27,7 +27,8 @@ from optimizer.energy.kernel_expressions import SYMBOLICS, build
 
 log = logging.getLogger(__name__)
 
-COMPILER_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+# at -O2 it takes twice as long to compile, and runs no faster: the code is one long run of multiplications
+COMPILER_FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 # users may bring any number of arms, each with a library of about a megabyte
 MOST_LIBRARIES = 200
 # modules whose code decides what is compiled

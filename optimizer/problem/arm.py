@@ -214,8 +214,7 @@ class Arm:
 
     def no_faster_than(self, tcp_speed: float | None) -> Arm:
         """The same arm, whose TCP is no faster than this [m/s] either; None changes nothing."""
-        speeds = [speed for speed in (self.tcp_speed, tcp_speed) if speed is not None]
-        return replace(self, tcp_speed=min(speeds, default=None))
+        return self if tcp_speed is None else replace(self, tcp_speed=min(tcp_speed, self.tcp_speed or np.inf))
 
     def check_rating(self, field: str, mass: float) -> None:
         """Raises InvalidProblem for `field` if a payload of `mass` [kg] exceeds the robot's rating."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from models.robot import Limits
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.line import Line
@@ -20,9 +23,11 @@ class Stop:
     """A target at which the arm comes to rest, for `dwell` [s].
 
     `payload` is carried from here on, the dwell included: grasped, or released with a payload without mass; None leaves
-    it unchanged. `branch` restricts the inverse kinematics branches of this stop. The TCP moves along the line
-    `approach` into it and along `retreat` out of it, and rests at their outer ends; on these lines the obstacles named
-    in `obstacles_ignored` do not count.
+    it unchanged. `branch` restricts the inverse kinematics branches of this stop. The moves into the stop, a line
+    included, keep within `limits`, `tcp_speed` and `elbow_speed` [m/s], too; position limits are the arm's.
+
+    The TCP moves along the line `approach` into the stop and along `retreat` out of it, and rests at their outer ends;
+    at the stop and on these lines the obstacles named in `obstacles_ignored` do not count.
     """
 
     name: str
@@ -30,6 +35,9 @@ class Stop:
     dwell: float = 0.0
     payload: Payload | None = None
     branch: BranchFilter | None = None
+    limits: Limits | None = None
+    tcp_speed: float | None = None
+    elbow_speed: float | None = None
     approach: Line | None = None
     retreat: Line | None = None
     obstacles_ignored: Sequence[str] = ()
@@ -48,7 +56,7 @@ class Stop:
 class PlannedMove:
     """A move of a round from one place to another, by their names, with `arm`; along a `line` if there is one.
 
-    After it `arm_after` rests, for `dwell` [s].
+    After it `arm_after` rests, for `dwell` [s]. `at_stop`: the goal is a stop, and neither an outer end nor the start.
     """
 
     start: str
@@ -57,22 +65,34 @@ class PlannedMove:
     arm_after: Arm
     dwell: float = 0.0
     line: Line | None = None
+    at_stop: bool = False
 
 
 def moves_over(stop: Stop, place: str, before: Arm, after: Arm) -> list[PlannedMove]:
     """The moves from `place` to a stop, and along its lines; `before` and `after` it the arm carries other payloads."""
-    moves, at_stop = list[PlannedMove](), _at(after, stop)
+    moves, resting, before = list[PlannedMove](), _at(after, stop), _within(before, stop)
     if stop.approach is not None:
         outer = stop.name + APPROACH
         moves.append(PlannedMove(place, outer, before, before))
         on_line = _on_line(before, stop, stop.approach)
-        moves.append(PlannedMove(outer, stop.name, on_line, at_stop, stop.dwell, stop.approach))
+        moves.append(PlannedMove(outer, stop.name, on_line, resting, stop.dwell, stop.approach, True))
     else:
-        moves.append(PlannedMove(place, stop.name, before, at_stop, stop.dwell))
+        moves.append(PlannedMove(place, stop.name, before, resting, stop.dwell, at_stop=True))
     if stop.retreat is not None:
         on_line = _on_line(after, stop, stop.retreat)
         moves.append(PlannedMove(stop.name, stop.name + RETREAT, on_line, after, 0.0, stop.retreat))
     return moves
+
+
+def _within(arm: Arm, stop: Stop) -> Arm:
+    """The arm on its way to a stop, within the limits of both."""
+    if stop.limits is not None:
+        own, rates = arm.active_limits, ("v_max", "a_max", "j_max", "tau_max")
+        tighter = {name: np.minimum(getattr(own, name), getattr(stop.limits, name)) for name in rates}
+        arm = replace(arm, limits=own.tightened(**tighter))
+    if stop.elbow_speed is not None:
+        arm = replace(arm, elbow_speed=min(stop.elbow_speed, arm.elbow_speed or np.inf))
+    return arm.no_faster_than(stop.tcp_speed)
 
 
 def _on_line(arm: Arm, stop: Stop, line: Line) -> Arm:

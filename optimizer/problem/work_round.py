@@ -13,6 +13,7 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle, Hold
+from optimizer.problem.free_order import FreeOrder, check_order
 from optimizer.problem.names import check_name, first_repeated
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
 from optimizer.problem.stops import APPROACH, RETREAT, PlannedMove, Stop, moves_over
@@ -27,14 +28,15 @@ START = "start"
 
 @dataclass(frozen=True, kw_only=True)
 class WorkRound:
-    """A request for the round of least electrical energy: from `start` over all `stops` in their order.
+    """A request for the round of least electrical energy: from `start` over all `stops`, in their order or a free one.
 
     `start` is a target like those of the stops, `branch` restricts its branches; `arm` carries its payload from the
     start to the first stop that changes it. A `closed` round ends in the configuration in which it started, full turns
     included. `duration_min` and `duration_max` [s] bound the duration of the round, dwells and waiting included: time
-    that is left over is waited out where it costs least. With `windings` every full-turn alternative of a configuration
+    that is left over is waited out. With `windings` every full-turn alternative of a configuration
     counts; else the one nearest to the middle of the joints' ranges. `hold`, `brake_delay` [s] and `brake_power` [W]
-    say how the arm dwells and waits, as in `Cycle`.
+    say how the arm dwells and waits, as in `Cycle`; it waits at `wait`, a stop or the start (None: where that costs
+    least).
 
     Orientations are given in full. Raises InvalidProblem or OutsideLimits, with the field named.
     """
@@ -45,12 +47,14 @@ class WorkRound:
     closed: bool = True
     duration_min: float | None = None
     duration_max: float | None = None
+    order: FreeOrder | None = None
     branch: BranchFilter | None = None
     method: MethodName = "bspline"
     windings: bool = True
     hold: Hold = "motors"
     brake_delay: float = 0.0
     brake_power: float | None = None
+    wait: str | None = None
     sample_period: float = 0.008
     deadline: float = 60.0
 
@@ -68,6 +72,7 @@ class WorkRound:
         for k, stop in enumerate(self.stops):
             if not 0 <= stop.dwell <= LONGEST_DURATION:
                 raise InvalidProblem(f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s.")
+            self._check_limits(k, stop)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
         if self.arm.bus.mode == "storage":
@@ -75,7 +80,10 @@ class WorkRound:
         for name in ("sample_period", "deadline"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
+        if self.order is not None:
+            check_order(self.order, self.stops, self.arm.payload)
         self._check_holding()
+        self._check_wait()
         self._check_duration()
 
     def _check_names(self) -> None:
@@ -94,6 +102,17 @@ class WorkRound:
                 f"Give each stop a name of its own. {START!r} is the start's, and a stop's name with {APPROACH} or "
                 f"{RETREAT} is that of the outer end of its line.",
             )
+
+    def _check_limits(self, k: int, stop: Stop) -> None:
+        given = {name: getattr(stop, name) for name in ("limits", "tcp_speed", "elbow_speed")}
+        try:
+            replace(self.arm, **{name: value for name, value in given.items() if value is not None})
+        except InvalidProblem as error:
+            raise InvalidProblem(f"stops.{k}.{error.field}", f"stops.{k}.{error}") from None
+
+    def _check_wait(self) -> None:
+        if self.wait is not None and self.wait not in (move.goal for move in self.moves):
+            raise InvalidProblem("wait", f"No move ends at a place named {self.wait!r}: give the name of a stop.")
 
     def _check_holding(self) -> None:
         try:

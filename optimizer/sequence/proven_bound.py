@@ -10,6 +10,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.kinematics.wrist_geometry import potential_rates
+from optimizer.problem.stops import PlannedMove
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.candidates import Candidate
 from optimizer.search.lower_bound import LeastBound
@@ -26,16 +27,22 @@ def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> f
     Where configurations are samples of infinitely many, or some may be missing, one more stands for all that are not
     known, with a bound that holds for each of them.
     """
-    return LeastChain([_costs(asked, k, leg, deadline) for k, leg in enumerate(legs)], asked.closed).find()[0]
+    return LeastChain(
+        [bounded_costs(asked, *both, deadline) for both in zip(asked.moves, legs, strict=True)], asked.closed
+    ).find()[0]
 
 
-def _costs(asked: WorkRound, k: int, leg: Leg, deadline: Deadline) -> Array:
+def bounded_costs(asked: WorkRound, move: PlannedMove, leg: Leg, deadline: Deadline) -> Array:
+    """Lower bounds (s, g) [J] of the pairs of a leg, the dwell included, and of one more node where some are not known.
+
+    That node comes last.
+    """
     costs = leg.least_costs
     open_start, open_goal = (layer.sampled or not layer.complete for layer in (leg.start, leg.goal))
     if not open_start and not open_goal:
         return costs
     least = _of_curves(leg, deadline) if leg.start.complete and leg.goal.complete else _of_any(leg)
-    dwell = rest_energy(asked, k, asked.moves[k].dwell, least_holding_power(asked, k))
+    dwell = rest_energy(asked, move, move.dwell, least_holding_power(move))
     if open_goal:
         costs = np.hstack([costs, np.full((len(costs), 1), least + dwell)])
     if open_start:

@@ -7,37 +7,37 @@ import numpy as np
 from models.robot import Array
 from optimizer.energy.dwell import brake_power, dwell_energy, holding_power
 from optimizer.energy.plant import Plant
+from optimizer.problem.stops import PlannedMove
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.layers import Layer
 
 
-def holding_powers(asked: WorkRound, move: int, goal: Layer) -> Array:
+def holding_powers(move: PlannedMove, goal: Layer) -> Array:
     """Power (n,) [W] that holding the arm on its motors draws after a move, in each configuration of its goal."""
-    arm = asked.moves[move].arm_after
+    arm = move.arm_after
     still = np.zeros((len(goal.ends), arm.robot.nq))
     tau = Plant(arm).torques(np.array([end.q for end in goal.ends]), still, still)
     return np.asarray(holding_power(arm, tau)[goal.end])
 
 
-def long_wait_powers(asked: WorkRound, move: int, goal: Layer) -> Array:
+def long_wait_powers(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:
     """Power (n,) [W] of every further second of a long wait after a move, in each configuration of its goal."""
     if asked.hold == "motors":
-        return holding_powers(asked, move, goal)
-    return np.full(len(goal.q), brake_power(asked.waiting(1.0), asked.moves[move].arm_after))
+        return holding_powers(move, goal)
+    return np.full(len(goal.q), brake_power(asked.waiting(1.0), move.arm_after))
 
 
-def least_holding_power(asked: WorkRound, move: int) -> float:
+def least_holding_power(move: PlannedMove) -> float:
     """Least power [W] that holding the arm draws after a move in any configuration: with no torque to hold."""
-    arm = asked.moves[move].arm_after
+    arm = move.arm_after
     return float(holding_power(arm, np.zeros(arm.robot.nq)))
 
 
-def rest_energy(asked: WorkRound, move: int, length: float, hold: float) -> float:
+def rest_energy(asked: WorkRound, move: PlannedMove, length: float, hold: float) -> float:
     """Energy [J] of a rest of `length` [s] after a move, where holding the arm on its motors draws `hold` [W]."""
-    return dwell_energy(asked.waiting(length), asked.moves[move].arm_after, hold, 0.0) if length > 0 else 0.0
+    return dwell_energy(asked.waiting(length), move.arm_after, hold, 0.0) if length > 0 else 0.0
 
 
-def dwell_energies(asked: WorkRound, move: int, goal: Layer) -> Array:
+def dwell_energies(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:
     """Energy (n,) [J] of the dwell after a move, in each configuration of its goal."""
-    length = asked.moves[move].dwell
-    return np.array([rest_energy(asked, move, length, hold) for hold in holding_powers(asked, move, goal).tolist()])
+    return np.array([rest_energy(asked, move, move.dwell, hold) for hold in holding_powers(move, goal).tolist()])

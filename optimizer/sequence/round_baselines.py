@@ -3,9 +3,14 @@ default speed."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from optimizer.exceptions import DeadlineExceeded
+from optimizer.deadline import Clock
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from optimizer.problem.free_order import is_given_order_allowed
+from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName
@@ -76,8 +81,24 @@ def _in_time(
     return RoundBaseline(name, timing.time + timing.asked.dwelling, total, held, saving(ours, total))
 
 
-def of_chain(search: RoundSearch, nodes: list[int], ours: float) -> RoundBaseline | None:
-    """The baseline `move_by_move` from the nodes of its chain; `ours` [J] is what it is compared with.
+def given_order(asked: WorkRound, ours: WorkRound, clock: Clock, energy: float) -> RoundBaseline | None:
+    """The best round in the order in which the stops are given, compared with `ours` of an `energy` [J].
+
+    None if it is the same or not allowed, if there is none before the deadline, or if it takes another time than is
+    asked for.
+    """
+    same = [stop.name for stop in asked.stops] == [stop.name for stop in ours.stops]
+    if same or (asked.order is not None and not is_given_order_allowed(asked.order, asked.stops)):
+        return None
+    try:
+        search = RoundSearch(replace(asked, order=None), clock)
+        return of_chain(search, search.run(), "given_order", energy)
+    except JoulepathError:
+        return None
+
+
+def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, ours: float) -> RoundBaseline | None:
+    """The baseline of a chain whose motions are known; `ours` [J] is what it is compared with.
 
     None if it takes another time than is asked for.
     """
@@ -86,7 +107,7 @@ def of_chain(search: RoundSearch, nodes: list[int], ours: float) -> RoundBaselin
     duration = sum(move.duration for move in moves) + search.asked.dwelling
     if search.asked.nearest_duration(duration) != duration:
         return None
-    return RoundBaseline("move_by_move", duration, theirs, True, saving(ours, theirs))
+    return RoundBaseline(name, duration, theirs, True, saving(ours, theirs))
 
 
 def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBaseline | None:

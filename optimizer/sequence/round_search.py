@@ -3,8 +3,8 @@ certified, as `optimize` does it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from optimizer.exceptions import DeadlineExceeded, JoulepathError, NoTrajectory
 from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
+from optimizer.problem.stops import PlannedMove
 from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.search.attempts import settled, solve
@@ -34,10 +35,11 @@ SAME = 1e-9
 
 
 class RoundSearch(LazySearch):
-    """One search, with the certified motions that it has found."""
+    """One search over `moves`, with the certified motions that it has found."""
 
-    def __init__(self, asked: WorkRound, clock: Clock) -> None:
+    def __init__(self, asked: WorkRound, clock: Clock, moves: Sequence[PlannedMove] | None = None) -> None:
         self.asked, self.clock = asked, clock
+        self.moves = asked.moves if moves is None else moves
         self.end = Deadline.after(asked.deadline, clock)
         self.solutions: dict[tuple[int, int, int], Solution] = {}
         # searches that have a first motion, to go on with
@@ -45,16 +47,15 @@ class RoundSearch(LazySearch):
         try:
             with watch(self.end):
                 layers = layers_of(asked)
-                layers += layers[:1] if asked.closed else []
-                legs = [self._leg(k, *both) for k, both in enumerate(pairwise(layers))]
+                legs = [self._leg(move, layers[move.start], layers[move.goal]) for move in self.moves]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
         super().__init__(legs, asked.closed, self.end.earlier_by(RESERVED * asked.deadline))
 
-    def _leg(self, k: int, start: Layer, goal: Layer) -> Leg:
-        prepared = PreparedProblem.of(self._problem(k, start.q[0], goal.q[0], self.asked.deadline))
-        make = Leg.of if self.asked.moves[k].line is None else Leg.of_line
-        return make(prepared, start, goal, dwell_energies(self.asked, k, goal))
+    def _leg(self, move: PlannedMove, start: Layer, goal: Layer) -> Leg:
+        prepared = PreparedProblem.of(self._problem(move, start.q[0], goal.q[0], self.asked.deadline))
+        make = Leg.of if move.line is None else Leg.of_line
+        return make(prepared, start, goal, dwell_energies(self.asked, move, goal))
 
     def run(self) -> list[int]:
         """The nodes of the chain of least energy, whose motions are all in `solutions`.
@@ -76,7 +77,7 @@ class RoundSearch(LazySearch):
         """
         leg = self.legs[k]
         time = SHARE_OF_A_LEG * self.search_end.left
-        run = Run(self._problem(k, leg.start.q[s], leg.goal.q[g], time), clock=self.clock)
+        run = Run(self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], time), clock=self.clock)
         try:
             run.prepare()
         except DeadlineExceeded:
@@ -106,7 +107,7 @@ class RoundSearch(LazySearch):
         """Whether the certificate confirms a motion of a pair."""
         leg = self.legs[k]
         q_start, q_goal = leg.start.q[s], leg.goal.q[g]
-        problem = self._problem(k, q_start, q_goal, self.asked.deadline)
+        problem = self._problem(self.moves[k], q_start, q_goal, self.asked.deadline)
         return certify(problem, spline, q_start, q_goal, leg.prepared.energy(spline)).valid
 
     def solve_in(self, k: int, s: int, g: int, duration: float) -> Solution:
@@ -114,7 +115,7 @@ class RoundSearch(LazySearch):
         leg = self.legs[k]
         if self.end.passed:
             raise DeadlineExceeded([])
-        problem = self._problem(k, leg.start.q[s], leg.goal.q[g], self.end.left)
+        problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], self.end.left)
         fixed = replace(problem, duration_min=duration, duration_max=duration)
         return Run(fixed, clock=self.clock).solution()
 
@@ -126,7 +127,7 @@ class RoundSearch(LazySearch):
         run = self._runs.pop((k, s, g), None)
         try:
             if run is None:
-                problem = self._problem(k, leg.start.q[s], leg.goal.q[g], self.end.left)
+                problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], self.end.left)
                 found = Run(problem, clock=self.clock).solution()
             else:
                 found = run.search()
@@ -138,25 +139,25 @@ class RoundSearch(LazySearch):
         leg.set_pair(s, g, found.energy.electrical.total)
         self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
 
-    def _problem(self, k: int, q_start: Array, q_goal: Array, time: float) -> Problem:
+    def _problem(self, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
         asked = self.asked
         return Problem(
-            arm=asked.moves[k].arm,
+            arm=move.arm,
             start=q_start,
             goal=q_goal,
             method=asked.method,
-            tool_path=None if asked.moves[k].line is None else ToolPath(),
+            tool_path=None if move.line is None else ToolPath(),
             windings=False,
             sample_period=asked.sample_period,
             deadline=max(time, LEAST_TIME),
         )
 
 
-def layers_of(asked: WorkRound) -> list[Layer]:
-    """The layers of all places of a round in their order, the start first. Raises the errors of `layer_of`, and
+def layers_of(asked: WorkRound) -> dict[str, Layer]:
+    """The layers of all places of a round by their names, in their order. Raises the errors of `layer_of`, and
     PathInfeasible."""
-    layers = [layer_of(asked, START, "start", asked.start, asked.branch)]
+    layers = {START: layer_of(asked, START, "start", asked.start, asked.branch)}
     for k, stop in enumerate(asked.stops):
         at = layer_of(asked, stop.name, f"stops.{k}.target", stop.target, stop.branch)
-        layers += layers_with_lines(asked, stop, at)
+        layers |= zip(stop.places, layers_with_lines(asked, stop, at), strict=True)
     return layers

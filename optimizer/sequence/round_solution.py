@@ -44,7 +44,7 @@ class Move:
         return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
 
 
-RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait"]
+RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"]
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,11 @@ class RoundSolution:
         """Energy of the round [J], with dwells and waiting."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
         return summed([move.solution for move in self.moves], resting)
+
+    @property
+    def order(self) -> list[str]:
+        """Names of the stops, as they are visited."""
+        return [move.planned.goal for move in self.moves if move.planned.at_stop]
 
     @property
     def joins(self) -> float:

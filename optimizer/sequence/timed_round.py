@@ -53,6 +53,8 @@ class TimedSearch:
         self.time = duration - self.asked.dwelling
         self.longest = _longest_move(self.time)
         self.exact = True
+        # moves after which it may wait
+        self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.wait in (None, move.goal)]
         self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
 
     def run(self, nodes: list[int]) -> Timed:
@@ -112,7 +114,7 @@ class TimedSearch:
         if fast is None or duration_of(fast) > self.time:
             return None
         pairs, end = list(self.search.pairs(nodes)), self.search.search_end
-        waiting = min(float(self._powers(k)[g]) for k, _, g in pairs)
+        waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
         try:
             shared = TimeSharing(self.legs, pairs, guesses, self.longest, end).fill(self.time, waiting, fast)
         except NoTrajectory:
@@ -122,19 +124,20 @@ class TimedSearch:
 
     def cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
         """The move after which a wait [s] draws least, and its energy [J] beside the dwell there."""
-        energies = [self._wait_energy(nodes, k, waited) for k in range(len(self.legs))]
-        return int(np.argmin(energies)), min(energies)
+        energies = {k: self._wait_energy(nodes, k, waited) for k in self.places}
+        at = min(energies, key=energies.__getitem__)
+        return at, energies[at]
 
     def _wait_energy(self, nodes: list[int], move: int, waited: float) -> float:
         """Energy [J] of a wait beside the dwell after a move."""
         if waited <= 0:
             return 0.0
-        node, dwell = nodes[move + 1], self.asked.moves[move].dwell
-        hold = float(holding_powers(self.asked, move, self.legs[move].goal)[node])
-        return rest_energy(self.asked, move, dwell + waited, hold) - float(self.legs[move].dwell[node])
+        node, leg, planned = nodes[move + 1], self.legs[move], self.asked.moves[move]
+        hold = float(holding_powers(planned, leg.goal)[node])
+        return rest_energy(self.asked, planned, planned.dwell + waited, hold) - float(leg.dwell[node])
 
     def _powers(self, move: int) -> Array:
-        return long_wait_powers(self.asked, move, self.legs[move].goal)
+        return long_wait_powers(self.asked, self.asked.moves[move], self.legs[move].goal)
 
     def bound(self, price: float, ours: float) -> float:
         """Lower bound [J] on all rounds in the time that is asked for, by a price [W] of time: not above what we found,
@@ -147,7 +150,9 @@ class TimedSearch:
             return -np.inf
         # neither a wait on motors nor one on brakes may gain by the price
         powers = [
-            f(self.asked, k, leg.goal) for k, leg in enumerate(self.legs) for f in (holding_powers, long_wait_powers)
+            power
+            for move, leg in zip(self.asked.moves, self.legs, strict=True)
+            for power in (holding_powers(move, leg.goal), long_wait_powers(self.asked, move, leg.goal))
         ]
         price = max(price, -min(float(each.min()) for each in powers))
         longest = self._longest_below(ours)

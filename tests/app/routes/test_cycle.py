@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
@@ -243,3 +245,40 @@ def test_a_line_that_no_configuration_follows_says_how_far_each_gets(client: Tes
     assert (reply.status_code, problem["type"]) == (422, "/problems/path-infeasible")
     assert problem["path"] == "stops/pick/retreat" and problem["length"] == pytest.approx(1.8)
     assert len(problem["attempts"]) == 8 and all(0 < each["followed"] < 1 for each in problem["attempts"])
+
+
+def test_a_free_order_is_told(client: TestClient) -> None:
+    content = a_round(order="free", together=[["pick", "place"]])
+    content["stops"].append({"name": "look", "target": down(0.3, 0.3, 0.4)})
+    reply = client.post("/cycle", json=content)
+    assert reply.status_code == 200, reply.text
+    order = CycleResponse.model_validate_json(reply.content).order
+    assert sorted(order) == ["look", "pick", "place"] and order.index("place") == order.index("pick") + 1
+
+
+@pytest.mark.parametrize(
+    ("fields", "loc"),
+    [
+        ({"before": [["pick", "place"]]}, ["body"]),
+        ({"order": "free", "before": [["pick", "nowhere"]]}, ["body", "before", 0]),
+        ({"order": "free"}, ["body", "together"]),
+        ({"wait": "nowhere"}, ["body", "wait"]),
+    ],
+)
+def test_an_order_that_cannot_be_names_its_field(client: TestClient, fields: dict[str, Any], loc: list[Any]) -> None:
+    reply = client.post("/cycle", json=a_round(**fields))
+    assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == loc
+
+
+def test_the_round_as_a_table(client: TestClient, answer: dict[str, Any]) -> None:
+    reply = client.post("/cycle", json=a_round(), headers={"Accept": "text/csv"})
+    assert reply.status_code == 200 and reply.headers["content-type"].startswith("text/csv")
+    rows = list(csv.DictReader(reply.text.splitlines()))
+    times, power = (np.array([float(row[name]) for row in rows]) for name in ("t", "power"))
+    assert (np.diff(times) >= 0).all() and times[-1] == pytest.approx(answer["duration"])
+    # the trapezoidal rule over samples of 8 ms
+    assert np.trapezoid(power, times) == pytest.approx(answer["energy"]["electrical"]["total"], rel=5e-3)
+    assert [float(rows[-1][f"q{k + 1}"]) for k in range(6)] == pytest.approx(HOME)
+    assert {(row["leg"], row["kind"]) for row in rows} == {
+        (str(k), leg["kind"]) for k, leg in enumerate(answer["legs"])
+    }

@@ -65,7 +65,7 @@ def test_the_tool_comes_and_leaves_straight() -> None:
 def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
     asked = one_stop()
     found = optimize_round(asked)
-    layers, energies = layers_of(asked), []
+    layers, energies = list(layers_of(asked).values()), []
     assert [layer.name for layer in layers] == [
         "start",
         "stops/stop 0/approach",

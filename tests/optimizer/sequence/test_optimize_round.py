@@ -81,7 +81,7 @@ def test_it_is_the_least_of_all_chains(seed: int) -> None:
     asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
     found = optimize_round(asked)
     assert_true(asked, found)
-    layers = [layer.q for layer in layers_of(asked)]
+    layers = [layer.q for layer in list(layers_of(asked).values())]
     goals = [*layers[1:], layers[0]]
     known = {
         (k, a, b): energy_of(asked, k, layers[k][a], goals[k][b])
@@ -151,7 +151,7 @@ def test_a_start_that_is_a_pose_is_come_back_to_in_the_same_configuration() -> N
     asked = WorkRound(arm=Arm(robot=ROBOT, collisions=False), start=first, stops=stops, windings=False, deadline=AMPLE)
     found = optimize_round(asked)
     assert_true(asked, found)
-    for start in layers_of(asked)[0].q:
+    for start in layers_of(asked)["start"].q:
         fixed = optimize_round(replace(asked, start=start))
         assert found.energy.electrical.total <= fixed.energy.electrical.total * (1 + CONVERGED)
         assert found.lower_bound <= fixed.lower_bound * (1 + ROUNDING)
@@ -183,7 +183,7 @@ def test_a_redundant_arm_goes_round_with_a_bound_that_covers_all_postures(others
     assert_true(asked, found)
     assert found.status == "feasible"
     assert found.lower_bound > 0.3 * found.energy.electrical.total
-    rng, layers = np.random.default_rng(5), layers_of(asked)[1:]
+    rng, layers = np.random.default_rng(5), list(layers_of(asked).values())[1:]
     postures = [q, *([_member(layer.ends, rng) for layer in layers] for _ in range(others))]
     for chosen in postures:
         given = replace(asked, stops=[replace(stop, target=each) for stop, each in zip(stops, chosen, strict=True)])
@@ -273,3 +273,32 @@ def test_joint_positions_out_of_range_name_the_stop_and_the_joint() -> None:
     with pytest.raises(OutsideLimits) as refusal:
         replace(pick_and_place(1, 2), stops=[Stop(name="a", target=HOME + 7.0)])
     assert refusal.value.field == "stops.0.target.q" and refusal.value.joint == ROBOT.joint_names[0]
+
+
+def test_moves_into_a_stop_keep_its_limits() -> None:
+    asked = pick_and_place(1, 2, windings=False)
+    slow = replace(ROBOT.limits, v_max=np.full(6, 0.8), a_max=ROBOT.limits.a_max / 2)
+    stops = [replace(asked.stops[0], limits=slow, tcp_speed=0.3), asked.stops[1]]
+    limited = replace(asked, stops=stops)
+    found, free = optimize_round(limited), optimize_round(asked)
+    assert_true(limited, found)
+    into, onward = (move.solution.trajectory for move in found.moves[:2])
+    assert np.abs(into.v).max() <= 0.8 * (1 + 1e-6) < np.abs(onward.v).max()
+    assert found.moves[0].solution.certificate.worst_ratio["tcp_speed"] <= 1 + 1e-6
+    assert found.energy.electrical.total >= free.energy.electrical.total * (1 - CONVERGED)
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"limits": replace(ROBOT.limits, v_max=10 * ROBOT.limits.v_max)}, "stops.0.limits.velocity"),
+        ({"tcp_speed": -1.0}, "stops.0.limits.tcp_speed"),
+        ({"elbow_speed": np.nan}, "stops.0.limits.elbow_speed"),
+    ],
+    ids=["too fast", "backwards", "none"],
+)
+def test_wrong_limits_of_a_stop_name_their_field(given: dict[str, Any], field: str) -> None:
+    asked = pick_and_place(1, 1)
+    with pytest.raises(InvalidProblem) as refusal:
+        replace(asked, stops=[replace(asked.stops[0], **given)])
+    assert refusal.value.field == field

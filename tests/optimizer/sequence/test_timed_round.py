@@ -164,7 +164,7 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
     asked = replace(asked, stops=[replace(stop, branch=only, dwell=0.0) for stop in asked.stops])
     duration = 1.4 * optimize_round(asked).duration
     found = optimize_round(in_time(asked, duration))
-    rng, layers = np.random.default_rng(seed), layers_of(asked)
+    rng, layers = np.random.default_rng(seed), list(layers_of(asked).values())
     for _ in range(4):
         chain = [HOME, *(layer.q[rng.integers(len(layer.q))] for layer in layers[1:]), HOME]
         shares = np.diff([0.0, *np.sort(rng.uniform(0.2, 0.8, 2)), 1.0]) * duration
@@ -229,3 +229,17 @@ def test_a_wrong_time_names_its_field(given: dict[str, Any]) -> None:
     with pytest.raises(InvalidProblem) as refusal:
         replace(ASKED, **given)
     assert refusal.value.field.startswith("time")
+
+
+@pytest.mark.parametrize("place", ["start", "stop 1"])
+def test_it_waits_where_it_is_told_to(place: str) -> None:
+    asked = in_time(replace(ASKED, hold="brakes", brake_power=1.0, wait=place), 2.0 * free().duration)
+    found = optimize_round(asked)
+    assert_true(asked, found)
+    assert [move.planned.goal for move in found.moves if move.wait > 0] == [place]
+
+
+def test_a_place_to_wait_must_be_one() -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        replace(ASKED, wait="nowhere")
+    assert refusal.value.field == "wait"

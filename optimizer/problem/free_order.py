@@ -1,0 +1,104 @@
+"""A free order of the stops of a round, and what restricts it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
+
+import numpy as np
+
+from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arm import Payload
+from optimizer.problem.stops import Stop
+
+# stops of a round with a free order: the search visits every subset of them
+MOST_FREE_STOPS = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeOrder:
+    """The stops may be visited in any order that has the first stop of each pair of `before` earlier than the second,
+    and the stops of each list of `together` one directly after the other, as they are listed."""
+
+    before: Sequence[tuple[str, str]] = ()
+    together: Sequence[Sequence[str]] = ()
+
+
+def groups_of(order: FreeOrder, stops: Sequence[Stop]) -> list[list[Stop]]:
+    """The stops in groups that stay together, in the order in which their first stops are given."""
+    by_name = {stop.name: stop for stop in stops}
+    listed = {name: list(names) for names in order.together for name in names}
+    groups = list[list[Stop]]()
+    for stop in stops:
+        names = listed.get(stop.name, [stop.name])
+        if stop.name == names[0]:
+            groups.append([by_name[name] for name in names])
+    return groups
+
+
+def earlier_groups(order: FreeOrder, groups: Sequence[Sequence[Stop]]) -> list[set[int]]:
+    """For each group the numbers of those that come before it."""
+    number = {stop.name: k for k, group in enumerate(groups) for stop in group}
+    earlier = [set[int]() for _ in groups]
+    for first, second in order.before:
+        if number[first] != number[second]:
+            earlier[number[second]].add(number[first])
+    return earlier
+
+
+def is_given_order_allowed(order: FreeOrder, stops: Sequence[Stop]) -> bool:
+    """Whether the stops may be visited in the order in which they are given."""
+    place = {stop.name: k for k, stop in enumerate(stops)}
+    listed = all(place[b] == place[a] + 1 for names in order.together for a, b in pairwise(names))
+    return listed and all(place[a] < place[b] for a, b in order.before)
+
+
+def check_order(order: FreeOrder, stops: Sequence[Stop], carried: Payload) -> None:
+    """Raises InvalidProblem, with the field named, if an order contradicts itself or does not fit the stops.
+
+    `carried` is what the arm carries at the start.
+    """
+    if len(stops) > MOST_FREE_STOPS:
+        raise InvalidProblem("stops", f"A round with a free order has at most {MOST_FREE_STOPS} stops.")
+    known = [stop.name for stop in stops]
+    for field, lists in (("before", order.before), ("together", order.together)):
+        for k, names in enumerate(lists):
+            unknown = next((name for name in names if name not in known), None)
+            if unknown is not None:
+                raise InvalidProblem(f"{field}.{k}", f"There is no stop named {unknown!r}.")
+            if len(names) < 2 or len(set(names)) < len(names):
+                raise InvalidProblem(f"{field}.{k}", "Give at least two stops, each of them once.")
+    together = [name for names in order.together for name in names]
+    if len(set(together)) < len(together):
+        raise InvalidProblem("together", "A stop can be in one list only.")
+    _check_before(order, stops)
+    for group in groups_of(order, stops):
+        after = [stop.payload for stop in group if stop.payload is not None]
+        if after and not _same(after[-1], carried):
+            raise InvalidProblem(
+                "together",
+                f"After {group[-1].name} the arm carries something else than at the start. With a free order, name the "
+                "stops between which a part is carried together: the one where it is taken up first.",
+            )
+
+
+def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
+    groups = groups_of(order, stops)
+    for k, (first, second) in enumerate(order.before):
+        for group in groups:
+            names = [stop.name for stop in group]
+            if first in names and second in names and names.index(first) > names.index(second):
+                raise InvalidProblem(f"before.{k}", f"By together {second} comes before {first}.")
+    try:
+        TopologicalSorter(dict(enumerate(earlier_groups(order, groups)))).prepare()
+    except CycleError as error:
+        circle = " before ".join(groups[k][0].name for k in error.args[1][::-1])
+        raise InvalidProblem("before", f"No order is possible: {circle}.") from None
+
+
+def _same(one: Payload, other: Payload) -> bool:
+    """Whether two payloads are the same."""
+    bodies = ((each.mass, each.com, each.inertia) for each in (one, other))
+    return one.shape is other.shape and all(np.array_equal(a, b) for a, b in zip(*bodies, strict=True))

@@ -1,0 +1,136 @@
+"""The best order of the stops of a round: a tour of least energy over groups of stops, by dynamic programming.
+
+Between two groups the arm carries the same whatever their order, so the cost of a move depends on its two ends alone. A
+tour is extended by one group at a time, from every subset of the groups and every configuration in which the last one
+is left (Held and Karp, "A dynamic programming approach to sequencing problems", 1962). As in `LazySearch`, moves weigh
+their proven bounds first; those of the least tour are solved, until no tour has a bound below it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.deadline import Clock, DeadlinePassed, watch
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
+from optimizer.problem.free_order import earlier_groups, groups_of
+from optimizer.problem.stops import PlannedMove, Stop, moves_over
+from optimizer.problem.work_round import START, WorkRound
+from optimizer.sequence.chains import LeastChain
+from optimizer.sequence.proven_bound import bounded_costs
+from optimizer.sequence.round_search import RoundSearch
+from optimizer.sequence.tours import Tours
+
+# share of the deadline that the search for the order may take
+SHARE = 0.5
+# configurations in which the groups are left: every subset of the groups weighs each of them
+MOST_NODES = 2000
+
+
+class OrderSearch:
+    """The search for the order of the stops of a round; `bound` [J] holds for every order once it has `run`.
+
+    `exact`: no other order can be better.
+    """
+
+    def __init__(self, asked: WorkRound, clock: Clock) -> None:
+        assert asked.order is not None
+        self.asked, self.order = asked, asked.order
+        self.groups = groups_of(asked.order, asked.stops)
+        self.moves, self.blocks = _all_moves(asked, self.groups)
+        self.search = RoundSearch(replace(asked, deadline=SHARE * asked.deadline), clock, self.moves)
+        self.exact, self.bound = True, -np.inf
+        count = sum(len(self.search.legs[self.blocks[None, k][-1]].goal.q) for k in range(len(self.groups)))
+        if count > MOST_NODES:
+            raise InvalidProblem(
+                "order",
+                f"There are {count} arm configurations at the stops, of at most {MOST_NODES} with a free order: set "
+                "`windings` false, or give a `branch`.",
+            )
+
+    def run(self) -> WorkRound:
+        """The round with its stops in the best order. Raises NoTrajectory if there is none, or DeadlineExceeded."""
+        search = self.search
+        try:
+            with watch(search.end):
+                legs = zip(self.moves, search.legs, strict=True)
+                self.bound = self._tours([bounded_costs(self.asked, *leg, search.end) for leg in legs]).least()[0]
+                groups = self._explored()
+        except DeadlinePassed:
+            raise DeadlineExceeded([]) from None
+        stops = [stop for k in groups for stop in self.groups[k]]
+        return replace(self.asked, stops=stops, order=None)
+
+    def _explored(self) -> list[int]:
+        """The groups of the least tour, in their order, all of its moves solved; once the time is up, not all."""
+        search = self.search
+        while True:
+            value, groups, ends = self._tours([leg.cost for leg in search.legs]).least()
+            if not np.isfinite(value):
+                raise DeadlineExceeded([]) if search.cut_short else NoTrajectory([])
+            open_ = [each for each in self._moves_of(groups, ends) if not search.legs[each[0]].known(*each[1:])]
+            if not open_ or search.search_end.passed:
+                self.exact = not (open_ or search.failed or search.cut_short)
+                return groups
+            for each in open_:
+                search.try_kind(*each)
+
+    def _tours(self, costs: list[Array]) -> Tours:
+        blocks = {key: _product([costs[k] for k in legs]) for key, legs in self.blocks.items()}
+        return Tours(blocks, earlier_groups(self.order, self.groups), self.asked.closed)
+
+    def _moves_of(self, groups: list[int], ends: list[int]) -> list[tuple[int, int, int]]:
+        """Leg, start node and goal node of each move of a tour, which leaves the start and the groups by the nodes
+        `ends`, and comes to the last of these."""
+        places: list[int | None] = [None, *groups, *([None] if self.asked.closed else [])]
+        found = list[tuple[int, int, int]]()
+        for k, (first, last) in enumerate(pairwise(places)):
+            legs = self.blocks[first, last]
+            costs = [self.search.legs[leg].cost for leg in legs]
+            costs = [costs[0][ends[k] : ends[k] + 1], *costs[1:]]
+            costs[-1] = costs[-1][:, ends[k + 1] : ends[k + 1] + 1]
+            nodes = LeastChain(costs, False).find()[1]
+            inner = [ends[k], *nodes[1:-1], ends[k + 1]]
+            found += [(leg, inner[n], inner[n + 1]) for n, leg in enumerate(legs)]
+        return found
+
+
+def _all_moves(
+    asked: WorkRound, groups: list[list[Stop]]
+) -> tuple[list[PlannedMove], dict[tuple[int | None, int | None], list[int]]]:
+    """Every move that some order has; and their numbers from the exit of a group, None for the start, to that of
+    another one."""
+    moves = list[PlannedMove]()
+    blocks: dict[tuple[int | None, int | None], list[int]] = {}
+    inside, exits = list[list[int]](), list[str]()
+    for group in groups:
+        own, arm, place = list[PlannedMove](), asked.arm, START
+        for stop in group:
+            after = arm if stop.payload is None else replace(arm, payload=stop.payload)
+            own += moves_over(stop, place, arm, after)
+            arm, place = after, own[-1].goal
+        inside.append(list(range(len(moves), len(moves) + len(own))))
+        exits.append(place)
+        moves += own
+    for to, own_moves in enumerate(inside):
+        blocks[None, to] = own_moves
+        for origin, exit_ in enumerate(exits):
+            if origin != to:
+                blocks[origin, to] = [len(moves), *own_moves[1:]]
+                moves.append(replace(moves[own_moves[0]], start=exit_))
+    if asked.closed:
+        for origin, exit_ in enumerate(exits):
+            blocks[origin, None] = [len(moves)]
+            moves.append(PlannedMove(exit_, START, asked.arm, asked.arm))
+    return moves, blocks
+
+
+def _product(costs: list[Array]) -> Array:
+    """The least cost (n_0, n_m) [J] over all chains from a first to a last node, through legs (n_k, n_k+1)."""
+    total = costs[0]
+    for cost in costs[1:]:
+        total = np.stack([(row[:, None] + cost).min(axis=0) for row in total])
+    return total

@@ -1,0 +1,172 @@
+"""Rounds whose order is free: the best order of all, and what restricts it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, permutations
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.robot import Array
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from optimizer.optimize_round import optimize_round
+from optimizer.problem.free_order import FreeOrder
+from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.tours import Tours
+from tests.optimizer.clocks import CountingClock
+from tests.optimizer.sequence.rounds import pick_and_place
+from tests.optimizer.sequence.test_lines import with_lines
+from tests.optimizer.sequence.test_optimize_round import assert_true
+from tests.selection import long_but
+
+ROUNDING = 1e-9
+# relative: optima that are reached in searches of their own
+CONVERGED = 2e-3
+
+
+def inspection(seed: int, count: int, **given: Any) -> WorkRound:
+    """A round at which nothing is carried, in a free order."""
+    asked = pick_and_place(seed, count, windings=False)
+    stops = [replace(stop, payload=None) for stop in asked.stops]
+    return replace(asked, stops=stops, **{"order": FreeOrder()} | given)
+
+
+def energies(asked: WorkRound) -> dict[tuple[str, ...], float]:
+    """Energy [J] of the best round in every order."""
+    return {
+        tuple(stop.name for stop in order): optimize_round(
+            replace(asked, stops=order, order=None)
+        ).energy.electrical.total
+        for order in permutations(asked.stops)
+    }
+
+
+@pytest.mark.parametrize(
+    ("seed", "count", "closed"), long_but([(1, 3, True)], [(1, 3, True), (0, 4, True), (2, 4, False)])
+)
+def test_it_is_the_best_of_all_orders(seed: int, count: int, closed: bool) -> None:
+    asked = inspection(seed, count, closed=closed)
+    found, all_ = optimize_round(asked), energies(asked)
+    assert_true(replace(asked, stops=_in(asked, found.order)), found)
+    assert found.status == "optimal"
+    assert found.energy.electrical.total == pytest.approx(min(all_.values()), rel=CONVERGED)
+    assert found.lower_bound <= min(all_.values())
+    given = [each for each in found.baselines if each.name == "given_order"]
+    first = tuple(stop.name for stop in asked.stops)
+    assert bool(given) == (tuple(found.order) != first)
+    assert all(
+        each.electrical == pytest.approx(all_[first], rel=CONVERGED) and each.saving > -CONVERGED for each in given
+    )
+
+
+def _in(asked: WorkRound, order: list[str]) -> list[Any]:
+    by_name = {stop.name: stop for stop in asked.stops}
+    return [by_name[name] for name in order]
+
+
+@pytest.mark.long
+def test_what_comes_before_and_together_is_kept() -> None:
+    free = optimize_round(inspection(0, 4)).order
+    first, last = free[-1], free[0]
+    asked = inspection(0, 4, order=FreeOrder(before=[(first, last)], together=[(free[2], free[0])]))
+    found = optimize_round(asked)
+    assert found.order.index(first) < found.order.index(last)
+    assert found.order.index(free[0]) == found.order.index(free[2]) + 1
+    assert found.energy.electrical.total >= optimize_round(inspection(0, 4)).energy.electrical.total * (1 - CONVERGED)
+
+
+@pytest.mark.parametrize("lines", long_but([False], [False, True]))
+def test_parts_are_carried_from_pick_to_place_whatever_the_order(lines: bool) -> None:
+    asked = pick_and_place(0, 4, windings=False)
+    asked = with_lines(asked) if lines else asked
+    pairs = [("stop 0", "stop 1"), ("stop 2", "stop 3")]
+    found = optimize_round(replace(asked, order=FreeOrder(together=pairs)))
+    assert [found.order.index(b) - found.order.index(a) for a, b in pairs] == [1, 1]
+    carried = {move.planned.start: move.planned.arm.payload.mass for move in found.moves}
+    after = {name: carried[f"{name}/retreat" if lines else name] for name in found.order}
+    assert after == {"stop 0": 2.0, "stop 1": 0.0, "stop 2": 2.0, "stop 3": 0.0}
+    assert found.status == "optimal" and found.joins < ROUNDING
+
+
+@pytest.mark.long
+def test_twelve_stops() -> None:
+    found = optimize_round(inspection(3, 12, order=FreeOrder(before=[("stop 3", "stop 1")])))
+    assert len(set(found.order)) == 12 and found.order.index("stop 3") < found.order.index("stop 1")
+    assert found.status == "optimal" and all(move.solution.certificate.valid for move in found.moves)
+
+
+@pytest.mark.parametrize("readings", long_but([2000], [200, 2000, 5000]))
+def test_a_deadline_gives_a_round_or_says_so(readings: int) -> None:
+    try:
+        found = optimize_round(inspection(1, 4, deadline=float(readings)), clock=CountingClock())
+    except DeadlineExceeded:
+        return
+    assert sorted(found.order) == [f"stop {k}" for k in range(4)]
+    assert all(move.solution.certificate.valid for move in found.moves)
+
+
+@pytest.mark.parametrize(
+    ("order", "field", "word"),
+    [
+        ({"before": [("stop 0", "nowhere")]}, "before.0", "nowhere"),
+        ({"together": [("stop 0", "stop 1"), ("stop 1", "stop 2")]}, "together", "one list"),
+        ({"together": [("stop 1",)]}, "together.0", "two"),
+        ({"before": [("stop 1", "stop 1")]}, "before.0", "two"),
+        ({"before": [("stop 0", "stop 1"), ("stop 1", "stop 2"), ("stop 2", "stop 0")]}, "before", "stop 2"),
+        ({"before": [("stop 1", "stop 0")], "together": [("stop 0", "stop 1")]}, "before.0", "together"),
+        (
+            {"before": [("stop 0", "stop 2"), ("stop 2", "stop 1")], "together": [("stop 0", "stop 1")]},
+            "before",
+            "stop 2",
+        ),
+    ],
+    ids=str,
+)
+def test_a_contradictory_order_names_its_field(order: dict[str, Any], field: str, word: str) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        inspection(0, 3, order=FreeOrder(**order))
+    assert refusal.value.field == field and word in str(refusal.value)
+
+
+def test_a_part_that_is_not_put_down_is_no_free_order() -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        replace(pick_and_place(0, 4), order=FreeOrder())
+    assert refusal.value.field == "together"
+
+
+def test_thirteen_stops_are_too_many() -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        inspection(0, 13)
+    assert refusal.value.field == "stops"
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("seed", range(20))
+def test_the_least_tour_is_that_of_all_tours(seed: int, closed: bool) -> None:
+    """Random costs, some of them infinite, some groups before others; every tour through every node as the peer."""
+    rng = np.random.default_rng(seed)
+    sizes = {None: int(rng.integers(1, 3))} | {k: int(rng.integers(1, 4)) for k in range(4)}
+    blocks: dict[Any, Array] = {
+        (a, b): np.where(rng.random((sizes[a], sizes[b])) < 0.2, np.inf, rng.uniform(1, 9, (sizes[a], sizes[b])))
+        for a in sizes
+        for b in sizes
+        if a != b
+    }
+    earlier: list[set[int]] = [set(), set(), {0}, set()] if seed % 2 else [set()] * 4
+    value, groups, ends = Tours(blocks, earlier, closed).least()
+    least = np.inf
+    for order in permutations(range(4)):
+        if any(order.index(first) > order.index(k) for k, before in enumerate(earlier) for first in before):
+            continue
+        for start in range(sizes[None]):
+            total = np.where(np.arange(sizes[None]) == start, 0.0, np.inf)
+            for a, b in pairwise([None, *order]):
+                total = (total[:, None] + blocks[a, b]).min(axis=0)
+            least = min(least, float((total + (blocks[order[-1], None][:, start] if closed else 0.0)).min()))
+    assert value == pytest.approx(least)
+    if np.isfinite(value):
+        places = [None, *groups, *([None] if closed else [])]
+        own = sum(blocks[a, b][ends[k], ends[k + 1]] for k, (a, b) in enumerate(pairwise(places)))
+        assert own == pytest.approx(value)
