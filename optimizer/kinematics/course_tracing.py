@@ -37,7 +37,7 @@ CONTROL_POINTS, SHARE = (12, 20, 36, 60, 100, 160), 0.1
 # points per step at which the fit is checked
 CHECKED = 2
 
-Obstacle = Literal["unreachable", "singular", "outside_limits", "too_curved"]
+Obstacle = Literal["unreachable", "singular"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,12 +113,7 @@ def joint_path(arm: Arm, course: ToolCourse, trace: Trace) -> Spline | None:
 
 def path_ratios(arm: Arm, course: ToolCourse, q: Array) -> dict[str, float]:
     """The worst deviations of configurations q (k, nq) [rad] from a course, over their tolerances."""
-    return ratios_of(course, tcp_pose(arm, q))
-
-
-def ratios_of(course: ToolCourse, T: Array) -> dict[str, float]:
-    """The worst deviations of poses T (k, 4, 4) of the TCP from a course, over their tolerances."""
-    position, rotation = course.deviation(T)
+    position, rotation = course.deviation(tcp_pose(arm, q))
     return {
         "path_position": float(position.max()) / course.path.position_tolerance,
         "path_rotation": float(rotation.max()) / course.path.rotation_tolerance,

@@ -38,7 +38,7 @@ from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline, lasting, least_time_scale, spline_of
 
 # control values of the time scaling, and how many more control points than the path the motion has, up to a number
-SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 200
+SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 72
 # instants per control point at which the motion is fitted to the path, and points per knot span that bound the rates
 FITTED, RATE_POINTS = 3, 4
 # first durations tried, in multiples of the shortest one of the quintic time scaling
@@ -70,14 +70,15 @@ class RetimingState:
 class PathRetiming:
     """Time scalings of `path`, a spline over [0, 1], in an interval of durations.
 
-    The motion has `more` control points than the path.
+    The motions have so many control `points`; unless given, some more than the path.
     """
 
     def __init__(
-        self, prepared: PreparedProblem, path: Spline, interval: DurationInterval, more: int = MORE_POINTS
+        self, prepared: PreparedProblem, path: Spline, interval: DurationInterval, points: int | None = None
     ) -> None:
         self.prepared, self.path, self.interval = prepared, path, interval
-        self.space = bspline.uniform(min(len(path.control_points) + more, MOST_POINTS))
+        count = min(len(path.control_points) + MORE_POINTS, MOST_POINTS) if points is None else points
+        self.space = bspline.uniform(count)
         self.scaling = bspline.uniform(SCALING_POINTS)
         at = np.linspace(0.0, 1.0, FITTED * self.space.n)
         self._instants = self.scaling.matrix(at)

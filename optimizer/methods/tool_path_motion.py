@@ -15,7 +15,7 @@ from optimizer.methods.sqp_method import with_effort
 from optimizer.trajectories.spline import Spline, sample
 
 # control points that the motion has more than the path, until it keeps to this
-MORE_POINTS = (12, 40, 100)
+MORE_POINTS = (12, 60)
 # instants at which this is checked
 CHECKED = 2000
 NOT_KEPT = "found no motion within the path's tolerance: give a larger one, or a larger path.blend"
@@ -59,7 +59,7 @@ class ToolPathMotion(Method):
         assert self.prepared.course is not None
         results = list[SolveResult]()
         for more in MORE_POINTS:
-            results.append(PathRetiming(self.prepared, path, interval, more).solve())
+            results.append(PathRetiming(self.prepared, path, interval, len(path.control_points) + more).solve())
             found = results[-1].spline
             if found is None:
                 break

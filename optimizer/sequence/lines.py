@@ -36,7 +36,7 @@ def layers_with_lines(asked: WorkRound, stop: Stop, at: Layer) -> list[Layer]:
             continue
         found = _traces(asked, line, sign, at.ends)
         outer = _outer(asked, at, stop.name + suffix, found)
-        attempts, follows = _followed(asked, at, outer, found)
+        attempts, follows = _followed(asked, stop, at, outer, found)
         if not (kept & follows).any():
             raise PathInfeasible(line.distance, attempts, outer.name)
         layers[stop.name + suffix] = outer
@@ -72,13 +72,15 @@ def _outer(asked: WorkRound, at: Layer, place: str, found: list[Trace]) -> Layer
     return replace(at, name=f"stops/{place}", ends=ends, q=at.q + moved, complete=at.complete and not at.sampled)
 
 
-def _followed(asked: WorkRound, at: Layer, outer: Layer, found: list[Trace]) -> tuple[list[PathAttempt], Mask]:
+def _followed(
+    asked: WorkRound, stop: Stop, at: Layer, outer: Layer, found: list[Trace]
+) -> tuple[list[PathAttempt], Mask]:
     """What stops the line of each configuration, and the nodes (n,) that lead along all of it."""
     limits, place = asked.arm.active_limits, outer.name.removeprefix("stops/")
     reach = np.array([[(trace.q - trace.q[0]).min(axis=0), (trace.q - trace.q[0]).max(axis=0)] for trace in found])
     low, high = at.q + reach[at.end, 0], at.q + reach[at.end, 1]
     inside = ((low >= limits.q_min) & (high <= limits.q_max)).all(axis=1)
-    blocked = _blocked(asked, place, np.array([end.q for end in outer.ends]))
+    blocked = _blocked(asked, stop, place, np.array([end.q for end in outer.ends]))
     whole = np.array([trace.obstacle is None for trace in found])
     attempts = [
         PathAttempt(end.label, trace.followed, trace.obstacle or ("in_collision" if hit else "outside_limits"))
@@ -87,12 +89,11 @@ def _followed(asked: WorkRound, at: Layer, outer: Layer, found: list[Trace]) -> 
     return attempts, inside & (whole & ~blocked)[at.end]
 
 
-def _blocked(asked: WorkRound, place: str, q: Array) -> Mask:
-    """Which of the configurations q (n, nq) the arm cannot rest in at a place."""
-    arms = {id(arm): arm for move in asked.moves if place in (move.start, move.goal) for arm in (move.arm,)}
-    ruled = [
-        check_configurations(PreparedProblem.of(Problem(arm=arm, start=q[0], goal=q[0])), q) for arm in arms.values()
-    ]
+def _blocked(asked: WorkRound, stop: Stop, place: str, q: Array) -> Mask:
+    """Which of the configurations q (n, nq) the arm cannot rest in at a place of a stop."""
+    arms = {id(move.arm): move.arm for move in asked.moves if place in (move.start, move.goal)}
+    problems = [Problem(arm=arm, start=stop.target, goal=stop.target) for arm in arms.values()]
+    ruled = [check_configurations(PreparedProblem.of(problem), q) for problem in problems]
     return np.array([any(cause is not None for cause in causes) for causes in zip(*ruled, strict=True)])
 
 

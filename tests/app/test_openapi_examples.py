@@ -79,8 +79,13 @@ def test_every_body_has_an_example() -> None:
         assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
 
 
-# a front of dozens of durations, and a round among obstacles with a path for each of dozens of legs
-SLOW = ("post /pareto application/json branch_switch", "post /cycle application/json pick_and_place")
+# a front of dozens of durations, all methods, and rounds in a given time or among obstacles
+SLOW = (
+    "post /pareto application/json branch_switch",
+    "post /compare application/json all_methods",
+    "post /cycle application/json pick_and_place",
+    "post /cycle application/json press_tending",
+)
 
 
 @pytest.fixture

@@ -61,7 +61,7 @@ def test_answers_are_true(name: str, method: str) -> None:
 @pytest.mark.parametrize(
     ("name", "method"),
     long_but(
-        [("as it comes", "bspline"), *((name, "time_scaling") for name in ("weak", "half recovered"))],
+        [("as it comes", "bspline"), *((name, "time_scaling") for name in ("half recovered",))],
         product(CONDITIONS, ("bspline", "time_scaling")),
     ),
 )

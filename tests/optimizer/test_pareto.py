@@ -243,8 +243,9 @@ def test_the_front_ends_where_optimize_ends(seed: int, kind: str) -> None:
 
 @pytest.mark.parametrize(
     "extra",
-    [{"limits": limits(tau_max=[45.0, 45.0, 45.0, 20.0, 20.0, 20.0])}, pytest.param({}, marks=pytest.mark.long)],
+    [{"limits": limits(tau_max=[45.0, 45.0, 45.0, 20.0, 20.0, 20.0])}, {}],
 )
+@pytest.mark.long
 def test_moves_that_had_no_front_or_a_better_one(extra: dict[str, Any]) -> None:
     """Weak motors, which left no front; and the move whose front ended 0.34 % below the answer."""
     asked = problem(HOME, np.array([1.2, -0.9, 1.3, -1.9, -1.57, 0.4]), collisions=True, **extra)

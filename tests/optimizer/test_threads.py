@@ -27,7 +27,6 @@ QUICK = (
     "replay with storage",
     "replayed log",
     "inverse kinematics 1",
-    "certificate 1",
 )
 SLOW = (
     "post",

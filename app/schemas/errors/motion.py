@@ -171,7 +171,7 @@ class PathAttempt(Response):
     """How far the path can be followed from one arm configuration."""
 
     label: str = described("Branch: shoulder/elbow/wrist.", None, LABEL)
-    followed: float = described("Share of the path that is followed.", "1", 0.62)
+    followed: float = described("Share of the path that is followed; of a line of a stop, from the stop.", "1", 0.62)
     reason: Literal["unreachable", "singular", "outside_limits", "in_collision", "other_goal"] = described(
         "What ends it: the next pose is out of reach; a joint would have to jump, at a singularity; a joint leaves its "
         "range; the arm collides at the end; the path ends at other joint positions than those of `goal`.",

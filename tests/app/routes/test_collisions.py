@@ -248,7 +248,8 @@ def test_refused_fields(client: TestClient, fields: dict[str, Any], where: list[
         assert errors[0]["loc"][: len(where)] == where
 
 
-@pytest.mark.parametrize("methods", long_but([FAST[:3]], [FAST[:3], [*FAST, "polynomial_ga"]]))
+@pytest.mark.long
+@pytest.mark.parametrize("methods", [FAST[:3], [*FAST, "polynomial_ga"]])
 def test_compare_and_pareto_keep_clear_too(client: TestClient, methods: list[str]) -> None:
     """Also the methods whose straight line hits the post."""
     request = EXAMPLES["over_a_post"]

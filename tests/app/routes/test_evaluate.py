@@ -107,6 +107,7 @@ def test_answers_a_table(client: TestClient) -> None:
     assert float(rows[0]["per_joint.copper.2"]) == content["segments"][0]["energy"]["per_joint"]["copper"][1]
 
 
+@pytest.mark.long
 def test_takes_a_hundred_thousand_rows(client: TestClient) -> None:
     answer = upload(client, log_of(100_000))
     assert answer.status_code == 200, answer.text

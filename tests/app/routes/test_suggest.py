@@ -119,6 +119,7 @@ def test_turns_are_about_the_axis_asked_for() -> None:
     assert R_before.T @ R_after == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), abs=1e-12)
 
 
+@pytest.mark.long
 def test_the_best_motion_to_a_pose_is_hard_to_beat(client: TestClient) -> None:
     path = begin(client, threshold=10.0)
     added(client, path, {"optimize": move(duration=4.0)})

@@ -54,7 +54,7 @@ def by_coal(model: CollisionModel, q: Array) -> Array:
     return result
 
 
-@pytest.mark.parametrize("count", long_but((12,), (12, 25)))
+@pytest.mark.parametrize("count", long_but((6,), (6, 25)))
 @pytest.mark.parametrize("load", LOADS, ids=lambda shape: type(shape).__name__)
 def test_distances_are_coals(load: Shape, count: int) -> None:
     model = CollisionModel(arm_in_cell(load))

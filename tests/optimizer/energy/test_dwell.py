@@ -134,6 +134,7 @@ def test_baselines_wait_too() -> None:
     assert not slow.within_limits
 
 
+@pytest.mark.long
 def test_the_mechanical_objective_knows_no_wait() -> None:
     """The cycle's end is the longest duration, and the wait shows in the electrical energy alone."""
     compile_kernel(ROBOT)

@@ -174,7 +174,8 @@ def test_the_solver_keeps_to_the_leeway() -> None:
         assert (allowed.rows @ moved >= allowed.lower - 1e-8).all()
 
 
-@pytest.mark.parametrize("number", long_but([0], range(3)))
+@pytest.mark.long
+@pytest.mark.parametrize("number", range(3))
 def test_what_is_freer_costs_no_more(number: int) -> None:
     """The paper's positions: free ≤ cone ≤ turned about the axis ≤ each of its five orientations."""
     pose = POSITIONS[number]
@@ -298,7 +299,8 @@ def test_respects_the_deadline() -> None:
     assert any(each.status == "unvisited" for each in solution.candidates)
 
 
-@pytest.mark.parametrize("count", long_but((2,), (2, 3, 4)))
+@pytest.mark.long
+@pytest.mark.parametrize("count", [2, 3, 4])
 def test_a_front_follows_a_goal_that_turns(count: int) -> None:
     """Every point of a front goes where its own duration is cheapest: none is beaten by a longer one's motion."""
     # with little idle power, time costs little: slower motions need less energy

@@ -114,7 +114,7 @@ def test_no_random_motion_does_less_work(name: str, count: int) -> None:
     assert stronger > 3 or EnergyRange(task).leading == 0
 
 
-@pytest.mark.parametrize("name", ["as it comes", "slow limits", "weightless"])
+@pytest.mark.parametrize("name", long_but(["slow limits"], ["as it comes", "slow limits", "weightless"]))
 def test_no_descent_gets_below(name: str) -> None:
     """The mechanical work is minimised from random guesses between the ends where the bound exceeds the climb most."""
     rng = np.random.default_rng(3)

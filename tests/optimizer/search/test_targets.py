@@ -15,6 +15,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import narrowed
 from optimizer.problem.targets import AnyOf, members, single
 from tests.optimizer.moves import GOAL, HOME, START, limits, paper_poses, problem, tcp_pose
+from tests.selection import long_but
 
 # relative: in a search of its own every target's winner is refined over more control points, in a common one only the
 # best of all, and refining gains some tenths of a percent
@@ -25,7 +26,7 @@ FAR = Pose(np.block([[np.eye(3), np.array([[2.0], [0.0], [0.3]])], [np.zeros((1,
 BEYOND = np.array([0.0, -1.57, 3.5, -1.57, -1.57, 0.0])
 
 
-@pytest.mark.parametrize("position", range(3))
+@pytest.mark.parametrize("position", long_but(range(1), range(3)))
 def test_the_papers_orientations_are_one_request(position: int) -> None:
     """Its five orientations at a position: no worse than the best of five requests, and it says which that is."""
     poses = paper_poses()[5 * position : 5 * position + 5]

@@ -12,6 +12,7 @@ from optimizer.exceptions import InvalidProblem, PathInfeasible, StopInCollision
 from optimizer.optimize import optimize
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm
+from optimizer.problem.branches import BranchFilter
 from optimizer.problem.line import Line
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -63,7 +64,7 @@ def test_the_tool_comes_and_leaves_straight() -> None:
 
 
 def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
-    asked = one_stop()
+    asked = one_stop(branch=BranchFilter(elbow="up"))
     found = optimize_round(asked)
     layers, energies = list(layers_of(asked).values()), []
     assert [layer.name for layer in layers] == [

@@ -181,7 +181,9 @@ def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
             assert found.energy.electrical.total <= total * (1 + CONVERGED)
 
 
-@pytest.mark.parametrize("hold", [{}, {"hold": "brakes", "brake_power": 1.0}], ids=str)
+@pytest.mark.parametrize(
+    "hold", [pytest.param({}, marks=pytest.mark.long), {"hold": "brakes", "brake_power": 1.0}], ids=str
+)
 def test_a_least_time_is_bounded_for_longer_rounds_and_longer_moves_too(hold: dict[str, Any]) -> None:
     """Of a least time alone, the bound holds for rounds that take longer, and for moves that take longer than it."""
     asked = WorkRound(
@@ -231,7 +233,7 @@ def test_a_wrong_time_names_its_field(given: dict[str, Any]) -> None:
     assert refusal.value.field.startswith("time")
 
 
-@pytest.mark.parametrize("place", ["start", "stop 1"])
+@pytest.mark.parametrize("place", long_but(["start"], ["start", "stop 1"]))
 def test_it_waits_where_it_is_told_to(place: str) -> None:
     asked = in_time(replace(ASKED, hold="brakes", brake_power=1.0, wait=place), 2.0 * free().duration)
     found = optimize_round(asked)
