@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from itertools import pairwise, permutations
 from typing import Any
@@ -14,6 +15,7 @@ from optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.tours import Tours
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.sequence.rounds import pick_and_place
@@ -35,12 +37,11 @@ def inspection(seed: int, count: int, **given: Any) -> WorkRound:
 
 def energies(asked: WorkRound) -> dict[tuple[str, ...], float]:
     """Energy [J] of the best round in every order."""
-    return {
-        tuple(stop.name for stop in order): optimize_round(
-            replace(asked, stops=order, order=None)
-        ).energy.electrical.total
-        for order in permutations(asked.stops)
-    }
+    found = {}
+    for stops in permutations(asked.stops):
+        search = RoundSearch(replace(asked, stops=stops, order=None), time.perf_counter)
+        found[tuple(stop.name for stop in stops)] = search.cost(search.run())
+    return found
 
 
 @pytest.mark.parametrize(
