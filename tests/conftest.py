@@ -6,5 +6,5 @@ import os
 
 
 def pytest_xdist_auto_num_workers() -> int:
-    """Two more than there are cores: many tests wait for a service of their own to start or to end."""
-    return len(os.sched_getaffinity(0)) + 2
+    """One more than there are cores: some tests wait for a service of their own to start or to end."""
+    return len(os.sched_getaffinity(0)) + 1
