@@ -43,7 +43,8 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundS
         ordered = orders.run()
         left = max(asked.deadline - (clock() - began), LEAST_TIME)
         found = _in_given_order(replace(ordered, deadline=left), clock)
-        baseline = given_order(replace(asked, deadline=left), ordered, clock, found.energy.electrical.total)
+        left = asked.deadline - (clock() - began)
+        baseline = given_order(asked, left, found, clock)
         # the bound of the best order does not hold for the others
         return replace(
             found,

@@ -42,7 +42,7 @@ class OrderSearch:
         self.groups = groups_of(asked.order, asked.stops)
         self.moves, self.blocks = _all_moves(asked, self.groups)
         self.search = RoundSearch(replace(asked, deadline=SHARE * asked.deadline), clock, self.moves)
-        self.exact, self.bound = True, -np.inf
+        self.exact, self.bound, self.best = True, -np.inf, list[int]()
         count = sum(len(self.search.legs[self.blocks[None, k][-1]].goal.q) for k in range(len(self.groups)))
         if count > MOST_NODES:
             raise InvalidProblem(
@@ -52,29 +52,35 @@ class OrderSearch:
             )
 
     def run(self) -> WorkRound:
-        """The round with its stops in the best order. Raises NoTrajectory if there is none, or DeadlineExceeded."""
+        """The round with its stops in the best order; once the time is up, in the best one known.
+
+        Raises NoTrajectory if there is none, or DeadlineExceeded if none is known.
+        """
         search = self.search
         try:
             with watch(search.end):
                 legs = zip(self.moves, search.legs, strict=True)
                 self.bound = self._tours([bounded_costs(self.asked, *leg, search.end) for leg in legs]).least()[0]
-                groups = self._explored()
+                self._explore()
         except DeadlinePassed:
-            raise DeadlineExceeded([]) from None
-        stops = [stop for k in groups for stop in self.groups[k]]
+            self.exact = False
+        if not self.best:
+            raise DeadlineExceeded([])
+        stops = [stop for k in self.best for stop in self.groups[k]]
         return replace(self.asked, stops=stops, order=None)
 
-    def _explored(self) -> list[int]:
-        """The groups of the least tour, in their order, all of its moves solved; once the time is up, not all."""
+    def _explore(self) -> None:
+        """Find the least tour, all of its moves solved; `best` are its groups so far."""
         search = self.search
         while True:
             value, groups, ends = self._tours([leg.cost for leg in search.legs]).least()
             if not np.isfinite(value):
                 raise DeadlineExceeded([]) if search.cut_short else NoTrajectory([])
+            self.best = groups
             open_ = [each for each in self._moves_of(groups, ends) if not search.legs[each[0]].known(*each[1:])]
             if not open_ or search.search_end.passed:
                 self.exact = not (open_ or search.failed or search.cut_short)
-                return groups
+                return
             for each in open_:
                 search.try_kind(*each)
 

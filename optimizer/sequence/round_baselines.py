@@ -13,7 +13,7 @@ from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
 from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName
+from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName, RoundSolution
 from optimizer.sequence.time_sharing import duration_of
 from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Baseline, Solution
@@ -81,18 +81,17 @@ def _in_time(
     return RoundBaseline(name, timing.time + timing.asked.dwelling, total, held, saving(ours, total))
 
 
-def given_order(asked: WorkRound, ours: WorkRound, clock: Clock, energy: float) -> RoundBaseline | None:
-    """The best round in the order in which the stops are given, compared with `ours` of an `energy` [J].
+def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock) -> RoundBaseline | None:
+    """The best round in the order in which the stops are given, found within the `left` [s] of the deadline.
 
-    None if it is the same or not allowed, if there is none before the deadline, or if it takes another time than is
-    asked for.
+    None if it is the same as `ours` or not allowed, if there is none, or if it takes another time than is asked for.
     """
-    same = [stop.name for stop in asked.stops] == [stop.name for stop in ours.stops]
-    if same or (asked.order is not None and not is_given_order_allowed(asked.order, asked.stops)):
+    same = [stop.name for stop in asked.stops] == ours.order
+    if left <= 0 or same or (asked.order is not None and not is_given_order_allowed(asked.order, asked.stops)):
         return None
     try:
-        search = RoundSearch(replace(asked, order=None), clock)
-        return of_chain(search, search.run(), "given_order", energy)
+        search = RoundSearch(replace(asked, order=None, deadline=left), clock)
+        return of_chain(search, search.run(), "given_order", ours.energy.electrical.total)
     except JoulepathError:
         return None
 

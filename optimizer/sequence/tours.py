@@ -10,9 +10,6 @@ import numpy as np
 from models.robot import Array
 from optimizer.deadline import checkpoint
 
-# subsets between two looks at the deadline
-SUBSETS_PER_CHECK = 256
-
 
 class Tours:
     """Tours from a node of the start over all groups, back to this node if `closed`.
@@ -63,8 +60,7 @@ class Tours:
             if not self.needed[k]:
                 reached[1 << k, self.own[k]] = self.first[start, self.own[k]]
         for subset in range(1, (1 << self.count) - 1):
-            if subset % SUBSETS_PER_CHECK == 0:
-                checkpoint()
+            checkpoint()
             nodes = np.flatnonzero(np.isfinite(reached[subset]))
             if not len(nodes):
                 continue
