@@ -169,6 +169,8 @@ class _Replay:
         instants = np.append(np.arange(0, len(self.q) - 1, len(self.q) // ON_PATH + 1), len(self.q) - 1)
         T = np.array([self.tcp_pose(self.q[k]) for k in instants])
         checkpoint()
+        if not np.isfinite(T).all():
+            return dict.fromkeys(("path_position", "path_rotation"), np.nan)
         position, rotation = course.deviation(T)
         between = 2 * float(np.linalg.norm(np.diff(T[:, :3], n=2, axis=0), axis=(1, 2)).max(initial=0.0)) / 8
         return {

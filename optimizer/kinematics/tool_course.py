@@ -8,6 +8,7 @@ with either: so the course has two continuous derivatives.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,10 +17,12 @@ from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 
-# poses of the course that a pose is compared with first, for each part of it
-COMPARED = 200
+# poses of the course that a motion is compared with, for each part of it and each half of a corner
+COMPARED = 100
 # a pose is looked for so many times as far ahead on the course as the motion and its tolerances reach
 AHEAD = 2.0
+# m²: two poses of the course that are nearer are the same
+TINY = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,44 +101,60 @@ class ToolCourse:
         return T
 
     def deviation(self, T: Array) -> tuple[Array, Array]:
-        """How far poses T (k, 4, 4) of a motion are from the course: at most so many metres (k,) and radians (k,).
+        """How far poses T (k, 4, 4) of a motion and the course are from each other: at most so many metres and radians.
 
-        The motion must go all the way, and in its order: a pose is compared with the part of the course to which the
-        one before it leads. Infinite for all if the motion does not end where the course does.
+        Each pose is compared with one of the course, in the order of both. A piece of the course of length s, whose
+        ends are c apart, is at most (s² - c²)^½ / 2 from the straight line between them, if both are gone through
+        evenly: so much is added for the piece between two compared poses, so that none of it can be left out.
+        Infinite for all poses (k,) if the motion does not end where the course does.
         """
-        at = np.linspace(0.0, 1.0, COMPARED * len(self.shift) + 1)
-        known, asked = _embedded(self.poses(at)), _embedded(T)
-        best = self._matched(at, known, asked)
+        at = self._grid()
+        known = _embedded(self.poses(at))
+        best, left_out, rest = self._matched(at, known, _embedded(T))
         on = self.poses(best)
-        position = np.asarray(np.linalg.norm(T[:, :3, 3] - on[:, :3, 3], axis=1))
+        position = np.linalg.norm(T[:, :3, 3] - on[:, :3, 3], axis=1) + left_out
         turned = Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(on[:, :3, :3]).inv()
-        rotation = np.asarray(turned.magnitude())
-        if self.length * (1 - best[-1]) > self.path.position_tolerance + TURNING * self.path.rotation_tolerance:
+        rotation = np.asarray(turned.magnitude()) + left_out / TURNING
+        if rest > self.path.position_tolerance + TURNING * self.path.rotation_tolerance:
             return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
-        return position, rotation
+        return np.asarray(position), rotation
 
-    def _matched(self, at: Array, known: Array, asked: Array) -> Array:
-        """Fractions (k,) of the way that are nearest to a motion, each a little after the one before.
+    def _grid(self) -> Array:
+        """Fractions of the way: COMPARED on each part, and on each half of a corner's blend."""
+        corners = self.ends[1:-1]
+        knots = np.unique([0.0, self.length, *corners - self.path.blend, *corners, *corners + self.path.blend])
+        pieces = [np.linspace(a, b, COMPARED, endpoint=False) for a, b in pairwise(knots)]
+        return np.append(np.concatenate(pieces) / self.length, 1.0)
 
-        `known` (m, 12) are the poses at fractions `at` (m,), `asked` (k, 12) those of the motion.
+    def _matched(self, at: Array, known: Array, asked: Array) -> tuple[Array, Array, float]:
+        """Fractions (k,) of the way that are compared with a motion; what is left out before each (k,) [m], and after
+        the last [m].
+
+        `known` (m, 12) are the poses at fractions `at` (m,), `asked` (k, 12) those of the motion. Of the points that
+        are not too far ahead, the one is taken that is least off, with what it leaves out.
         """
-        cell = float(np.linalg.norm(np.diff(known, axis=0), axis=1).max())
-        moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
+        chords = np.diff(known, axis=0)
+        squares = (chords**2).sum(axis=1)
+        gone = np.concatenate([[0.0], np.cumsum(np.sqrt(squares))])
         reach = AHEAD * (self.path.position_tolerance + TURNING * self.path.rotation_tolerance)
-        ahead = np.ceil((AHEAD * moved + reach) / cell).astype(int) + 1
-        best, here = np.empty(len(asked)), 0
+        moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
+        best, left_out = np.empty(len(asked)), np.empty(len(asked))
+        here, length, point = 0, 0.0, known[0]
         for k, pose in enumerate(asked):
-            low = known[max(here - 1, 0) : here + ahead[k] + 1]
-            start = max(here - 1, 0)
-            if len(low) < 2:
-                start, low = len(known) - 2, known[-2:]
-            chord = np.diff(low, axis=0)
-            share = np.clip(((pose - low[:-1]) * chord).sum(axis=1) / (chord**2).sum(axis=1), 0.0, 1.0)
-            missed = ((pose - low[:-1] - share[:, None] * chord) ** 2).sum(axis=1)
-            nearest = int(missed.argmin())
-            here = start + nearest
-            best[k] = at[here] + share[nearest] * (at[here + 1] - at[here])
-        return best
+            last = int(np.searchsorted(gone, length + AHEAD * moved[k] + reach))
+            cells = slice(max(here - 1, 0), min(last, len(chords)))
+            # where the course turns back, two of its points may be the same
+            share = np.clip(
+                ((pose - known[cells]) * chords[cells]).sum(axis=1) / np.maximum(squares[cells], TINY), 0.0, 1.0
+            )
+            points = known[cells] + share[:, None] * chords[cells]
+            lengths = gone[cells] + share * np.sqrt(squares[cells])
+            apart = ((points - point) ** 2).sum(axis=1)
+            skipped = np.sqrt(np.maximum((lengths - length) ** 2 - apart, 0.0)) / 2
+            nearest = int((np.linalg.norm(pose - points, axis=1) + skipped).argmin())
+            here, length, point = cells.start + nearest, float(lengths[nearest]), points[nearest]
+            best[k], left_out[k] = at[here] + share[nearest] * (at[here + 1] - at[here]), skipped[nearest]
+        return best, left_out, float(gone[-1] - length)
 
 
 def _fading(x: Array) -> Array:

@@ -56,20 +56,32 @@ def baselines(
         goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
         hold = float(holding_power(problem.arm, torques(goal, still, still))[0])
     for (name, motion), tau in zip(motions.items(), np.split(torques(q, v, a), ends), strict=True):
-        energy = motion_energy(problem, motion, tau, potential)
-        if problem.cycle is not None:
-            energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
-        result.append(
-            Baseline(
-                name=name,
-                duration=motion.duration,
-                electrical=energy.electrical.total,
-                mechanical=energy.mechanical.total,
-                within_limits=within_limits(problem, motion, tau) and satisfies_path_constraints(motion.q, motion.v),
-                saving=saving(ours, energy.of(problem.objective)),
-            )
-        )
+        result.append(compared(problem, name, motion, tau, hold, ours, potential, satisfies_path_constraints))
     return result
+
+
+def compared(
+    problem: Problem,
+    name: BaselineName,
+    motion: SampledMotion,
+    tau: Array,
+    hold: float,
+    ours: float,
+    potential: Callable[[Array], float],
+    satisfies_path_constraints: Callable[[Array, Array], bool],
+) -> Baseline:
+    """A motion with torques tau (k, nq) as a baseline; after it, holding the arm draws `hold` [W]. See `baselines`."""
+    energy = motion_energy(problem, motion, tau, potential)
+    if problem.cycle is not None:
+        energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
+    return Baseline(
+        name=name,
+        duration=motion.duration,
+        electrical=energy.electrical.total,
+        mechanical=energy.mechanical.total,
+        within_limits=within_limits(problem, motion, tau) and satisfies_path_constraints(motion.q, motion.v),
+        saving=saving(ours, energy.of(problem.objective)),
+    )
 
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer.energy.dwell import dwell_energy
-from optimizer.search.baselines import motion_energy, saving, within_limits
+from optimizer.search.baselines import compared
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
 from optimizer.solution import Baseline
@@ -21,21 +20,9 @@ def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
-    energy = motion_energy(problem, motion, tau, prepared.potential)
-    if problem.cycle is not None:
-        hold = float(prepared.holding_power(best.q_goal))
-        energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
-    held = within_limits(problem, motion, tau) and prepared.satisfies_path_constraints(motion.q, motion.v)
-    return [
-        Baseline(
-            name="trapezoid",
-            duration=motion.duration,
-            electrical=energy.electrical.total,
-            mechanical=energy.mechanical.total,
-            within_limits=held,
-            saving=saving(best.energy, energy.of(problem.objective)),
-        )
-    ]
+    hold = 0.0 if problem.cycle is None else float(prepared.holding_power(best.q_goal))
+    oracle = prepared.potential, prepared.satisfies_path_constraints
+    return [compared(problem, "trapezoid", motion, tau, hold, best.energy, *oracle)]
 
 
 def along(path: Spline, law: SampledMotion) -> SampledMotion:

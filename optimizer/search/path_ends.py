@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from models.robot import Array
+from optimizer.deadline import Deadline
 from optimizer.exceptions import PathAttempt, PathInfeasible
+from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.course_tracing import Trace, traces, turned, within
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.candidates import Candidate
+from optimizer.problem.targets import Target
+from optimizer.search.candidates import Candidate, bound, pairs
 from optimizer.search.ends import EndConfiguration, ends, label_of
+from optimizer.search.missed_branches import bound_of_missed
+from optimizer.search.self_motion_bound import self_motion_bound
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6
@@ -27,7 +33,8 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     starts, _ = ends(prepared, "start")
     found, attempts = list[Candidate](), list[PathAttempt]()
     for start, trace in zip(starts, traces(prepared.arm, course, np.array([each.q for each in starts])), strict=True):
-        whole = trace if start.fixed else turned(trace, limits.q_min, limits.q_max, start.choices)
+        choices = _choices(start, trace, prepared.problem.goal)
+        whole = trace if start.fixed else turned(trace, limits.q_min, limits.q_max, choices)
         if trace.obstacle is None and whole is not None and within(whole, limits.q_min, limits.q_max):
             candidate = _candidate(prepared, start, whole)
             if candidate is not None:
@@ -38,6 +45,30 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     if not found:
         raise PathInfeasible(course.length, attempts)
     return found
+
+
+def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline) -> float:
+    """Lower bound [J] on motions along the tool path to which none of the `followed` candidates leads.
+
+    A path may come so near to a singularity that a motion within its tolerance goes on in another branch than the one
+    that was followed; and of a self-motion at its start only samples were followed. So this is the bound of all motions
+    between the first pose and the last one, in any other configurations.
+    """
+    free = PreparedProblem.of(replace(prepared.problem, tool_path=None))
+    (starts, _), (goals, _) = (ends(free, name) for name in ("start", "goal"))
+    candidates = pairs(free, starts, goals)
+    bound(free, candidates)
+    others = (each.lower_bound for each in candidates if not each.sampled and not _is_among(each, followed))
+    return min([self_motion_bound(free, candidates, deadline), bound_of_missed(free, candidates, deadline), *others])
+
+
+def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:
+    """Whether a pair of ends is one of those that were followed, but for common full turns."""
+    return any(
+        np.abs(wrapped(pair.q_start - each.q_start)).max() < SAME
+        and np.abs((pair.q_goal - pair.q_start) - (each.q_goal - each.q_start)).max() < SAME
+        for each in followed
+    )
 
 
 def _candidate(prepared: PreparedProblem, start: EndConfiguration, trace: Trace) -> Candidate | None:
@@ -51,6 +82,15 @@ def _candidate(prepared: PreparedProblem, start: EndConfiguration, trace: Trace)
         label_of(prepared.arm.robot, q_goal), q_goal, [[value] for value in q_goal.tolist()], True, start.target
     )
     return Candidate(start, goal, q_start, q_goal)
+
+
+def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[float]]:
+    """The positions of each joint at the start: those from which it comes to the given one of the goal, if any does."""
+    if not isinstance(goal, np.ndarray):
+        return start.choices
+    needed = goal - (trace.q[-1] - trace.q[0])
+    reaching = [[x for x in each if abs(x - q) < SAME] for each, q in zip(start.choices, needed, strict=True)]
+    return [some or each for some, each in zip(reaching, start.choices, strict=True)]
 
 
 def _attempt(prepared: PreparedProblem, start: EndConfiguration, trace: Trace) -> PathAttempt:

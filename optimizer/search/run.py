@@ -23,7 +23,7 @@ from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_missed
-from optimizer.search.path_ends import path_candidates
+from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.refinement import compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.self_motion_bound import self_motion_bound
@@ -220,6 +220,10 @@ class Run:
             self_motion_bound(prepared, candidates, incumbent.deadline),
             bound_of_missed(prepared, candidates, incumbent.deadline),
         )
+        beside = np.inf
+        if self.problem.tool_path is not None:
+            beside = bound_beside(prepared, candidates, incumbent.deadline)
+            family = min(family, beside) if any(each.sampled for each in candidates) else family
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
         done = done and all_known(self.problem)
         assert best.attempt is not None
@@ -229,7 +233,7 @@ class Run:
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=trajectory,
             energy=energy,
-            lower_bound=min([family, *(each.lower_bound for each in candidates if not each.sampled)]),
+            lower_bound=min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)]),
             complete=all_known(self.problem),
             baselines=table,
             candidates=[each.report() for each in candidates],

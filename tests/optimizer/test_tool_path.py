@@ -242,3 +242,60 @@ def test_a_slow_motion_keeps_to_the_path(duration: float) -> None:
     """Where time costs next to nothing else, the optimal timing is uneven."""
     found = optimize(along(moved([0.0, 0.3, -0.1]), duration_min=duration, duration_max=1.2 * duration))
     assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
+
+
+def test_an_excursion_of_the_path_cannot_be_left_out() -> None:
+    """A needle of 10 mm to the side, on a long path."""
+    foot, tip, back = moved([0.0, 0.15, 0.0]), moved([0.01, 0.15, 0.0]), moved([0.0, 0.1501, 0.0])
+    for tolerance in (1e-4, 4e-3):
+        path = ToolPath(via=[foot, tip, back], blend=tolerance, position_tolerance=tolerance)
+        course = ToolCourse.of(path, tcp_pose(HOME).T, moved([0.0, 0.3, 0.0]).T)
+        T = np.tile(tcp_pose(HOME).T, (2000, 1, 1))
+        T[:, 1, 3] += np.linspace(0.0, 0.3, 2000)
+        assert course.deviation(T)[0].max() > 4e-3
+        assert course.deviation(course.poses(np.linspace(0.0, 1.0, 5000)))[0].max() < tolerance
+
+
+def test_a_course_that_turns_back_between_two_of_its_points_is_compared() -> None:
+    """Two points of the course's grid are the same then."""
+    out = 0.1
+    for cell in range(50, 150, 2):
+        back = out * (200 / (cell + 0.5) - 1)
+        goal = moved([0.0, out - back, 0.0]).T
+        course = ToolCourse.of(ToolPath(via=[moved([0.0, out, 0.0])], blend=0.001), tcp_pose(HOME).T, goal)
+        T = course.poses(np.linspace(0.0, 1.0, 700))
+        half_a_step = course.length / 699 / 2
+        assert course.deviation(T)[0].max() < half_a_step, "what may be left out at the tip between two of the poses"
+
+
+def test_what_is_no_motion_is_not_certified() -> None:
+    problem = along(moved([0.0, 0.3, 0.0]))
+    found = optimize(problem)
+    spline = replace(found.trajectory.spline, control_points=found.trajectory.spline.control_points * np.nan)
+    certificate = certify(problem, spline, HOME, found.goal.q, found.energy)
+    assert np.isnan(certificate.worst_ratio["path_position"]) and not certificate.valid
+
+
+def test_a_given_goal_is_met_in_its_own_turns() -> None:
+    goal = optimize(along(moved([0.0, 0.2, 0.0]))).goal.q
+    for turns in ([0, 0, 0, 0, 0, 1], [1, 0, 0, 0, 0, -1], [0, 0, 0, -1, 1, 0]):
+        there = goal + 2 * np.pi * np.array(turns)
+        if (np.abs(there) < 2 * np.pi).all():
+            found = optimize(along(there, moved([0.0, 0.0, 0.0])))
+            assert found.certificate.valid and (found.goal.q == there).all()
+
+
+@pytest.mark.parametrize("seed", long_but([0], range(10)))
+def test_the_bound_holds_for_starts_that_were_not_sampled(seed: int) -> None:
+    """Seven joints: every posture at the start leads along the path to another one at its end."""
+    arm, rng = Arm(robot=load_robot("panda"), collisions=False), np.random.default_rng(seed)
+    q = np.array([0.0, -0.3, 0.1, -2.0, 0.0, 1.8, 0.7]) + rng.uniform(-0.3, 0.3, 7)
+    T = pose_of(arm, q)
+    goal = T.copy()
+    goal[:3, 3] += rng.uniform(-0.15, 0.15, 3)
+    path = {"arm": arm, "goal": Pose(goal), "tool_path": ToolPath()}
+    found = optimize(Problem(start=Pose(T), deadline=5.0, **path))
+    assert found.status == "feasible"
+    given = optimize(Problem(start=q, deadline=AMPLE, **path))
+    assert found.lower_bound <= given.energy.electrical.total
+    assert found.lower_bound <= found.energy.electrical.total
