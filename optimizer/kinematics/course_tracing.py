@@ -7,7 +7,7 @@ arm reaches and no singularity stops it. The joint path is a quintic spline thro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal
 
@@ -23,30 +23,33 @@ from optimizer.problem.arm import Arm
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline
 
-# way [m] from point to point, and how many there are at least on a straight line, and on each part of a course with
-# corners
-STEP, ON_LINE, AT_CORNERS = 0.005, 32, 160
+# longest way [m] from point to point, and how many there are at least on a straight piece and on half of a corner
+STEP, ON_PIECE = 0.005, 32
 # joints that move farther from point to point [rad] are followed in so many times as many steps
 FAR, FINER = 0.03, 4
 # a configuration is on the course if it misses the pose by less [m, rad]
 REACHED = 1e-9
 # a joint that turns farther from one point to the next [rad] does so at a singularity
 JUMP = 0.25
-# control points of the joint path that are tried, and the share of the tolerances that its fit may take
-CONTROL_POINTS, SHARE = (12, 20, 36, 60, 100, 160), 0.1
-# points per step at which the fit is checked
-CHECKED = 2
+# knot spans of the joint path on each piece of the course at first, and at most in all; traced points in each of them
+# at least; and the share of the tolerances that the fit may take
+FIRST_SPANS, MOST_SPANS, SAMPLES_IN_SPAN, SHARE = 2, 500, 2, 0.1
 
 Obstacle = Literal["unreachable", "singular"]
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Configurations q (m, nq) [rad] at the first fractions of a course, and why they end before its end, if so."""
+    """Configurations q (m, nq) [rad] at the fractions `at` (m,) of a course, and why they end before its end, if so."""
 
     q: Array
-    followed: float
+    at: Array
     obstacle: Obstacle | None = None
+
+    @property
+    def followed(self) -> float:
+        """The share of the course that was followed."""
+        return float(self.at[-1])
 
 
 @lru_cache(maxsize=16)
@@ -59,27 +62,26 @@ def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
 
     Where joints move far from point to point, it is followed once more with more points.
     """
-    parts = len(course.shift)
-    steps = max(int(np.ceil(course.length / STEP)), ON_LINE if parts == 1 else AT_CORNERS * parts)
-    found = _traced(arm, course, q_start, steps)
+    at = course.grid(ON_PIECE, STEP)
+    found = _traced(arm, course, q_start, at)
     coarse = [k for k, each in enumerate(found) if len(each.q) > 1 and np.abs(np.diff(each.q, axis=0)).max() > FAR]
     if coarse:
-        finer = _traced(arm, course, q_start[coarse], FINER * steps)
+        finer = _traced(arm, course, q_start[coarse], course.grid(FINER * ON_PIECE, STEP / FINER))
         found = [finer[coarse.index(k)] if k in coarse else each for k, each in enumerate(found)]
     return found
 
 
-def _traced(arm: Arm, course: ToolCourse, q_start: Array, steps: int) -> list[Trace]:
-    fractions = np.linspace(0.0, 1.0, steps + 1)
-    poses, chain = course.poses(fractions), _chain_of(arm.robot)
-    q = np.full((len(q_start), steps + 1, q_start.shape[1]), np.nan)
+def _traced(arm: Arm, course: ToolCourse, q_start: Array, at: Array) -> list[Trace]:
+    poses, chain = course.poses(at), _chain_of(arm.robot)
+    q = np.full((len(q_start), len(at), q_start.shape[1]), np.nan)
     q[:, 0] = q_start
     last, obstacle = np.zeros(len(q_start), dtype=int), list[Obstacle | None]([None] * len(q_start))
     going = np.arange(len(q_start))
-    for k in range(1, steps + 1):
+    for k in range(1, len(at)):
         checkpoint()
-        before = q[going, k - 1]
-        guess = before if k == 1 else 2 * before - q[going, k - 2]
+        guess = before = q[going, k - 1]
+        if k > 1:
+            guess = before + (before - q[going, k - 2]) * ((at[k] - at[k - 1]) / (at[k - 1] - at[k - 2]))
         found, missed = newton.solved(chain, guess, flange_pose(poses[k], arm.T_flange_tcp))
         jumped = np.abs(found - before).max(axis=1) > JUMP
         for node, is_missed, is_jump in zip(going, missed > REACHED, jumped, strict=True):
@@ -90,25 +92,53 @@ def _traced(arm: Arm, course: ToolCourse, q_start: Array, steps: int) -> list[Tr
         if not len(going):
             break
         q[going, k], last[going] = found[kept], k
-    return [Trace(q[n, : last[n] + 1], float(fractions[last[n]]), obstacle[n]) for n in range(len(q_start))]
+    return [Trace(q[n, : last[n] + 1], at[: last[n] + 1], obstacle[n]) for n in range(len(q_start))]
 
 
 def joint_path(arm: Arm, course: ToolCourse, trace: Trace) -> Spline | None:
-    """The path γ(s), s ∈ [0, 1], through a whole trace; None if it turns too sharply for the tolerances."""
-    fractions = np.linspace(0.0, 1.0, len(trace.q))
-    checked = np.linspace(0.0, 1.0, CHECKED * len(trace.q))
-    for count in CONTROL_POINTS:
-        if count > len(trace.q):
-            break
-        knots = bspline.uniform(count).knots
-        matrix = bspline.basis_matrix(knots, fractions)
-        points = np.zeros((count, trace.q.shape[1]))
-        points[0], points[-1] = trace.q[0], trace.q[-1]
-        points[1:-1] = np.linalg.lstsq(matrix[:, 1:-1], trace.q - matrix @ points, rcond=None)[0]
-        path = Spline(bspline.DEGREE, knots, points)
-        if max(path_ratios(arm, course, path.curve(checked)).values()) <= SHARE:
+    """The path γ(s), s ∈ [0, 1], through a whole trace; None if it turns too sharply for the tolerances.
+
+    The spline has more knots where it is off the course: near corners and singularities.
+    """
+    breaks = course.grid(FIRST_SPANS)
+    while len(breaks) <= MOST_SPANS:
+        checkpoint()
+        denser = _denser(arm, course, trace, breaks)
+        if denser is None:
+            return None
+        trace = denser
+        path = _fit(trace.q, trace.at, bspline.clamped(breaks))
+        checked = np.sort(np.concatenate([trace.at, (trace.at[1:] + trace.at[:-1]) / 2]))
+        off = course.ratios(tcp_pose(arm, path.curve(checked)), course.poses(checked))
+        bad = np.unique(np.searchsorted(breaks, checked[off > SHARE], side="right").clip(1, len(breaks) - 1))
+        if not len(bad):
             return path
+        breaks = np.union1d(breaks, (breaks[bad] + breaks[bad - 1]) / 2)
     return None
+
+
+def _denser(arm: Arm, course: ToolCourse, trace: Trace, breaks: Array) -> Trace | None:
+    """A trace with enough points for a spline with these breaks; None if one of them is not found."""
+    few = np.flatnonzero(np.histogram(trace.at, breaks)[0] < SAMPLES_IN_SPAN)
+    inside = (np.arange(SAMPLES_IN_SPAN) + 0.5) / SAMPLES_IN_SPAN
+    at = (breaks[few, None] + inside * np.diff(breaks)[few, None]).ravel()
+    chain, found = _chain_of(arm.robot), np.empty((len(at), trace.q.shape[1]))
+    guesses = np.stack([np.interp(at, trace.at, q) for q in trace.q.T], axis=1)
+    for k, pose in enumerate(course.poses(at)):
+        (found[k],), (missed,) = newton.solved(chain, guesses[k][None], flange_pose(pose, arm.T_flange_tcp))
+        if missed > REACHED or np.abs(found[k] - guesses[k]).max() > JUMP:
+            return None
+    order = np.argsort(np.concatenate([trace.at, at]), kind="stable")
+    return Trace(np.concatenate([trace.q, found])[order], np.concatenate([trace.at, at])[order])
+
+
+def _fit(q: Array, at: Array, knots: Array) -> Spline:
+    """The spline that is nearest to configurations q (m, nq) at fractions (m,), and meets the first and the last."""
+    matrix = bspline.basis_matrix(knots, at)
+    points = np.zeros((matrix.shape[1], q.shape[1]))
+    points[0], points[-1] = q[0], q[-1]
+    points[1:-1] = np.linalg.lstsq(matrix[:, 1:-1], q - matrix @ points, rcond=None)[0]
+    return Spline(bspline.DEGREE, knots, points)
 
 
 def path_ratios(arm: Arm, course: ToolCourse, q: Array) -> dict[str, float]:
@@ -141,4 +171,4 @@ def turned(trace: Trace, lower: Array, upper: Array, choices: Sequence[Sequence[
         if not found:
             return None
         shift[joint] = min(found)[1]
-    return Trace(trace.q + shift, trace.followed, trace.obstacle)
+    return replace(trace, q=trace.q + shift)

@@ -108,22 +108,30 @@ class ToolCourse:
         evenly: so much is added for the piece between two compared poses, so that none of it can be left out.
         Infinite for all poses (k,) if the motion does not end where the course does.
         """
-        at = self._grid()
+        at = self.grid(COMPARED)
         known = _embedded(self.poses(at))
         best, left_out, rest = self._matched(at, known, _embedded(T))
-        on = self.poses(best)
-        position = np.linalg.norm(T[:, :3, 3] - on[:, :3, 3], axis=1) + left_out
-        turned = Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(on[:, :3, :3]).inv()
-        rotation = np.asarray(turned.magnitude()) + left_out / TURNING
+        position, rotation = _apart(T, self.poses(best))
+        position, rotation = position + left_out, rotation + left_out / TURNING
         if rest > self.path.position_tolerance + TURNING * self.path.rotation_tolerance:
             return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
-        return np.asarray(position), rotation
+        return position, rotation
 
-    def _grid(self) -> Array:
-        """Fractions of the way: COMPARED on each part, and on each half of a corner's blend."""
+    def ratios(self, T: Array, wanted: Array) -> Array:
+        """How far poses T (k, 4, 4) are from poses that are `wanted` (k, 4, 4), over the path's tolerances."""
+        position, rotation = _apart(T, wanted)
+        return np.maximum(position / self.path.position_tolerance, rotation / self.path.rotation_tolerance)
+
+    def grid(self, count: int, step: float = np.inf) -> Array:
+        """Fractions of the way: each piece, straight or half of a corner's blend, divided into `count` and more parts,
+        so that none is longer than a `step` [m]."""
         corners = self.ends[1:-1]
-        knots = np.unique([0.0, self.length, *corners - self.path.blend, *corners, *corners + self.path.blend])
-        pieces = [np.linspace(a, b, COMPARED, endpoint=False) for a, b in pairwise(knots)]
+        knots = np.concatenate([[0.0, self.length], corners - self.path.blend, corners, corners + self.path.blend])
+        knots = np.unique(knots)
+        knots = knots[np.append(True, np.diff(knots) > SAME_POSE)]
+        pieces = [
+            np.linspace(a, b, max(count, int(np.ceil((b - a) / step))), endpoint=False) for a, b in pairwise(knots)
+        ]
         return np.append(np.concatenate(pieces) / self.length, 1.0)
 
     def _matched(self, at: Array, known: Array, asked: Array) -> tuple[Array, Array, float]:
@@ -161,6 +169,12 @@ def _fading(x: Array) -> Array:
     """From 1 to 0 over [0, 1], as 1 - 2 x at first: the Bézier curve of the values 1, 3/5, 1/5, 0, 0, 0."""
     y = 1 - x
     return np.asarray(y**5 + 3 * x * y**4 + 2 * x**2 * y**3)
+
+
+def _apart(T: Array, others: Array) -> tuple[Array, Array]:
+    """Distances (k,) [m] and angles (k,) [rad] between poses (k, 4, 4)."""
+    turned = Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(others[:, :3, :3]).inv()
+    return np.linalg.norm(T[:, :3, 3] - others[:, :3, 3], axis=1), np.asarray(turned.magnitude())
 
 
 def _embedded(T: Array) -> Array:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import solve
 from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from models.robot import Array, Limits
@@ -44,7 +45,7 @@ FITTED, RATE_POINTS = 3, 4
 # first durations tried, in multiples of the shortest one of the quintic time scaling
 TIME_SCALES = (1.02, 1.2, 1.5, 2.0, 3.0, 4.5)
 # SLSQP ends when a step changes the cost by less than this share; and after so many iterations
-PROGRESS, MOST_ITERATIONS = 1e-6, 80
+PROGRESS, MOST_ITERATIONS = 1e-5, 80
 # SLSQP's effort grows with the constraints: it has those whose slack 1 - ratio² fell below this, and more in each round
 NEAR, MOST_ROUNDS = 0.75, 6
 # times that an NLP is solved with limits tightened after the solve before
@@ -70,33 +71,40 @@ class RetimingState:
 class PathRetiming:
     """Time scalings of `path`, a spline over [0, 1], in an interval of durations.
 
-    The motions have so many control `points`; unless given, some more than the path.
+    The motion is in `space`, the time scaling in `scaling`. Unless given, both have evenly spaced knots, and the motion
+    has some more control points than the path.
     """
 
     def __init__(
-        self, prepared: PreparedProblem, path: Spline, interval: DurationInterval, points: int | None = None
+        self,
+        prepared: PreparedProblem,
+        path: Spline,
+        interval: DurationInterval,
+        space: bspline.Basis | None = None,
+        scaling: bspline.Basis | None = None,
     ) -> None:
         self.prepared, self.path, self.interval = prepared, path, interval
-        count = min(len(path.control_points) + MORE_POINTS, MOST_POINTS) if points is None else points
-        self.space = bspline.uniform(count)
-        self.scaling = bspline.uniform(SCALING_POINTS)
-        at = np.linspace(0.0, 1.0, FITTED * self.space.n)
+        self.space = space or bspline.uniform(min(len(path.control_points) + MORE_POINTS, MOST_POINTS))
+        self.scaling = scaling or bspline.uniform(SCALING_POINTS)
+        edges, count = np.unique(self.space.knots), FITTED * self.space.n
+        at = np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(edges)), edges)
         self._instants = self.scaling.matrix(at)
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
         self._ends[: self.space.resting, 0], self._ends[-self.space.resting :, 1] = 1.0, 1.0
         matrix = self.space.matrix(at)
         self._fit = np.zeros((self.space.n, len(at)))
-        self._fit[inner] = np.linalg.pinv(matrix[:, inner])
+        self._fit[inner] = solve(matrix[:, inner].T @ matrix[:, inner], matrix[:, inner].T, assume_a="pos")
         self._ends -= self._fit @ matrix @ self._ends
 
-    def solve(self) -> SolveResult:
+    def solve(self, guess: tuple[Array, float] | None = None) -> SolveResult:
         """The time scaling of least cost. While the motion exceeds a limit between the nodes, the limit is tightened.
 
+        A `guess` is a scaling, by its values at the Greville points of its space, and a duration [s].
         Ends by DeadlinePassed if the watched deadline passes.
         """
         prepared = self.prepared
         limits, bounds = prepared.problem.arm.active_limits.scaled(1 - MARGIN), initial_bounds(prepared.path)
-        x, none = self._first(limits), np.zeros(len(self.path.control_points[0]))
+        x, none = self._first(limits) if guess is None else self._of(*guess), np.zeros(len(self.path.control_points[0]))
         iterations = 0
         for solves in range(1, REPAIRS + 1):
             program = RetimingProgram(self, limits, bounds, x)
@@ -154,6 +162,11 @@ class PathRetiming:
                 break
             best, x[-1] = cost, np.log(duration)
         return x
+
+    def _of(self, values: Array, duration: float) -> Array:
+        """The variables of a time scaling with these values at the Greville points."""
+        control = np.linalg.solve(self.scaling.matrix(bspline.greville(self.scaling.knots)), values)
+        return np.append(np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], np.log(duration))
 
     def _cost(self, unit: Spline, duration: float) -> tuple[float, Array]:
         """Cost [J] and limited torques (N, nq) of a motion of 1 s retimed to `duration` [s]."""

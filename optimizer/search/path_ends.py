@@ -100,7 +100,7 @@ def _attempt(prepared: PreparedProblem, start: EndConfiguration, trace: Trace) -
     outside = ((trace.q + shift < limits.q_min) | (trace.q + shift > limits.q_max)).any(axis=1)
     if outside.any():
         first = int(outside.argmax())
-        return PathAttempt(start.label, first / max(len(trace.q) - 1, 1) * trace.followed, "outside_limits")
+        return PathAttempt(start.label, float(trace.at[first]), "outside_limits")
     return PathAttempt(start.label, trace.followed, trace.obstacle or "other_goal")
 
 

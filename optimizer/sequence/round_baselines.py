@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from optimizer.deadline import Clock
+from optimizer.deadline import Clock, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
@@ -70,14 +70,21 @@ def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: float) -> Rou
 
 def _in_time(
     timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: float
-) -> RoundBaseline:
-    """The baseline of a chain with given motions; the time that they leave is waited out where it draws least."""
+) -> RoundBaseline | None:
+    """The baseline of a chain with given motions; the time that they leave is waited out where it draws least.
+
+    None if the time is up.
+    """
     search = timing.search
     pairs = list(zip(search.pairs(nodes), splines, strict=True))
     _, wait = timing.cheapest_wait(nodes, timing.time - sum(spline.duration for spline in splines))
     moving = sum(search.legs[k].prepared.energy(spline).electrical.total for (k, _, _), spline in pairs)
     total = moving + search.dwells(nodes) + wait
-    held = all(search.confirms(*pair, spline) for pair, spline in pairs)
+    try:
+        with watch(search.end):
+            held = all(search.confirms(*pair, spline) for pair, spline in pairs)
+    except DeadlinePassed:
+        return None
     return RoundBaseline(name, timing.time + timing.asked.dwelling, total, held, saving(ours, total))
 
 

@@ -120,12 +120,15 @@ class Basis:
 
     @staticmethod
     def of(knots: Array, least_nodes: int = LEAST_NODES, grid_points: int = GRID_POINTS) -> Basis:
-        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; inner knots have multiplicity three at most."""
+        """The space of clamped knots (n + DEGREE + 1,) over [0, 1]; inner knots have multiplicity three at most.
+
+        With no `grid_points`, the grid is too coarse for peaks.
+        """
         spans = len(np.unique(knots)) - 1
         nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), 3))
         edges = np.unique(knots)
         # slightly inside the span: at a repeated knot jerk jumps, and both of its values count
-        per_span = 4 * max(math.ceil(grid_points / spans / 4), 4)
+        per_span = 4 * max(math.ceil(grid_points / spans / 4), 4 if grid_points else 1)
         grid = (edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(1e-9, 1 - 1e-9, per_span + 1)).ravel()
         step = np.arange(len(grid)) % (per_span + 1)
         return Basis(
