@@ -86,8 +86,7 @@ class PathRetiming:
         self.prepared, self.path, self.interval = prepared, path, interval
         self.space = space or bspline.uniform(min(len(path.control_points) + MORE_POINTS, MOST_POINTS))
         self.scaling = scaling or bspline.uniform(SCALING_POINTS)
-        edges, count = np.unique(self.space.knots), FITTED * self.space.n
-        at = np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(edges)), edges)
+        at = np.linspace(0.0, 1.0, FITTED * self.space.n)
         self._instants = self.scaling.matrix(at)
         inner, self._ends = self.space.free, np.zeros((self.space.n, 2))
         self._ends[: self.space.resting, 0], self._ends[-self.space.resting :, 1] = 1.0, 1.0
@@ -96,19 +95,20 @@ class PathRetiming:
         self._fit[inner] = solve(matrix[:, inner].T @ matrix[:, inner], matrix[:, inner].T, assume_a="pos")
         self._ends -= self._fit @ matrix @ self._ends
 
-    def solve(self, guess: tuple[Array, float] | None = None) -> SolveResult:
+    def solve(self, guess: Array | None = None) -> SolveResult:
         """The time scaling of least cost. While the motion exceeds a limit between the nodes, the limit is tightened.
 
-        A `guess` is a scaling, by its values at the Greville points of its space, and a duration [s].
+        Without a `guess` x (n,), from the quintic time scaling. The variables where it ends are `found`.
         Ends by DeadlinePassed if the watched deadline passes.
         """
         prepared = self.prepared
         limits, bounds = prepared.problem.arm.active_limits.scaled(1 - MARGIN), initial_bounds(prepared.path)
-        x, none = self._first(limits) if guess is None else self._of(*guess), np.zeros(len(self.path.control_points[0]))
+        x, none = self._first(limits) if guess is None else guess, np.zeros(len(self.path.control_points[0]))
         iterations = 0
         for solves in range(1, REPAIRS + 1):
             program = RetimingProgram(self, limits, bounds, x)
             x, spent = program.solve()
+            self.found = x
             iterations += spent
             if program.excess(x) > FEASIBLE:
                 return SolveResult(SolveStatus.FAILED, NONE, iterations, solves)
@@ -163,10 +163,11 @@ class PathRetiming:
             best, x[-1] = cost, np.log(duration)
         return x
 
-    def _of(self, values: Array, duration: float) -> Array:
-        """The variables of a time scaling with these values at the Greville points."""
-        control = np.linalg.solve(self.scaling.matrix(bspline.greville(self.scaling.knots)), values)
-        return np.append(np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], np.log(duration))
+    def variables(self, s: Array, t: Array) -> Array:
+        """The variables of a time scaling that is near s (k,) at times t (k,) [s]."""
+        x = bspline.greville(self.scaling.knots)
+        control = np.linalg.solve(self.scaling.matrix(x), np.interp(x, t / t[-1], s))
+        return np.append(np.maximum.accumulate(np.clip(control, 0.0, 1.0))[self.scaling.free], np.log(t[-1]))
 
     def _cost(self, unit: Spline, duration: float) -> tuple[float, Array]:
         """Cost [J] and limited torques (N, nq) of a motion of 1 s retimed to `duration` [s]."""

@@ -15,14 +15,15 @@ from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, Solve
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
 from optimizer.trajectories import quintic
-from optimizer.trajectories.bspline import DEGREE, Basis, clamped, greville, uniform
+from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.spline import Spline, sample
 
-# spans of the first time scaling, more of them for each corner, and how much finer the second one is
-SPANS, CORNER_SPANS, FINER_SCALING = 12, 4, 2
-# spans of the motion on each span of its path, where fewer do not keep to it; and the shortest one, as a share of the
-# duration
-FINER, SHORTEST = (1, 2, 4), 5e-4
+# spans of the first time scaling, and more of them for each corner; how much finer the second one is, and its spans
+# at most
+SPANS, CORNER_SPANS, FINER_SCALING, MOST_SPANS = 12, 6, 2, 72
+# spans that the motion has more than its path, and at most at first; it has so many times as many until it keeps to
+# the path
+MORE_SPANS, FIRST_SPANS, FINER = 12, 67, (1, 2, 4, 8)
 # instants at which the path's tolerances are checked; samples of the path per control point, to measure along it
 CHECKED, SAMPLED = 2000, 16
 NOT_FINER = "there is no other space of time scalings"
@@ -64,19 +65,23 @@ class ToolPathMotion(Method):
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """The time scaling of least cost in a finer space, from samples q (k, nq) [rad] at t (k,) [s] of a motion along
         the path."""
-        path = self.prepared.joint_path(self.q_start)
-        if fine or path is None:
+        path, scaling = self.prepared.joint_path(self.q_start), self._scaling(FINER_SCALING)
+        if fine or path is None or scaling.n > MOST_SPANS + DEGREE:
             return SolveResult(SolveStatus.FAILED, NOT_FINER)
         try:
             with watch(self.deadline):
-                return self._kept(path, self.interval, self._scaling(FINER_SCALING), (q, t))
+                return self._kept(path, self.interval, scaling, (q, t))
         except DeadlinePassed:
             return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
 
     def _scaling(self, finer: int) -> Basis:
         """The space of the time scaling, so many times finer than the first one."""
+        return _evenly((SPANS + CORNER_SPANS * self._corners) * finer)
+
+    @property
+    def _corners(self) -> int:
         assert self.prepared.problem.tool_path is not None
-        return uniform((SPANS + CORNER_SPANS * len(self.prepared.problem.tool_path.via)) * finer + DEGREE)
+        return len(self.prepared.problem.tool_path.via)
 
     def _intervals(self) -> list[DurationInterval]:
         """The durations that are tried. Work without friction falls with the duration, its smoothed corners do not."""
@@ -92,23 +97,20 @@ class ToolPathMotion(Method):
         guess: tuple[Array, Array] | None = None,
     ) -> SolveResult:
         """The time scaling of least cost from a guess, in a space of motions that is fine enough for the tolerance."""
-        results, space = list[SolveResult](), None
-        guess = guess or self._paced(path)
+        results, x = list[SolveResult](), None
+        t, s = self._paced(path) if guess is None else _on_path(path, *guess)
+        spans = min(len(np.unique(path.knots)) + MORE_SPANS, FIRST_SPANS)
         for finer in FINER:
-            at, s = _on_path(path, *guess)
-            values = np.interp(greville(scaling.knots), at, s)
-            retiming = PathRetiming(self.prepared, path, interval, space, scaling)
-            results.append(retiming.solve((values, float(guess[1][-1]))))
-            found = results[-1].spline
+            retiming = PathRetiming(self.prepared, path, interval, _evenly(spans * finer), scaling)
+            results.append(retiming.solve(retiming.variables(s, t) if x is None else x))
+            found, x = results[-1].spline, retiming.found
             if found is None or self._keeps_to_path(found):
                 return with_effort(results[-1], results)
-            guess = _samples(found)
-            space = _fine_space(path, guess, finer)
         failed = replace(results[-1], status=SolveStatus.FAILED, reason=NOT_KEPT, spline=None)
         return with_effort(failed, results)
 
     def _paced(self, path: Spline) -> tuple[Array, Array]:
-        """Samples q (k, nq) [rad] at t (k,) [s] of a motion that is slow where the path bends.
+        """Times (k,) [s], and fractions (k,) of the path where a motion is then that is slow where the path bends.
 
         At every point, the speed keeps the rates of the path's own derivatives within the limits.
         """
@@ -120,7 +122,7 @@ class ToolPathMotion(Method):
         at = np.linspace(0.0, 1.0, CHECKED)
         # as fast at most as this pace, whose peak is that of the quintic
         duration = float(np.clip(quintic.PEAKS[0] * t[-1], self.t_min, self.t_max))
-        return path.curve(np.interp(quintic.fraction(at), t / t[-1], s)), at * duration
+        return at * duration, np.interp(quintic.fraction(at), t / t[-1], s)
 
     def _keeps_to_path(self, motion: Spline) -> bool:
         """Whether a motion is within the path's tolerances."""
@@ -129,28 +131,16 @@ class ToolPathMotion(Method):
         return max(path_ratios(self.prepared.arm, self.prepared.course, q).values()) <= 1
 
 
-def _fine_space(path: Spline, motion: tuple[Array, Array], finer: int) -> Basis:
-    """A space of motions with so many spans where a motion is on each span of its path."""
-    at, s = _on_path(path, *motion)
-    breaks = np.unique(path.knots)
-    breaks = np.interp(np.arange((len(breaks) - 1) * finer + 1) / finer, np.arange(len(breaks)), breaks)
-    knots = np.union1d(np.interp(breaks, s, at), np.linspace(0.0, 1.0, SPANS + 1))
-    kept = knots[np.append(True, np.diff(knots) > SHORTEST)]
-    kept[-1] = 1.0
-    return Basis.of(clamped(kept), grid_points=0)
+def _evenly(spans: int) -> Basis:
+    """A space with so many even spans."""
+    return Basis.of(clamped(np.linspace(0.0, 1.0, spans + 1)), grid_points=0)
 
 
 def _on_path(path: Spline, q: Array, t: Array) -> tuple[Array, Array]:
-    """Fractions (k,) of the duration, and of the path where a motion is then, by the way that its joints have gone."""
+    """Times (k,) [s], and fractions (k,) of the path where a motion is then, by the way that its joints have gone."""
     s = np.linspace(0.0, 1.0, SAMPLED * len(path.control_points))
     gone, way = _way(q), _way(path.curve(s))
-    return t / t[-1], np.interp(gone / gone[-1], way / way[-1], s)
-
-
-def _samples(motion: Spline) -> tuple[Array, Array]:
-    """Configurations (k, nq) [rad] of a motion, and their times (k,) [s]."""
-    t = np.linspace(0.0, motion.duration, CHECKED)
-    return np.asarray(motion.curve(t)), t
+    return t, np.interp(gone / gone[-1], way / way[-1], s)
 
 
 def _way(q: Array) -> Array:

@@ -96,6 +96,18 @@ def test_a_corner_is_rounded_within_its_blend() -> None:
     assert even.name == "trapezoid" and even.saving > 0, "slow in the corner, fast beside it"
 
 
+@pytest.mark.parametrize("corners", long_but([5], [5, 10]))
+def test_many_tight_corners_are_followed(corners: int) -> None:
+    """A zigzag of lines of 0.1 m and more, with corners of 5 mm."""
+    turns = [moved([-0.1 * (1 - k % 2), 0.4 * (k + 1) / (corners + 1), 0.0]) for k in range(corners + 1)]
+    found = optimize(along(turns[-1], path=ToolPath(via=turns[:-1], blend=0.005)))
+    assert found.certificate.valid and found.certificate.worst_ratio["path_position"] <= 1
+    for corner in turns[:-1]:
+        assert np.linalg.norm(poses_of(found)[:, :3, 3] - corner.T[:3, 3], axis=1).min() < 0.005
+    (even,) = found.baselines
+    assert even.saving > 0.1, "an even speed is as slow everywhere as the corners need"
+
+
 def test_a_pose_finds_the_best_branch() -> None:
     start, goal = moved([0.0, 0.0, 0.0]), moved([0.0, 0.0, -0.1])
     found, given = optimize(along(goal, start)), optimize(along(goal))
