@@ -47,6 +47,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
 def to_tool_path(path: Path) -> ToolPath:
     """The tool path of the library. Raises InvalidProblem."""
     return ToolPath(
+        shape=path.shape,
         via=[to_pose(pose.position, pose) for pose in path.via],
         blend=path.blend,
         position_tolerance=path.tolerance.position,

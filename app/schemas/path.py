@@ -10,7 +10,7 @@ from app.schemas.arm import Speed
 from app.schemas.common import Pose, Request, described
 from app.schemas.orientation import Axis
 from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
-from optimizer.problem.tool_path import LEAST_TOLERANCE, MOST_POINTS, POSITION_TOLERANCE, ROTATION_TOLERANCE
+from optimizer.problem.tool_path import LEAST_TOLERANCE, MOST_POINTS, POSITION_TOLERANCE, ROTATION_TOLERANCE, PathShape
 
 SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
 
@@ -27,20 +27,29 @@ class PathTolerance(Request):
 
 
 class Path(Request):
-    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis.
+    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis; a
+    smooth curve; or an arc.
 
     The branch and the timing are chosen; the tool is on the path from the start to the goal.
     """
 
-    via: Annotated[list[Pose], Field(max_length=MOST_POINTS)] = described(
-        "Poses of the TCP between start and goal.",
+    shape: PathShape = described(
+        "`lines`: straight from pose to pose, with rounded corners. `curve`: smoothly through every pose, as through "
+        "those of a recorded curve. `arc`: on the circle through the start, the one pose of `via` and the goal.",
+        None,
+        "lines",
+        default="lines",
+    )
+    via: Annotated[list[Pose], Field(max_length=max(MOST_POINTS.values()))] = described(
+        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
+        "a curve, exactly one of an arc.",
         None,
         [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
         default=[],
     )
     blend: float = described(
-        "Length of path before and after each pose of `via` on which a smooth curve replaces the corner. Needed with "
-        "`via`, as the arm cannot turn a sharp corner without a stop.",
+        "Length of path before and after each pose of `via` on which a smooth curve replaces the corner of two lines. "
+        "Needed with lines over `via`, as the arm cannot turn a sharp corner without a stop.",
         "m",
         0.02,
         default=0.0,

@@ -33,7 +33,7 @@ REACHED = 1e-9
 JUMP = 0.25
 # knot spans of the joint path on each piece of the course at first, and at most in all; traced points in each of them
 # at least; and the share of the tolerances that the fit may take
-FIRST_SPANS, MOST_SPANS, SAMPLES_IN_SPAN, SHARE = 2, 500, 2, 0.1
+FIRST_SPANS, MOST_SPANS, SAMPLES_IN_SPAN, SHARE = 2, 500, 2, 0.5
 
 Obstacle = Literal["unreachable", "singular"]
 

@@ -18,9 +18,9 @@ from optimizer.trajectories import quintic
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.spline import Spline, sample
 
-# spans of the first time scaling, and more of them for each corner; how much finer the second one is, and its spans
+# spans of the first time scaling, and more of them for each bend; how much finer the second one is, and its spans
 # at most
-SPANS, CORNER_SPANS, FINER_SCALING, MOST_SPANS = 12, 6, 2, 72
+SPANS, BEND_SPANS, FINER_SCALING, MOST_SPANS = 12, 6, 2, 72
 # spans that the motion has more than its path, and at most at first; it has so many times as many until it keeps to
 # the path
 MORE_SPANS, FIRST_SPANS, FINER = 12, 67, (1, 2, 4, 8)
@@ -76,12 +76,8 @@ class ToolPathMotion(Method):
 
     def _scaling(self, finer: int) -> Basis:
         """The space of the time scaling, so many times finer than the first one."""
-        return _evenly((SPANS + CORNER_SPANS * self._corners) * finer)
-
-    @property
-    def _corners(self) -> int:
-        assert self.prepared.problem.tool_path is not None
-        return len(self.prepared.problem.tool_path.via)
+        assert self.prepared.course is not None
+        return _evenly((SPANS + BEND_SPANS * self.prepared.course.shape.bends) * finer)
 
     def _intervals(self) -> list[DurationInterval]:
         """The durations that are tried. Work without friction falls with the duration, its smoothed corners do not."""

@@ -1,16 +1,19 @@
-"""A path that the TCP must follow: straight lines between poses, with smooth corners."""
+"""A path that the TCP must follow: straight lines with smooth corners, a smooth curve, or an arc."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.pose import Pose
 
-MOST_POINTS = 20
+PathShape = Literal["lines", "curve", "arc"]
+# poses between start and goal at most
+MOST_POINTS: dict[PathShape, int] = {"lines": 20, "curve": 500, "arc": 1}
 # finest tolerances [m, rad]: ten times what a motion may bend between two samples of its certificate
 LEAST_TOLERANCE = 1e-5
 # tolerances [m, rad] unless given: a tenth of a millimetre and of a degree
@@ -23,24 +26,32 @@ SAME_POSE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class ToolPath:
-    """How the TCP goes from the start of a motion to its goal: straight, over the poses `via` in the base frame.
+    """How the TCP goes from the start of a motion to its goal over the poses `via` in the base frame.
 
-    Between two poses the position moves straight and the orientation turns evenly about one axis. Within `blend` [m] of
-    path before and after a pose of `via`, a smooth curve leads past it. The motion may be off by at most
-    `position_tolerance` [m] and `rotation_tolerance` [rad].
+    `shape` is "lines", "curve" or "arc". On lines the position moves straight between two poses, and the orientation
+    turns evenly about one axis; within `blend` [m] of path before and after a pose of `via`, a smooth curve leads past
+    it. A curve goes through every pose, with continuous acceleration. An arc is part of the circle through the start,
+    the one pose of `via` and the goal. The motion may be off by at most `position_tolerance` [m] and
+    `rotation_tolerance` [rad].
 
     Raises InvalidProblem, with the field named.
     """
 
     via: Sequence[Pose] = ()
+    shape: PathShape = "lines"
     blend: float = 0.0
     position_tolerance: float = POSITION_TOLERANCE
     rotation_tolerance: float = ROTATION_TOLERANCE
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "via", tuple(self.via))
-        if len(self.via) > MOST_POINTS:
-            raise InvalidProblem("path.via", f"A path must have at most {MOST_POINTS} poses between start and goal.")
+        if self.shape not in MOST_POINTS:
+            raise InvalidProblem("path.shape", f"path.shape must be one of {', '.join(MOST_POINTS)}.")
+        most = MOST_POINTS[self.shape]
+        if len(self.via) > most:
+            raise InvalidProblem("path.via", f"A path of this shape has at most {most} poses between start and goal.")
+        if self.shape == "arc" and not self.via:
+            raise InvalidProblem("path.via", "An arc needs one pose between start and goal, which it goes through.")
         for name in ("position_tolerance", "rotation_tolerance"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= LEAST_TOLERANCE):
@@ -48,9 +59,11 @@ class ToolPath:
                 raise InvalidProblem(field, f"{field} must be at least {LEAST_TOLERANCE:g}.")
         if not (np.isfinite(self.blend) and self.blend >= 0):
             raise InvalidProblem("path.blend", "path.blend must be a length in metres, zero or more.")
-        if self.via and self.blend < self.position_tolerance:
+        if self.shape != "lines" and self.blend > 0:
+            raise InvalidProblem("path.blend", "Only lines have corners: leave path.blend out for a curve or an arc.")
+        if self.shape == "lines" and self.via and self.blend < self.position_tolerance:
             raise InvalidProblem(
                 "path.blend",
                 "The arm cannot turn a sharp corner without a stop: give a path.blend of at least the position's "
-                f"tolerance, {self.position_tolerance:g} m, or one path for each line.",
+                f'tolerance, {self.position_tolerance:g} m, one path for each line, or the shape "curve".',
             )

@@ -35,7 +35,7 @@ ROUNDING = 1e-9
 QUARTER = Rotation.from_rotvec([0.0, 0.0, np.pi / 2])
 
 
-def moved(shift: list[float], turn: Rotation | None = None) -> Pose:
+def moved(shift: list[float] | Array, turn: Rotation | None = None) -> Pose:
     """The home pose, shifted in the base frame [m] and turned about the tool's own axes."""
     T = tcp_pose(HOME).T.copy()
     T[:3, 3] += shift
@@ -94,6 +94,45 @@ def test_a_corner_is_rounded_within_its_blend() -> None:
     assert 0.001 < gap < path.blend
     (even,) = found.baselines
     assert even.name == "trapezoid" and even.saving > 0, "slow in the corner, fast beside it"
+
+
+def test_an_arc_is_part_of_a_circle() -> None:
+    """Three quarters of a circle of 80 mm, upright; the tool keeps its orientation."""
+    radius, centre = 0.08, tcp_pose(HOME).T[:3, 3] + [0.0, 0.08, 0.0]
+    via, goal = moved([0.0, radius * (1 + np.sqrt(0.5)), radius * np.sqrt(0.5)]), moved([0.0, radius, -radius])
+    found = optimize(along(goal, path=ToolPath(shape="arc", via=[via])))
+    assert found.certificate.valid
+    T = poses_of(found)
+    away = T[:, :3, 3] - centre
+    assert np.abs(np.linalg.norm(away, axis=1) - radius).max() < ToolPath().position_tolerance
+    assert np.abs(away[:, 0]).max() < ToolPath().position_tolerance, "in its plane"
+    angle = np.unwrap(np.arctan2(away[:, 2], -away[:, 1]))
+    assert angle[-1] - angle[0] == pytest.approx(1.5 * np.pi, abs=1e-3), "the long way, over the pose between"
+    assert (np.diff(angle) > -1e-6).all()
+
+
+def test_a_recorded_curve_goes_through_every_pose() -> None:
+    """A spiral of one and a half turns that narrows, given by 100 poses, while the tool turns by 0.6 rad."""
+    share = np.linspace(0.0, 1.0, 102)[1:]
+    angle, radius = 3 * np.pi * share, 0.1 - 0.05 * share
+    position = np.stack([-0.1 * share, radius * np.sin(angle), 0.1 - radius * np.cos(angle)], axis=1)
+    poses = [moved(x, Rotation.from_rotvec([0.0, 0.0, 0.6 * u])) for x, u in zip(position, share, strict=True)]
+    found = optimize(along(poses[-1], path=ToolPath(shape="curve", via=poses[:-1])))
+    assert found.certificate.valid
+    T = poses_of(found, 20000)
+    for pose in poses:
+        near = np.linalg.norm(T[:, :3, 3] - pose.T[:3, 3], axis=1).argmin()
+        assert np.linalg.norm(T[near, :3, 3] - pose.T[:3, 3]) < 1.5e-4
+        turned = Rotation.from_matrix(T[near, :3, :3] @ pose.T[:3, :3].T).magnitude()
+        assert turned < 5e-3
+
+
+def test_three_poses_on_a_line_are_no_arc() -> None:
+    for aside in (0.0, 1e-9, 1e-5):
+        path = ToolPath(shape="arc", via=[moved([0.0, 0.1, aside])])
+        with pytest.raises(InvalidProblem) as refusal:
+            optimize(along(moved([0.0, 0.2, 0.0]), path=path))
+        assert refusal.value.field == "path.via.0"
 
 
 @pytest.mark.parametrize("corners", long_but([5], [5, 10]))
@@ -185,6 +224,10 @@ def test_a_path_that_is_none_names_its_field(given: dict[str, Any], field: str) 
     [
         ({"via": [moved([0.0, 0.2, 0.0])]}, "path.blend"),
         ({"blend": -1.0}, "path.blend"),
+        ({"shape": "arc"}, "path.via"),
+        ({"shape": "circle"}, "path.shape"),
+        ({"shape": "curve", "blend": 0.01}, "path.blend"),
+        ({"shape": "arc", "via": [moved([0.0, 0.2, 0.0])] * 2}, "path.via"),
         ({"position_tolerance": 1e-7}, "path.tolerance.position"),
         ({"rotation_tolerance": np.nan}, "path.tolerance.rotation"),
     ],
