@@ -349,7 +349,7 @@ def test_the_bound_holds_for_starts_that_were_not_sampled(seed: int) -> None:
     goal = T.copy()
     goal[:3, 3] += rng.uniform(-0.15, 0.15, 3)
     path = {"arm": arm, "goal": Pose(goal), "tool_path": ToolPath()}
-    found = optimize(Problem(start=Pose(T), deadline=5.0, **path))
+    found = optimize(Problem(start=Pose(T), deadline=AMPLE, **path))
     assert found.status == "feasible"
     given = optimize(Problem(start=q, deadline=AMPLE, **path))
     assert found.lower_bound <= given.energy.electrical.total
