@@ -1,0 +1,82 @@
+"""How far a motion is from the course of a tool path: nothing of the course can be left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from optimizer.certificate import certify
+from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.tool_path import ToolPath
+from optimizer.trajectories.time_scalings import quintic_spline
+from tests.optimizer.moves import tcp_pose
+from tests.optimizer.tool_paths import HOME, along, moved
+
+
+def test_the_certificate_refuses_what_leaves_the_path() -> None:
+    """The straight line in joint space between the same ends is another curve of the tool."""
+    problem = along(moved([0.0, 0.5, 0.0]))
+    q_goal = optimize(problem).goal.q
+    spline = quintic_spline(HOME, q_goal, 2.0)
+    certificate = certify(problem, spline, HOME, q_goal, PreparedProblem.of(problem).energy(spline))
+    assert certificate.worst_ratio["path_position"] > 10 and not certificate.valid
+    free = replace(problem, tool_path=None)
+    assert certify(free, spline, HOME, q_goal, PreparedProblem.of(free).energy(spline)).valid
+
+
+def test_the_certificate_refuses_a_short_cut_of_a_loop() -> None:
+    """Out and back on nearly the same line: who stays at the start is on the path all the time, and does not go it."""
+    out, back = moved([0.0, 0.2, 0.0]), moved([0.0, 0.0, 0.001])
+    course = ToolCourse.of(ToolPath(via=[out], blend=0.02), tcp_pose(HOME).T, back.T)
+    fractions = np.linspace(0.0, 1.0, 500)
+    whole, (lazy, _) = course.poses(fractions), course.deviation(np.array([tcp_pose(HOME).T] * 50))
+    assert course.deviation(whole)[0].max() < course.path.position_tolerance and np.isinf(lazy).all()
+    half = whole[fractions < 0.3]
+    assert np.isinf(course.deviation(np.concatenate([half, half[::-1]]))[0]).all()
+
+
+def test_a_deviation_is_seen_for_what_it_is() -> None:
+    course = ToolCourse.of(ToolPath(), tcp_pose(HOME).T, moved([0.0, 0.3, 0.0]).T)
+    T = course.poses(np.linspace(0.0, 1.0, 400))
+    T[200, :3, 3] += [3e-4, 0.0, 4e-4]
+    T[100, :3, :3] = Rotation.from_rotvec([0.01, 0.0, 0.0]).as_matrix() @ T[100, :3, :3]
+    position, rotation = course.deviation(T)
+    assert position.argmax() == 200 and position.max() == pytest.approx(5e-4, rel=1e-3)
+    assert rotation.argmax() == 100 and rotation.max() == pytest.approx(0.01, rel=1e-3)
+
+
+def test_an_excursion_of_the_path_cannot_be_left_out() -> None:
+    """A needle of 10 mm to the side, on a long path."""
+    foot, tip, back = moved([0.0, 0.15, 0.0]), moved([0.01, 0.15, 0.0]), moved([0.0, 0.1501, 0.0])
+    for tolerance in (1e-4, 4e-3):
+        path = ToolPath(via=[foot, tip, back], blend=tolerance, position_tolerance=tolerance)
+        course = ToolCourse.of(path, tcp_pose(HOME).T, moved([0.0, 0.3, 0.0]).T)
+        T = np.tile(tcp_pose(HOME).T, (2000, 1, 1))
+        T[:, 1, 3] += np.linspace(0.0, 0.3, 2000)
+        assert course.deviation(T)[0].max() > 4e-3
+        assert course.deviation(course.poses(np.linspace(0.0, 1.0, 5000)))[0].max() < tolerance
+
+
+def test_a_course_that_turns_back_between_two_of_its_points_is_compared() -> None:
+    """Two points of the course's grid are the same then."""
+    out = 0.1
+    for cell in range(50, 150, 2):
+        back = out * (200 / (cell + 0.5) - 1)
+        goal = moved([0.0, out - back, 0.0]).T
+        course = ToolCourse.of(ToolPath(via=[moved([0.0, out, 0.0])], blend=0.001), tcp_pose(HOME).T, goal)
+        T = course.poses(np.linspace(0.0, 1.0, 700))
+        half_a_step = course.length / 699 / 2
+        assert course.deviation(T)[0].max() < half_a_step, "what may be left out at the tip between two of the poses"
+
+
+def test_what_is_no_motion_is_not_certified() -> None:
+    problem = along(moved([0.0, 0.3, 0.0]))
+    found = optimize(problem)
+    spline = replace(found.trajectory.spline, control_points=found.trajectory.spline.control_points * np.nan)
+    certificate = certify(problem, spline, HOME, found.goal.q, found.energy)
+    assert np.isnan(certificate.worst_ratio["path_position"]) and not certificate.valid
