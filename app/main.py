@@ -13,6 +13,7 @@ from app import __version__
 from app.engine.pool import Engine
 from app.engine.warm_up import warm
 from app.http.body_limit import BodyLimit
+from app.http.client import sender
 from app.http.handlers import install_handlers
 from app.http.json_body import JsonBody
 from app.http.openapi import install_openapi
@@ -105,4 +106,6 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
     }
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
-    app.add_middleware(RequestContext)
+    app.add_middleware(
+        RequestContext, sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header)
+    )

@@ -50,6 +50,8 @@ def serve(settings: Settings) -> None:
         log_config=None,
         access_log=False,
         server_header=False,
+        # `app.http.client` reads their headers, from trusted proxies only
+        proxy_headers=False,
         # the engine ends the requests in flight before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,6 +25,15 @@ class Settings(BaseSettings):
     host: str = Field(default="0.0.0.0", description="Address to listen on.")
     port: int = Field(
         default=8000, ge=0, le=65535, validation_alias=AliasChoices("JOULEPATH_PORT", "PORT"), description="TCP port."
+    )
+    trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
+        default=(),
+        description="Addresses or networks of the reverse proxies whose reports of the client's address are believed, "
+        "separated by commas.",
+    )
+    proxy_header: Literal["X-Forwarded-For", "Forwarded"] = Field(
+        default="X-Forwarded-For",
+        description="The header in which these proxies report it; the other one is a client's own word.",
     )
     log_level: Literal["debug", "info", "warning", "error"] = Field(
         default="info", description="Lowest level that is logged."
@@ -78,9 +88,9 @@ class Settings(BaseSettings):
         default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."
     )
 
-    @field_validator("robots", mode="before")
+    @field_validator("robots", "trusted_proxies", mode="before")
     @classmethod
-    def _names(cls, given: Any) -> Any:
+    def _listed(cls, given: Any) -> Any:
         return tuple(name.strip() for name in given.split(",") if name.strip()) if isinstance(given, str) else given
 
     @field_validator("robots")

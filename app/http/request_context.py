@@ -1,4 +1,4 @@
-"""The outermost layer: gives each request an id, logs it, and answers every exception."""
+"""The outermost layer: gives each request an id and its client, logs it, and answers every exception."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import logging
 import re
 import time
 import uuid
+from collections.abc import Callable
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.access.client import Client
 from app.exceptions import ClientDisconnected
 from app.http.handlers import problem_response
 
@@ -24,10 +26,14 @@ _CLIENT_CLOSED_REQUEST = 499
 
 
 class RequestContext:
-    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log."""
+    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log.
 
-    def __init__(self, app: ASGIApp) -> None:
+    The client, as `sender` finds it, goes to `request.state.client` and the log. Layers inside may put another there.
+    """
+
+    def __init__(self, app: ASGIApp, sender: Callable[[Scope], Client]) -> None:
         self._app = app
+        self._sender = sender
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers the request, also if an exception comes from inside."""
@@ -36,7 +42,8 @@ class RequestContext:
             return
         given = Headers(scope=scope).get(REQUEST_ID_HEADER, "")
         request_id = given if _SANE_ID.fullmatch(given) else str(uuid.uuid4())
-        scope.setdefault("state", {})["id"] = request_id
+        state = scope.setdefault("state", {})
+        state["id"], state["client"] = request_id, self._sender(scope)
         status = 0
 
         async def send_with_id(message: Message) -> None:
@@ -60,9 +67,12 @@ class RequestContext:
             response = await problem_response(Request(scope), error)
             await response(scope, receive, send_with_id)
         finally:
+            client: Client = state["client"]
             logger.log(
                 # probes come every second or so
                 logging.DEBUG if scope["path"] in _PROBES else logging.INFO,
                 "request",
-                extra=asked | {"status": status, "duration": round(time.perf_counter() - began, 6)},
+                extra=asked
+                | {"client": client.address, "key": client.key}
+                | {"status": status, "duration": round(time.perf_counter() - began, 6)},
             )

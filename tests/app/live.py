@@ -102,13 +102,31 @@ class Server:
         self.process.send_signal(signal.SIGTERM)
         return self.process.wait(EXIT)
 
+    def request_logged(self, path: str) -> dict[str, Any]:
+        """The log's line about the last request for this path, which was answered before."""
+        end = time.monotonic() + ANSWER
+        while True:
+            found = [entry for entry in self.logged() if entry["message"] == "request" and entry["path"] == path]
+            if found:
+                return found[-1]
+            assert time.monotonic() < end, f"no request for {path} is logged"
+            time.sleep(0.02)
+
+    def wait_listening(self) -> None:
+        """Until it answers, workers warm or not."""
+        self._wait_for("/healthz", "the server does not listen")
+
     def wait_ready(self) -> None:
+        """Until all workers are warm."""
+        self._wait_for("/readyz", "the workers do not warm up")
+
+    def _wait_for(self, path: str, failure: str) -> None:
         end = time.monotonic() + WARM_UP
         while True:
             assert self.process.poll() is None, "the server ended by itself"
-            assert time.monotonic() < end, "the workers do not warm up"
+            assert time.monotonic() < end, failure
             try:
-                if self.get("/readyz").status_code == 200:
+                if self.get(path).status_code == 200:
                     return
             except httpx2.TransportError:
                 pass

@@ -1,0 +1,70 @@
+"""The client of a request, in the one place that reads proxies' headers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_address
+from typing import Literal
+
+from starlette.datastructures import Headers
+from starlette.requests import HTTPConnection
+from starlette.types import Scope
+
+from app.access.client import Client
+
+Address = IPv4Address | IPv6Address
+ProxyHeader = Literal["X-Forwarded-For", "Forwarded"]
+
+_NOBODY = "unknown"
+"""Address of a client whose transport has none."""
+
+
+def client_of(request: HTTPConnection) -> Client:
+    """Who sent the request: `RequestContext` has put it into the request's state."""
+    client: Client = request.state.client
+    return client
+
+
+def sender(scope: Scope, proxies: Sequence[IPv4Network | IPv6Network], header: ProxyHeader) -> Client:
+    """The client of a request by its address, without its key.
+
+    Each proxy appends the address that it was called from. From the right, the first address that is no trusted proxy
+    is the client's: everything to the left of it is the client's own word.
+    """
+    peer = scope["client"][0] if scope.get("client") else _NOBODY
+    address = _address(peer)
+    if address is None:
+        return Client(peer)
+    for reported in _reported(Headers(scope=scope).getlist(header), header):
+        if not any(address in network for network in proxies):
+            break
+        further = _address(reported)
+        if further is None:  # a proxy hides its client, or does not know it
+            break
+        address = further
+    return Client(str(address))
+
+
+def _reported(lines: Sequence[str], header: ProxyHeader) -> Iterator[str]:
+    """The addresses that proxies report, the nearest first."""
+    for element in reversed(",".join(lines).split(",")):
+        if header == "X-Forwarded-For":
+            yield element
+        else:  # RFC 7239: `for=192.0.2.60;proto=http`, `For="[2001:db8::1]:4711"`
+            pairs = (pair.partition("=") for pair in element.split(";"))
+            yield next((value for name, _, value in pairs if name.strip().lower() == "for"), "")
+
+
+def _address(text: str) -> Address | None:
+    """The address in `192.0.2.1`, `192.0.2.1:80`, `2001:db8::1`, `[2001:db8::1]:80`, quoted or not; else None."""
+    text = text.strip().strip('"')
+    if text.startswith("["):
+        text = text[1:].partition("]")[0]
+    elif text.count(":") == 1:
+        text = text.partition(":")[0]
+    try:
+        parsed = ip_address(text)
+    except ValueError:
+        return None
+    # a socket for both families shows IPv4 peers as IPv6
+    return (parsed.ipv4_mapped or parsed) if isinstance(parsed, IPv6Address) else parsed
