@@ -35,12 +35,15 @@ WORKDIR /opt/joulepath
 COPY --from=build /opt/joulepath .
 # matplotlib, which toppra imports, keeps its cache only where it may write
 COPY --from=build --chown=joulepath /opt/matplotlib /opt/matplotlib
+# open: who reaches it is decided by the network of the container
 ENV PATH=/opt/joulepath/venv/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
     JOULEPATH_CACHE_DIR=/opt/joulepath/kernels \
     MPLCONFIGDIR=/opt/matplotlib \
     JOULEPATH_DATABASE_URL=sqlite:////var/lib/joulepath/joulepath.db \
+    JOULEPATH_HOST=0.0.0.0 \
+    JOULEPATH_OPEN=1 \
     PORT=8000
 USER joulepath
 # studies outlast the container where a volume is mounted here

@@ -18,12 +18,14 @@ def main() -> None:
 
     start_forkserver()
 
+    from app.access.start import check_access
     from app.logs import configure_logging
     from app.server import serve
     from app.settings import WrongSettings, read_settings
 
     try:
         settings = read_settings()
+        check_access(settings)
     except WrongSettings as error:
         sys.exit(str(error))
     configure_logging(settings.log_level)

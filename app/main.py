@@ -8,16 +8,22 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 from fastapi import FastAPI
+from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
+from app.access.key_ring import KeyRing
+from app.access.start import key_ring
 from app.engine.pool import Engine
 from app.engine.warm_up import warm
+from app.http.authentication import authenticated
 from app.http.body_limit import BodyLimit
 from app.http.client import sender
+from app.http.gate import Gate
 from app.http.handlers import install_handlers
 from app.http.json_body import JsonBody
 from app.http.openapi import install_openapi
 from app.http.request_context import RequestContext
+from app.http.sites import known_host, same_site
 from app.routes import (
     answers,
     compare,
@@ -61,7 +67,10 @@ ROUTES = (
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """The service as an ASGI application. Its workers start and end with the server's lifespan."""
+    """The service as an ASGI application. Its workers start and end with the server's lifespan.
+
+    Raises WrongSettings.
+    """
     settings = settings or Settings()
     app = FastAPI(
         title="joulepath",
@@ -76,9 +85,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=_lifespan,
     )
     app.state.settings = settings
-    _add_middleware(app, settings)
+    keys = key_ring(settings)
+    _add_middleware(app, settings, keys)
     install_handlers(app)
-    install_openapi(app, settings)
+    install_openapi(app, settings, with_keys=keys is not None)
     for module in ROUTES:
         app.include_router(module.router)
     return app
@@ -98,7 +108,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     await store.close()
 
 
-def _add_middleware(app: FastAPI, settings: Settings) -> None:
+def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> None:
     """Adds the middleware, the innermost first."""
     uploads = {
         "/evaluate|/robots|/robots/[^/]+": settings.max_upload_bytes,
@@ -106,6 +116,19 @@ def _add_middleware(app: FastAPI, settings: Settings) -> None:
     }
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
+    if keys is not None:
+        app.add_middleware(Gate, check=authenticated(keys))
+    if settings.cors_origins:
+        # no cookies are used, so that a page may send any header, which is its own
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.cors_origins,
+            allow_methods=["*"],
+            allow_headers=["*"],
+            expose_headers=["*"],
+        )
+    app.add_middleware(Gate, check=same_site(settings.cors_origins))
+    app.add_middleware(Gate, check=known_host(settings.allowed_hosts, settings.host))
     app.add_middleware(
         RequestContext, sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header)
     )

@@ -9,6 +9,7 @@ import socket
 import uvicorn
 from fastapi import FastAPI
 
+from app.access.start import log_access
 from app.engine.pool import Engine
 from app.main import create_app
 from app.settings import Settings
@@ -40,6 +41,7 @@ class _Server(uvicorn.Server):
 def serve(settings: Settings) -> None:
     """Serves in this process until a signal arrives."""
     app = create_app(settings)
+    log_access(settings)
     config = uvicorn.Config(
         app,
         host=settings.host,

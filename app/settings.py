@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import os
+import re
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
+
+_HOST_NAME = re.compile(r"[A-Za-z0-9._-]+")
+_ORIGIN = re.compile(r"https?://([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:[0-9]{1,5})?")
 
 
 def _default_database() -> str:
@@ -22,9 +26,27 @@ class Settings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="JOULEPATH_", frozen=True)
 
-    host: str = Field(default="0.0.0.0", description="Address to listen on.")
+    host: str = Field(default="127.0.0.1", description="Address to listen on.")
     port: int = Field(
         default=8000, ge=0, le=65535, validation_alias=AliasChoices("JOULEPATH_PORT", "PORT"), description="TCP port."
+    )
+    api_keys_file: Path | None = Field(
+        default=None, description="File of API keys, which every request then needs: see `joulepath keys`."
+    )
+    open: bool = Field(
+        default=False,
+        description="Whether the service may listen on an address of the network without API keys. It does not make "
+        "keys optional where there are some.",
+    )
+    allowed_hosts: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(),
+        description="Names under which clients reach the service, separated by commas. Addresses, `localhost`, the "
+        "host's own name and `host` are always among them; `*` stands for any name.",
+    )
+    cors_origins: Annotated[tuple[str, ...], NoDecode] = Field(
+        default=(),
+        description="Origins of web pages that may call the service, e.g. `https://cell4.example`, separated by "
+        "commas; `*` stands for any.",
     )
     trusted_proxies: Annotated[tuple[IPv4Network | IPv6Network, ...], NoDecode] = Field(
         default=(),
@@ -88,10 +110,30 @@ class Settings(BaseSettings):
         default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."
     )
 
-    @field_validator("robots", "trusted_proxies", mode="before")
+    @field_validator("robots", "trusted_proxies", "allowed_hosts", "cors_origins", mode="before")
     @classmethod
     def _listed(cls, given: Any) -> Any:
         return tuple(name.strip() for name in given.split(",") if name.strip()) if isinstance(given, str) else given
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _host_names(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name != "*" and not _HOST_NAME.fullmatch(name):
+                raise ValueError(
+                    f"{name!r} is no name of a host: give names without scheme and port, as `robots.example`"
+                )
+        return tuple(name.lower() for name in names)
+
+    @field_validator("cors_origins")
+    @classmethod
+    def _origins(cls, origins: tuple[str, ...]) -> tuple[str, ...]:
+        for origin in origins:
+            if origin != "*" and not _ORIGIN.fullmatch(origin):
+                raise ValueError(
+                    f"{origin!r} is no origin: give scheme, name and port only, as `https://cell4.example`"
+                )
+        return tuple(origin.lower() for origin in origins)
 
     @field_validator("robots")
     @classmethod

@@ -34,6 +34,10 @@ class Client:
         return self.key
 
 
+OPERATOR = Client("console")
+"""Who uses the database by the console command."""
+
+
 def _network(address: str) -> str:
     try:
         parsed = ip_address(address)

@@ -12,6 +12,7 @@ from app.cli.cycle import cycle
 from app.cli.evaluate import evaluate
 from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
 from app.cli.interrupts import interruptible
+from app.cli.keys import keys
 from app.cli.optimize import optimize
 from app.cli.robots import robots
 from app.cli.serve import serve
@@ -40,7 +41,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, cycle, evaluate, robots):
+for command in (serve, optimize, cycle, evaluate, robots, keys):
     joulepath.add_command(command)
 
 

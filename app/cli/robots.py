@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from app.cli.answer import refused, write
 from app.cli.store import in_store
+from app.cli.table import table
+
+if TYPE_CHECKING:
+    from sqlalchemy.orm import Session
 
 
 @click.group(
@@ -43,6 +49,7 @@ def add(file: Path, name: str | None, replace: bool) -> None:
 
     FILE is a YAML file that names a URDF and says what a URDF does not hold: see docs/own_robot.md.
     """
+    from app.access.client import OPERATOR
     from app.exceptions import ServiceError
     from app.schemas.own_arm import NAME_PATTERN
     from app.settings import Settings
@@ -61,8 +68,11 @@ def add(file: Path, name: str | None, replace: bool) -> None:
         stored.check_own(name)
         figures, warnings = own_figures(name, read_description(file))
         row = OwnRobot(name=name, created=now(), figures=figures, warnings=warnings)
-        put = partial(stored.put if replace else stored.add, robot=row, most=Settings().max_robots)
-        in_store(lambda store: store.write(put))
+        most = Settings().max_robots
+        work: Callable[[Session], object] = partial(stored.add, robot=row, most=most)
+        if replace:
+            work = partial(stored.put, robot=row, most=most, client=OPERATOR)
+        in_store(lambda store: store.write(work))
     except InvalidArm as error:
         raise refused(InvalidProblem(error.field, str(error))) from None
     except ServiceError as error:
@@ -79,12 +89,13 @@ Example:
 @click.argument("name")
 def remove(name: str) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
+    from app.access.client import OPERATOR
     from app.exceptions import ServiceError
     from app.store import robots as stored
     from optimizer.exceptions import UnknownRobot
 
     try:
-        in_store(lambda store: store.write(partial(stored.delete, name=name)))
+        in_store(lambda store: store.write(partial(stored.delete, name=name, client=OPERATOR)))
     except (ServiceError, UnknownRobot) as error:
         raise refused(error) from None
 
@@ -113,6 +124,4 @@ def _table() -> str:
         letters = (" ".join(sorted(trust_letters(figures[part]))) for part in ENERGY_SECTIONS)
         joints, payload = figures["kinematics"]["joint_names"]["value"], figures["limits"]["rated_payload"]["value"]
         rows.append((name, figures["title"], str(len(joints)), f"{payload:g}", *letters))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows)
-    return "\n".join(lines)
+    return table(rows)

@@ -10,7 +10,8 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from app.engine.result import TaskResult, json_document
-from app.exceptions import BodyTooLarge, InvalidRequest, MethodNotAllowed, NotFound, ServiceError
+from app.exceptions import BodyTooLarge, InvalidRequest, MethodNotAllowed, NoKey, NotFound, ServiceError
+from app.http.authentication import challenge
 from app.http.problem_details import invalid_request, problem_content, problem_type
 from optimizer.exceptions import JoulepathError
 
@@ -33,6 +34,8 @@ async def problem_response(request: Request, error: Exception) -> Response:
         if error.status_code == 405:
             headers["Allow"] = ", ".join(_allowed(request))
         error = _from_framework(error)
+    elif isinstance(error, NoKey):
+        headers["WWW-Authenticate"] = challenge(error)
     problem = problem_type(error)
     if problem.retry_after is not None:
         headers["Retry-After"] = str(problem.retry_after)

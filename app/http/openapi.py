@@ -1,4 +1,4 @@
-"""Additions to FastAPI's OpenAPI document: problems, and the longest deadline of the settings."""
+"""Additions to FastAPI's OpenAPI document: problems, API keys, and the longest deadline of the settings."""
 
 from __future__ import annotations
 
@@ -10,11 +10,23 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic.json_schema import models_json_schema
 
-from app.schemas.errors import PROBLEMS, Internal, ProblemDetails
+from app.access.rules import needed_role
+from app.http.authentication import SCHEME
+from app.http.sites import PROBES
+from app.schemas.errors import (
+    PROBLEMS,
+    CrossSite,
+    Internal,
+    ProblemDetails,
+    RoleTooLow,
+    Unauthenticated,
+    WrongHost,
+)
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from app.schemas.examples import BODY_EXAMPLES
 from app.settings import Settings
 
+_SECURITY = "apiKey"
 _REF = "#/components/schemas/{model}"
 
 
@@ -47,22 +59,26 @@ def _response(same_status: list[type[ProblemDetails]]) -> dict[str, Any]:
                 "schema": {"type": "integer", "minimum": 0},
             }
         }
+    if Unauthenticated in same_status:
+        response["headers"] = {
+            "WWW-Authenticate": {"description": "The scheme of the key (RFC 6750).", "schema": {"type": "string"}}
+        }
     return response
 
 
-def install_openapi(app: FastAPI, settings: Settings) -> None:
-    """Serves the completed document at `app.openapi_url`."""
+def install_openapi(app: FastAPI, settings: Settings, with_keys: bool) -> None:
+    """Serves the completed document at `app.openapi_url`. `with_keys`: requests need API keys."""
 
     def document() -> dict[str, Any]:
         if app.openapi_schema is None:
-            app.openapi_schema = _document(app, settings)
+            app.openapi_schema = _document(app, settings, with_keys)
         return app.openapi_schema
 
     # FastAPI's documented way to extend its document
     app.openapi = document  # type: ignore[method-assign]
 
 
-def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
+def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, Any]:
     document = get_openapi(
         title=app.title,
         version=app.version,
@@ -91,11 +107,41 @@ def _document(app: FastAPI, settings: Settings) -> dict[str, Any]:
         for media_type, examples in by_media_type.items():
             operation = document["paths"][path].get("post") or document["paths"][path]["put"]
             operation["requestBody"]["content"][media_type]["examples"] = examples
+    _add_access(document, with_keys)
     for deadline in _deadlines(document):
         deadline["maximum"] = settings.max_deadline
         if "default" in deadline:
             deadline["default"] = min(deadline["default"], settings.max_deadline)
     return document
+
+
+def _add_access(document: dict[str, Any], with_keys: bool) -> None:
+    """What gates answer before a route does, and the API keys."""
+    if with_keys:
+        scheme = {"type": "http", "scheme": SCHEME.lower(), "description": "An API key, see `joulepath keys add`."}
+        document["components"]["securitySchemes"] = {_SECURITY: scheme}
+    for path, operations in document["paths"].items():
+        for method, operation in operations.items():
+            needed = needed_role(method.upper(), path)
+            refusals: list[type[ProblemDetails]] = [] if path in PROBES else [WrongHost]
+            if needed not in (None, "read"):
+                refusals.append(CrossSite)
+            if with_keys and needed is not None:
+                # OpenAPI 3.1: for a scheme without scopes, the role that is needed
+                operation["security"] = [{_SECURITY: [needed]}]
+                refusals += [Unauthenticated] if needed == "read" else [Unauthenticated, RoleTooLow]
+            for problem in refusals:
+                _add_problem(operation["responses"], problem)
+
+
+def _add_problem(responses: dict[str, Any], problem: type[ProblemDetails]) -> None:
+    status = str(problem.model_fields["status"].default)
+    known: list[type[ProblemDetails]] = []
+    if status in responses:
+        schema = responses[status]["content"]["application/problem+json"]["schema"]
+        names = [each["$ref"].rpartition("/")[2] for each in schema.get("oneOf", [schema])]
+        known = [each for each in PROBLEMS if each.__name__ in names]
+    responses[status] = _response([*known, problem])
 
 
 def _deadlines(document: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -10,15 +10,20 @@ from pydantic import ValidationError
 
 from app.convert.fields import candidate_fields, fields, unreachable_fields
 from app.exceptions import (
+    AnswerInUse,
     BodyTooLarge,
     Busy,
+    CrossSite,
     EmptyStudy,
     InvalidRequest,
     KeyReused,
     MethodNotAllowed,
+    NoKey,
     NotFound,
+    NotOwner,
     NotReady,
     RobotExists,
+    RoleTooLow,
     ServiceError,
     ShuttingDown,
     StoreUnavailable,
@@ -28,6 +33,7 @@ from app.exceptions import (
     UnknownStudy,
     UnsupportedMediaType,
     WorkerDied,
+    WrongHost,
 )
 from app.schemas import errors as problems
 from app.schemas.common import KEY_HEADER
@@ -64,6 +70,12 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     KeyReused: problems.KeyReused,
     RobotExists: problems.RobotExists,
     TooManyRobots: problems.TooManyRobots,
+    NoKey: problems.Unauthenticated,
+    RoleTooLow: problems.RoleTooLow,
+    NotOwner: problems.NotOwner,
+    AnswerInUse: problems.AnswerInUse,
+    CrossSite: problems.CrossSite,
+    WrongHost: problems.WrongHost,
     NotFound: problems.NotFound,
     MethodNotAllowed: problems.MethodNotAllowed,
     BodyTooLarge: problems.BodyTooLarge,

@@ -15,12 +15,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.access.client import Client
 from app.exceptions import ClientDisconnected
 from app.http.handlers import problem_response
+from app.http.sites import PROBES
 
 logger = logging.getLogger("app.request")
 
 REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-_PROBES = ("/healthz", "/readyz")
 _CLIENT_CLOSED_REQUEST = 499
 """Status in the log, never sent, of a request whose client closed the connection: nginx's convention."""
 
@@ -70,7 +70,7 @@ class RequestContext:
             client: Client = state["client"]
             logger.log(
                 # probes come every second or so
-                logging.DEBUG if scope["path"] in _PROBES else logging.INFO,
+                logging.DEBUG if scope["path"] in PROBES else logging.INFO,
                 "request",
                 extra=asked
                 | {"client": client.address, "key": client.key}

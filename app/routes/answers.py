@@ -1,4 +1,4 @@
-"""GET /answers/{id}."""
+"""GET and DELETE /answers/{id}."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastapi import APIRouter, Path, Response
 from app.engine.result import TaskResult
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceStore
+from app.routes.dependencies import ServiceClient, ServiceStore
 from app.schemas import errors as problems
 from app.schemas.answers import StoredAnswer
 from app.schemas.examples.values import ANSWER_ID
@@ -20,16 +20,30 @@ from app.store import answers
 router = APIRouter(prefix="/answers", tags=["answers"])
 
 
+AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])]
+
+
 @router.get(
     "/{id}",
     summary="A stored answer",
     response_model=StoredAnswer,
     responses=problem_responses(problems.UnknownAnswer, problems.StoreUnavailable),
 )
-async def show(
-    id: Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])], store: ServiceStore
-) -> Response:
+async def show(id: AnswerId, store: ServiceStore) -> Response:
     """The complete answer that another answer refers to."""
     answer, body = await store.read(partial(answers.get, answer_id=id))
-    content = {"id": answer.id, "kind": answer.kind, "created": answer.created, "answer": orjson.Fragment(body)}
-    return result_response(TaskResult.of_json(content))
+    content = {name: getattr(answer, name) for name in ("id", "kind", "created", "owner")}
+    return result_response(TaskResult.of_json(content | {"answer": orjson.Fragment(body)}))
+
+
+@router.delete(
+    "/{id}",
+    summary="Delete a stored answer",
+    status_code=204,
+    responses=problem_responses(
+        problems.UnknownAnswer, problems.AnswerInUse, problems.NotOwner, problems.StoreUnavailable
+    ),
+)
+async def delete(id: AnswerId, store: ServiceStore, client: ServiceClient) -> None:
+    """Deletes an answer. One of a study is deleted with its study."""
+    await store.write(partial(answers.delete, answer_id=id, client=client))

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import CYCLE_PROBLEMS
 from app.schemas.cycle import CycleRequest, CycleResponse
@@ -33,10 +33,11 @@ async def cycle(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     store: ServiceStore,
+    client: ServiceClient,
 ) -> Response:
     """Finds the arm configuration at every stop of a round, and the motions between them, that need the least
     electrical energy together. The configuration at one stop decides what the moves from there cost, so that all are
     chosen at once. Each move refers to its complete answer. `Accept: text/csv` returns the samples of the round."""
     task = CycleTask(body, request.state.id, wanted)
     result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
-    return result_response(await store_answers(store, settings, "optimize", result))
+    return result_response(await store_answers(store, settings, "optimize", result, client.owner))

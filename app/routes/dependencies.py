@@ -6,7 +6,9 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
+from app.access.client import Client
 from app.engine.pool import Engine
+from app.http.client import client_of
 from app.settings import Settings
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
@@ -29,6 +31,12 @@ async def _store(request: Request) -> Store:
     return store
 
 
+async def _client(request: Request) -> Client:
+    return client_of(request)
+
+
+ServiceClient = Annotated[Client, Depends(_client)]
+"""Who sent the request."""
 ServiceSettings = Annotated[Settings, Depends(_settings)]
 ServiceEngine = Annotated[Engine, Depends(_engine)]
 ServiceStore = Annotated[Store, Depends(_store)]

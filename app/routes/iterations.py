@@ -9,10 +9,11 @@ from typing import Annotated, Any, TypeVar
 import orjson
 from fastapi import APIRouter, Body, Path, Request, Response
 
+from app.access.rules import check_owner
 from app.engine.result import TaskResult
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -48,6 +49,7 @@ MOST_ITERATIONS = 2**31 - 1
             problems.InvalidTable,
             problems.KeyReused,
             problems.UnknownStudy,
+            problems.NotOwner,
             problems.StoreUnavailable,
         ),
     },
@@ -60,18 +62,20 @@ async def add(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     store: ServiceStore,
+    client: ServiceClient,
     key: Key = None,
 ) -> Any:
     """Computes the next iteration and stores the request and the complete answer. Returns its energy and the changes
     from the previous and the best iteration. A failed request returns its problem, and the study does not record it."""
     study = (await store.read(partial(studies.history, study_id=id))).study
+    check_owner(client, study.owner)
     kind, asked = _completed(body, study)
     sent = asked.model_dump(mode="json", exclude_unset=True)
     known = await store.read(partial(studies.known_step, study_id=id, kind=kind, request=sent, key=key))
     if known is None:
         work = _result(asked, request.state.id, engine, settings.max_deadline)
         step = _step(kind, sent, (await unless_disconnected(request, work)).document)
-        number, again = await store.write(partial(studies.add, study_id=id, step=step, key=key))
+        number, again = await store.write(partial(studies.add, study_id=id, step=step, key=key, client=client))
     else:
         number, again = known, True
     set_location(request, response, f"{id}/iterations/{number}", again)

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -34,9 +34,10 @@ async def pareto(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     store: ServiceStore,
+    client: ServiceClient,
 ) -> Response:
     """Finds the Pareto front of duration and energy over all arm configurations, from the fastest motion to the motion
     of least energy. Each point refers to its complete answer. `Accept: text/csv` returns the points as CSV."""
     task = ParetoTask(body, request.state.id, wanted)
     result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
-    return result_response(await store_answers(store, settings, "optimize", result))
+    return result_response(await store_answers(store, settings, "optimize", result, client.owner))

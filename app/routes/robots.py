@@ -10,10 +10,11 @@ from fastapi import APIRouter, Path, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from app.access.client import Client
 from app.exceptions import RobotExists
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceClient, ServiceEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import LOCATION_HEADER
 from app.routes.problem_lists import ADDING_PROBLEMS
 from app.schemas import errors as problems
@@ -41,8 +42,8 @@ async def list_robots(store: ServiceStore) -> RobotList:
     added = await store.read(robots.all_of)
     return RobotList(
         robots=[
-            *(RobotSummary(**_summary(name, figures, added=False)) for name, figures in bundled.items()),
-            *(RobotSummary(**_summary(each.name, each.figures, added=True)) for each in added),
+            *(RobotSummary(**_summary(name, figures, added=False, owner=None)) for name, figures in bundled.items()),
+            *(RobotSummary(**_summary(each.name, each.figures, added=True, owner=each.owner)) for each in added),
         ]
     )
 
@@ -61,11 +62,12 @@ async def add(
     settings: ServiceSettings,
     engine: ServiceEngine,
     store: ServiceStore,
+    client: ServiceClient,
 ) -> RobotDetail:
     """Adds an arm of your own, from its URDF and what a URDF does not hold. What is missing follows from stated rules,
     is marked with the trust letter E, and listed in `warnings`."""
     robots.check_own(body.name)
-    robot = await _computed(request, body.name, body, engine, settings.max_deadline)
+    robot = await _computed(request, body.name, body, engine, settings.max_deadline, client)
     try:
         await store.write(partial(robots.add, robot=robot, most=settings.max_robots))
     except IntegrityError:  # another process has just added a robot of this name
@@ -84,7 +86,7 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     """Kinematics, inertials, limits, drives and electronics, each parameter with its source and trust letter. Also the
     friction laws with their coefficients."""
     if name in robot_names():
-        return _detail(name, load_robot(name).figures, added=False, warnings=[])
+        return _detail(name, load_robot(name).figures, added=False, owner=None, warnings=[])
     return _of_user(await store.read(partial(robots.get, name=name)))
 
 
@@ -94,7 +96,7 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     response_model=RobotDetail,
     responses={
         201: {"model": RobotDetail, "description": "Added", "headers": LOCATION_HEADER},
-        **problem_responses(*ADDING_PROBLEMS, problems.RobotExists),
+        **problem_responses(*ADDING_PROBLEMS, problems.RobotExists, problems.NotOwner),
     },
 )
 async def put(
@@ -105,12 +107,13 @@ async def put(
     settings: ServiceSettings,
     engine: ServiceEngine,
     store: ServiceStore,
+    client: ServiceClient,
 ) -> RobotDetail:
     """Adds an arm of your own under this name, or replaces it. Requests from then on use the new one; stored answers
     stay."""
     robots.check_own(name)
-    robot = await _computed(request, name, body, engine, settings.max_deadline)
-    write = partial(robots.put, robot=robot, most=settings.max_robots)
+    robot = await _computed(request, name, body, engine, settings.max_deadline, client)
+    write = partial(robots.put, robot=robot, most=settings.max_robots, client=client)
     try:
         is_new = await store.write(write)
     except IntegrityError:  # another process has just added it
@@ -125,27 +128,32 @@ async def put(
     "/{name}",
     summary="Delete a robot",
     status_code=204,
-    responses=problem_responses(problems.UnknownRobot, problems.RobotExists, problems.StoreUnavailable),
+    responses=problem_responses(
+        problems.UnknownRobot, problems.RobotExists, problems.NotOwner, problems.StoreUnavailable
+    ),
 )
-async def delete(name: Name, store: ServiceStore) -> None:
+async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
-    await store.write(partial(robots.delete, name=name))
+    await store.write(partial(robots.delete, name=name, client=client))
 
 
-async def _computed(request: Request, name: str, arm: OwnArm, engine: ServiceEngine, deadline: float) -> OwnRobot:
+async def _computed(
+    request: Request, name: str, arm: OwnArm, engine: ServiceEngine, deadline: float, client: Client
+) -> OwnRobot:
     """The row of a user's arm. Raises InvalidProblem."""
     task = OwnRobotTask(name, arm, request.state.id)
     content = orjson.loads((await unless_disconnected(request, engine.run(task, deadline))).document)
-    return OwnRobot(name=name, created=now(), **content)
+    return OwnRobot(name=name, created=now(), owner=client.owner, **content)
 
 
 def _of_user(row: OwnRobot) -> RobotDetail:
-    return _detail(row.name, row.figures, added=True, warnings=row.warnings)
+    return _detail(row.name, row.figures, added=True, owner=row.owner, warnings=row.warnings)
 
 
-def _detail(name: str, figures: dict[str, Any], added: bool, warnings: list[str]) -> RobotDetail:
+def _detail(name: str, figures: dict[str, Any], added: bool, owner: str | None, warnings: list[str]) -> RobotDetail:
     content: dict[str, Any] = {section: figures.get(section) for section in _SECTIONS}
-    content |= _summary(name, figures, added) | {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}
+    content |= _summary(name, figures, added, owner)
+    content |= {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}
     return RobotDetail(**content)
 
 
@@ -161,11 +169,12 @@ def _friction(figures: dict[str, Any]) -> Friction:
     )
 
 
-def _summary(name: str, figures: dict[str, Any], added: bool) -> dict[str, Any]:
+def _summary(name: str, figures: dict[str, Any], added: bool, owner: str | None) -> dict[str, Any]:
     return {
         "name": name,
         "title": figures["title"],
         "joints": figures["kinematics"]["joint_names"]["value"],
         "added": added,
+        "owner": owner,
         "energy_trust": energy_trust(figures),
     }

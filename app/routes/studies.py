@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.exc import IntegrityError
 
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceStore
+from app.routes.dependencies import ServiceClient, ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from app.schemas import errors as problems
 from app.schemas.examples.studies import STUDY_CSV
@@ -42,11 +42,12 @@ async def create(
     response: Response,
     body: StudyRequest,
     store: ServiceStore,
+    client: ServiceClient,
     key: Key = None,
 ) -> StudySummary:
     """Begins a study: a motion that is improved step by step until its energy is at most `threshold`."""
     await robot_in(store, body.robot)
-    study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key)
+    study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key, client.owner)
     try:
         made, again = await store.write(partial(studies.create, study=study))
     except IntegrityError:  # another process has just created the study of this key
@@ -89,8 +90,8 @@ async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Respon
     "/{id}",
     summary="Delete a study",
     status_code=204,
-    responses=problem_responses(problems.UnknownStudy, problems.StoreUnavailable),
+    responses=problem_responses(problems.UnknownStudy, problems.NotOwner, problems.StoreUnavailable),
 )
-async def delete(id: StudyId, store: ServiceStore) -> None:
+async def delete(id: StudyId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes the study with its iterations and their answers."""
-    await store.write(partial(studies.delete, study_id=id))
+    await store.write(partial(studies.delete, study_id=id, client=client))

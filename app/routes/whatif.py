@@ -7,7 +7,7 @@ from fastapi import APIRouter, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -32,6 +32,7 @@ async def whatif(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     store: ServiceStore,
+    client: ServiceClient,
 ) -> Response:
     """Compares one motion on the arm as it is with the same task on changed arms: lighter links, another payload, other
     drives or limits. Each change has two results, as differences from the base: the base's motion on the changed arm,
@@ -39,4 +40,4 @@ async def whatif(
     task = WhatifTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
     kind = "evaluate" if body.optimize is None else "optimize"
-    return result_response(await store_answers(store, settings, kind, result))
+    return result_response(await store_answers(store, settings, kind, result, client.owner))

@@ -15,6 +15,7 @@ class StoredAnswer(Response):
     id: str = described("Id of the answer.", None, ANSWER_ID)
     kind: str = described("Endpoint of the answer: `optimize` or `evaluate`.", None, "optimize")
     created: datetime = described("Time at which it was computed, in UTC.", None, CREATED)
+    owner: str | None = described("Name of the API key that asked for it; null without one.", None, "press_shop")
     answer: dict[str, Any] = described(
         "The answer, with the fields that this endpoint documents.",
         None,

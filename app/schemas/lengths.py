@@ -8,5 +8,7 @@ KEY_LENGTH = 128
 """Of an `Idempotency-Key`."""
 NAME_LENGTH = 200
 """Of a study's name."""
+OWNER_LENGTH = 64
+"""Of the name of an API key."""
 ROBOT_LENGTH = 64
 """Of a robot's name."""

@@ -53,6 +53,7 @@ class RobotSummary(Response):
         "Names of the joints, from base to flange.", None, ["shoulder_pan_joint", "shoulder_lift_joint"]
     )
     added: bool = described("Whether a user added it; the others come with the service.", None, False)
+    owner: str | None = described("Name of the API key that added it; null without one.", None, "press_shop")
     energy_trust: str = described(
         "What the energies of this robot rest on, from the trust letters of its parameters.",
         None,

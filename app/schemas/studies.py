@@ -120,6 +120,7 @@ class StudySummary(Response):
     )
     threshold: float = described("Energy that is low enough, of the objective.", "J", 60.0)
     created: datetime = described("Time at which the study was created, in UTC.", None, CREATED)
+    owner: str | None = described("Name of the API key that created it; null without one.", None, "press_shop")
     iterations: int = described("Number of iterations.", "1", 2)
     last: IterationEnergy | None = part("The last iteration; null without iterations.")
     best: IterationEnergy | None = part("The iteration of least energy, the first of equals; null without iterations.")

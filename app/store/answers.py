@@ -5,14 +5,24 @@ from __future__ import annotations
 import zlib
 from datetime import timedelta
 
-from sqlalchemy import delete, func, select
+from sqlalchemy import delete as delete_from
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from app.exceptions import UnknownAnswer
+from app.access.client import Client
+from app.access.rules import check_owner
+from app.exceptions import AnswerInUse, UnknownAnswer
 from app.store.tables import Answer, is_id, new_id, now
 
 
-def put(session: Session, kind: str, body: bytes, study_id: str | None = None, answer_id: str | None = None) -> str:
+def put(
+    session: Session,
+    kind: str,
+    body: bytes,
+    study_id: str | None = None,
+    answer_id: str | None = None,
+    owner: str | None = None,
+) -> str:
     """Stores an answer, the JSON document of the endpoint `kind`, and returns its id: `answer_id`, or a new one.
 
     The answer of a study stays until the study is deleted; any other until `prune` deletes it.
@@ -21,7 +31,15 @@ def put(session: Session, kind: str, body: bytes, study_id: str | None = None, a
     compressed = zlib.compress(body, zlib.Z_BEST_SPEED)
     answer_id = new_id() if answer_id is None else answer_id
     session.add(
-        Answer(id=answer_id, kind=kind, created=now(), study_id=study_id, size=len(compressed), body=compressed)
+        Answer(
+            id=answer_id,
+            kind=kind,
+            created=now(),
+            owner=owner,
+            study_id=study_id,
+            size=len(compressed),
+            body=compressed,
+        )
     )
     return answer_id
 
@@ -34,11 +52,22 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
     return answer, zlib.decompress(answer.body)
 
 
+def delete(session: Session, answer_id: str, client: Client) -> None:
+    """Deletes an answer. Raises UnknownAnswer, NotOwner, or AnswerInUse for an answer of a study."""
+    answer = session.get(Answer, answer_id) if is_id(answer_id) else None
+    if answer is None:
+        raise UnknownAnswer
+    check_owner(client, answer.owner)
+    if answer.study_id is not None:
+        raise AnswerInUse
+    session.delete(answer)
+
+
 def prune(session: Session, max_bytes: int, max_age: timedelta) -> None:
     """Deletes answers of no study: those older than `max_age`, then the oldest until the rest fit `max_bytes`."""
     session.flush()
     free = Answer.study_id.is_(None)
-    session.execute(delete(Answer).where(free, Answer.created < now() - max_age))
+    session.execute(delete_from(Answer).where(free, Answer.created < now() - max_age))
     newest_first = func.sum(Answer.size).over(order_by=(Answer.created.desc(), Answer.id))
     so_far = select(Answer.id, newest_first.label("bytes")).where(free).subquery()
-    session.execute(delete(Answer).where(Answer.id.in_(select(so_far.c.id).where(so_far.c.bytes > max_bytes))))
+    session.execute(delete_from(Answer).where(Answer.id.in_(select(so_far.c.id).where(so_far.c.bytes > max_bytes))))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from app.access.client import Client
+from app.access.rules import check_owner
 from app.exceptions import RobotExists, TooManyRobots
 from app.store.tables import OwnRobot
 from models.registry import robot_names
@@ -38,10 +40,15 @@ def add(session: Session, robot: OwnRobot, most: int) -> None:
     session.add(robot)
 
 
-def put(session: Session, robot: OwnRobot, most: int) -> bool:
-    """Adds or replaces a robot; whether it is new. Raises TooManyRobots if it is one more than `most`."""
+def put(session: Session, robot: OwnRobot, most: int, client: Client) -> bool:
+    """Adds or replaces a robot, which keeps its owner; whether it is new.
+
+    Raises NotOwner, or TooManyRobots if it is one more than `most`.
+    """
     known = session.get(OwnRobot, robot.name)
     if known is not None:
+        check_owner(client, known.owner)
+        robot.owner = known.owner
         known.created, known.figures, known.warnings = robot.created, robot.figures, robot.warnings
         return False
     _check_count(session, most)
@@ -49,10 +56,15 @@ def put(session: Session, robot: OwnRobot, most: int) -> bool:
     return True
 
 
-def delete(session: Session, name: str) -> None:
-    """Deletes a robot. Raises RobotExists for one that comes with the service, UnknownRobot if there is none."""
+def delete(session: Session, name: str, client: Client) -> None:
+    """Deletes a robot.
+
+    Raises RobotExists for one that comes with the service, UnknownRobot if there is none, or NotOwner.
+    """
     check_own(name)
-    session.delete(get(session, name))
+    robot = get(session, name)
+    check_owner(client, robot.owner)
+    session.delete(robot)
 
 
 def _check_count(session: Session, most: int) -> None:

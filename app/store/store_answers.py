@@ -13,18 +13,20 @@ from app.store import answers
 from app.store.store import Store
 
 
-async def store_answers(store: Store, settings: Settings, kind: str, result: TaskResult) -> TaskResult:
+async def store_answers(
+    store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None
+) -> TaskResult:
     """The result, once the answers that it refers to are stored.
 
-    Stores `result.stored`, answers of the endpoint `kind`, and deletes answers that are too old or too many. Raises
-    StoreUnavailable.
+    Stores `result.stored`, answers of the endpoint `kind` that belong to `owner`. Deletes answers that are too old or
+    too many. Raises StoreUnavailable.
     """
     if not result.stored:
         return result
 
     def put(session: Session) -> None:
         for answer in result.stored:
-            answers.put(session, kind, answer.body, answer_id=answer.id)
+            answers.put(session, kind, answer.body, answer_id=answer.id, owner=owner)
         answers.prune(session, settings.answers_max_bytes, timedelta(days=settings.answers_max_age))
 
     await store.write(put)

@@ -11,6 +11,8 @@ from sqlalchemy import and_, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
+from app.access.client import Client
+from app.access.rules import check_owner
 from app.exceptions import KeyReused, UnknownIteration, UnknownStudy
 from app.store import answers
 from app.store.tables import Iteration, Study, is_id, new_id, now
@@ -53,7 +55,8 @@ def create(session: Session, study: Study) -> tuple[Study, bool]:
         known = session.scalar(select(Study).where(Study.idempotency_key == study.idempotency_key))
         if known is not None:
             if any(
-                getattr(known, name) != getattr(study, name) for name in ("name", "robot", "objective", "threshold")
+                getattr(known, name) != getattr(study, name)
+                for name in ("name", "robot", "objective", "threshold", "owner")
             ):
                 raise KeyReused
             return known, True
@@ -81,9 +84,11 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[History]
     return histories, None if last is None else f"{(last.created - _EPOCH) // _MICROSECOND}_{last.id}"
 
 
-def delete(session: Session, study_id: str) -> None:
-    """Deletes a study, its iterations and their answers. Raises UnknownStudy."""
-    session.execute(delete_from(Study).where(Study.id == _study(session, study_id).id))
+def delete(session: Session, study_id: str, client: Client) -> None:
+    """Deletes a study, its iterations and their answers. Raises UnknownStudy or NotOwner."""
+    study = _study(session, study_id)
+    check_owner(client, study.owner)
+    session.execute(delete_from(Study).where(Study.id == study.id))
 
 
 def known_step(session: Session, study_id: str, kind: str, request: dict[str, Any], key: str | None) -> int | None:
@@ -102,11 +107,12 @@ def known_step(session: Session, study_id: str, kind: str, request: dict[str, An
     return known.number
 
 
-def add(session: Session, study_id: str, step: Step, key: str | None) -> tuple[int, bool]:
+def add(session: Session, study_id: str, step: Step, key: str | None, client: Client) -> tuple[int, bool]:
     """Adds an iteration and returns its number with False; if its key is known, the number of that key with True.
 
-    Raises UnknownStudy or KeyReused.
+    Raises UnknownStudy, NotOwner or KeyReused.
     """
+    check_owner(client, _study(session, study_id).owner)
     # locks the study (PostgreSQL), so that numbers have no gaps; SQLite has one writer at a time anyway
     if session.scalar(select(Study.id).where(Study.id == study_id).with_for_update()) is None:
         raise UnknownStudy
@@ -116,7 +122,7 @@ def add(session: Session, study_id: str, step: Step, key: str | None) -> tuple[i
     last = session.scalar(
         select(Iteration.number).where(Iteration.study_id == study_id).order_by(Iteration.number.desc()).limit(1)
     )
-    answer_id = answers.put(session, step.kind, step.answer, study_id)
+    answer_id = answers.put(session, step.kind, step.answer, study_id, owner=client.owner)
     session.flush()
     number = (last or 0) + 1
     session.add(
@@ -148,7 +154,7 @@ def up_to(session: Session, study_id: str, number: int) -> History:
     return History(study, [entry for entry in _iterations(session, [study_id]) if entry.number <= number])
 
 
-def new_study(name: str, robot: str, objective: str, threshold: float, key: str | None) -> Study:
+def new_study(name: str, robot: str, objective: str, threshold: float, key: str | None, owner: str | None) -> Study:
     """A new study, not yet in the database."""
     return Study(
         id=new_id(),
@@ -157,6 +163,7 @@ def new_study(name: str, robot: str, objective: str, threshold: float, key: str 
         objective=objective,
         threshold=threshold,
         created=now(),
+        owner=owner,
         idempotency_key=key,
     )
 

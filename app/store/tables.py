@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from app.schemas.lengths import ID_LENGTH, KEY_LENGTH, NAME_LENGTH, ROBOT_LENGTH
+from app.schemas.lengths import ID_LENGTH, KEY_LENGTH, NAME_LENGTH, OWNER_LENGTH, ROBOT_LENGTH
 
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
@@ -52,7 +52,7 @@ class Instant(TypeDecorator[datetime]):
 
 
 class Table(DeclarativeBase):
-    """Base of the tables."""
+    """Base of the tables. A column `owner` has the name of the API key that created the row; null without one."""
 
     metadata = MetaData(naming_convention=_NAMES)
 
@@ -69,6 +69,7 @@ class Study(Table):
     objective: Mapped[str] = mapped_column(String(32))
     threshold: Mapped[float]
     created: Mapped[datetime] = mapped_column(Instant)
+    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
 
 
@@ -79,6 +80,7 @@ class OwnRobot(Table):
 
     name: Mapped[str] = mapped_column(String(ROBOT_LENGTH), primary_key=True)
     created: Mapped[datetime] = mapped_column(Instant)
+    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     figures: Mapped[dict[str, Any]] = mapped_column(JSON)
     warnings: Mapped[list[str]] = mapped_column(JSON)
 
@@ -94,6 +96,7 @@ class Answer(Table):
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
     kind: Mapped[str] = mapped_column(String(32))
     created: Mapped[datetime] = mapped_column(Instant)
+    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
     size: Mapped[int]
     """Size of the compressed body [byte]."""

@@ -25,6 +25,7 @@ _COLUMNS = {
     "threshold_met": "threshold_met",
     "answer": "answer",
 }
+_OF_STUDY = ("id", "name", "robot", "objective", "threshold", "created", "owner")
 
 
 def summary(history: History) -> dict[str, Any]:
@@ -32,7 +33,7 @@ def summary(history: History) -> dict[str, Any]:
     study, energies = history.study, history.energies
     met = first_met(energies, study.threshold)
     return {
-        **{name: getattr(study, name) for name in ("id", "name", "robot", "objective", "threshold", "created")},
+        **{name: getattr(study, name) for name in _OF_STUDY},
         "iterations": len(energies),
         "last": _reached(history, len(energies) - 1 if energies else None),
         "best": _reached(history, best_of(energies)),

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.live import GRACE, WARM_UP, Server, serving
+from tests.app.live import GRACE, LOCAL, WARM_UP, Server, serving
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -25,7 +25,9 @@ def _database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def client() -> Iterator[TestClient]:
     """The service in this process, its two workers warm."""
     with TestClient(
-        create_app(Settings(workers=2, queue_size=4, deadline_grace=GRACE)), raise_server_exceptions=False
+        create_app(Settings(workers=2, queue_size=4, deadline_grace=GRACE)),
+        base_url=LOCAL,
+        raise_server_exceptions=False,
     ) as client:
         end = time.monotonic() + WARM_UP
         while client.get("/readyz").status_code != 200:

@@ -19,6 +19,8 @@ from typing import Any
 
 import httpx2
 
+LOCAL = "http://localhost"
+"""Where a client in the same process finds the service: a name that it is always known by."""
 ROOT = Path(__file__).parents[2]
 WARM_UP = 150.0
 """Most that a cold start may take on a busy machine [s]: imports, loading the kernels, a first solve. Alone: 3 s."""
@@ -141,9 +143,9 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
         port = free.getsockname()[1]
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log")
-        settings = {"database_url": f"sqlite:///{folder}/joulepath.db", **settings}
+        settings = {"database_url": f"sqlite:///{folder}/joulepath.db", "host": "127.0.0.1", **settings}
         environment = {f"JOULEPATH_{name.upper()}": str(value) for name, value in settings.items()}
-        environment |= {"JOULEPATH_LOG_LEVEL": "debug", "JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)}
+        environment |= {"JOULEPATH_LOG_LEVEL": "debug", "PORT": str(port)}
         with log.open("ab") as appended:
             process = subprocess.Popen(
                 [sys.executable, "-m", "app"], cwd=ROOT, env=os.environ | environment, stderr=appended

@@ -14,10 +14,11 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.schemas.examples.own_arm import PUT_EXAMPLES
+from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR
 
 # the document is served before the workers run
-DOCUMENT: dict[str, Any] = json.loads(TestClient(create_app()).get("/openapi.json").content)
+DOCUMENT: dict[str, Any] = json.loads(TestClient(create_app(), base_url=LOCAL).get("/openapi.json").content)
 CSV = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
 
 

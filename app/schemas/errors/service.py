@@ -119,6 +119,66 @@ class KeyReused(ProblemDetails):
     status: Literal[422] = fixed("status", 422)
 
 
+class Unauthenticated(ProblemDetails):
+    """The service needs an API key, and the request has none, or one that is not valid. Send the key in the header
+    `Authorization: Bearer KEY`. The operator of the service makes keys with `joulepath keys add`. A key that was
+    removed is no longer valid."""
+
+    type: Literal["/problems/unauthenticated"] = fixed("type", "/problems/unauthenticated")
+    title: Literal["API key needed"] = fixed("title", "API key needed")
+    status: Literal[401] = fixed("status", 401)
+
+
+class RoleTooLow(ProblemDetails):
+    """The API key may not do this. A key of the role `read` may look at everything, `compute` may also compute and
+    create, and change what it created, and `admin` may change everything."""
+
+    type: Literal["/problems/role-too-low"] = fixed("type", "/problems/role-too-low")
+    title: Literal["Role too low"] = fixed("title", "Role too low")
+    status: Literal[403] = fixed("status", 403)
+    role: Literal["read", "compute", "admin"] = described("Role of the API key.", None, "read")
+    needed: Literal["read", "compute", "admin"] = described("Role that the request needs.", None, "compute")
+
+
+class NotOwner(ProblemDetails):
+    """Another client created this study, robot or answer. Only the client that created it, or an API key of the role
+    `admin`, may change or delete it. What was created while the service had no API keys has no owner."""
+
+    type: Literal["/problems/not-owner"] = fixed("type", "/problems/not-owner")
+    title: Literal["Not the owner"] = fixed("title", "Not the owner")
+    status: Literal[403] = fixed("status", 403)
+    owner: str | None = described("Name of the API key that created it; null without one.", None, "press_shop")
+
+
+class AnswerInUse(ProblemDetails):
+    """The answer belongs to a study, whose history refers to it. It is deleted with the study:
+    `DELETE /studies/{id}`."""
+
+    type: Literal["/problems/answer-in-use"] = fixed("type", "/problems/answer-in-use")
+    title: Literal["Answer in use"] = fixed("title", "Answer in use")
+    status: Literal[409] = fixed("status", 409)
+
+
+class CrossSite(ProblemDetails):
+    """A browser sent this request for a web page of another site (headers `Origin` and `Sec-Fetch-Site`). The service
+    refuses this, because any page that a user opens could otherwise post and delete. The operator can allow a page's
+    origin with `JOULEPATH_CORS_ORIGINS`. A reverse proxy must pass on the header `Host`."""
+
+    type: Literal["/problems/cross-site"] = fixed("type", "/problems/cross-site")
+    title: Literal["Cross-site request"] = fixed("title", "Cross-site request")
+    status: Literal[403] = fixed("status", 403)
+
+
+class WrongHost(ProblemDetails):
+    """The name in the header `Host` is none of the service's names. The service refuses this, because a web page could
+    otherwise give a name of its own the service's address, and read everything (DNS rebinding). Use the service's
+    address, or a name that the operator allows with `JOULEPATH_ALLOWED_HOSTS`."""
+
+    type: Literal["/problems/wrong-host"] = fixed("type", "/problems/wrong-host")
+    title: Literal["Wrong host"] = fixed("title", "Wrong host")
+    status: Literal[421] = fixed("status", 421)
+
+
 class NotFound(ProblemDetails):
     """The service has nothing at this path. `GET /openapi.json` lists all paths."""
 

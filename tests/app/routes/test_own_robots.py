@@ -18,6 +18,7 @@ from app.schemas.examples.own_arm import ARM
 from app.schemas.robots import RobotDetail, RobotList
 from app.settings import Settings
 from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
+from tests.app.live import LOCAL
 from tests.app.requests import PATIENT
 from tests.app.routes.test_problems import refused
 
@@ -155,7 +156,9 @@ def test_a_name_that_is_none(client: TestClient, name: str) -> None:
 
 
 def test_no_more_than_the_service_holds() -> None:
-    with TestClient(create_app(Settings(workers=1, max_robots=0)), raise_server_exceptions=False) as client:
+    with TestClient(
+        create_app(Settings(workers=1, max_robots=0)), base_url=LOCAL, raise_server_exceptions=False
+    ) as client:
         refused(client.put("/robots/one_more", json=ARM), problems.TooManyRobots)
         refused(client.post("/robots", json={"name": "one_more", **ARM}), problems.TooManyRobots)
 

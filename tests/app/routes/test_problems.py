@@ -17,6 +17,7 @@ from app.settings import Settings
 from models.registry import robot_names
 from models.robot import Robot
 from optimizer.kinematics.ur_closed_form import URClosedForm
+from tests.app.live import LOCAL
 from tests.app.requests import move
 from tests.optimizer.chains import serial_chain
 
@@ -168,7 +169,7 @@ def test_body_too_large(client: TestClient, declared: bool) -> None:
 def test_not_ready(tmp_path: Any) -> None:
     # the engine starts with the lifespan, which is not entered here: it is at its very beginning
     app = create_app(Settings(workers=1))
-    with TestClient(app) as client:
+    with TestClient(app, base_url=LOCAL) as client:
         answer = client.get("/readyz")
         assert client.get("/healthz").json() == {"status": "alive"}
     refused(answer, problems.NotReady)

@@ -18,6 +18,7 @@ from models.registry import load_robot
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.tcp import rotated_poses
 from optimizer.problem.arm import Arm
+from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_studies import ABSENT, SECRET, added, begin
 
@@ -218,7 +219,7 @@ def test_what_cannot_be_is_listed(client: TestClient) -> None:
 def test_a_shutdown_is_told_as_one(client: TestClient) -> None:
     path = begin(client)
     added(client, path, {"optimize": move()})
-    with TestClient(create_app(Settings(workers=1)), raise_server_exceptions=False) as stopping:
+    with TestClient(create_app(Settings(workers=1)), base_url=LOCAL, raise_server_exceptions=False) as stopping:
         assert stopping.portal is not None
         stopping.portal.call(stopping.app.state.engine.drain)  # type: ignore[attr-defined]
         answer = stopping.get(f"{path}/suggest")

@@ -123,7 +123,7 @@ def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
     result = TaskResult.of_json({"names": texts, "answers": [answer.path for answer in kept]}, tuple(kept))
 
     async def test(store: Store) -> None:
-        done = await store_answers(store, Settings(), "optimize", result)
+        done = await store_answers(store, Settings(), "optimize", result, None)
         assert (done.document, done.media_type, done.stored) == (result.document, result.media_type, ())
         for answer in kept:
             _, body = await store.read(partial(answers.get, answer_id=answer.path.removeprefix("/answers/")))

@@ -1,0 +1,54 @@
+"""The API keys that are valid now: a change of their file applies from the next request on."""
+
+from __future__ import annotations
+
+import hmac
+import logging
+from pathlib import Path
+
+from app.access.key_file import ApiKey, WrongKeyFile, hash_of, read_keys
+
+logger = logging.getLogger(__name__)
+
+_Stamp = tuple[int, int, int, int]
+
+
+class KeyRing:
+    """The keys of a file. Raises WrongKeyFile at once if it cannot be read."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._stamp = _stamp(file)
+        self._keys = read_keys(file)
+
+    def find(self, secret: str) -> ApiKey | None:
+        """The entry of a key; None if it is not valid."""
+        self._refresh()
+        found, digest = None, hash_of(secret)
+        # every entry is compared, in constant time: how long it takes says nothing of where it matched
+        for key in self._keys:
+            if hmac.compare_digest(key.sha256, digest):
+                found = key
+        return found
+
+    def _refresh(self) -> None:
+        """Reads a file that changed. Without a file nobody gets in; one that makes no sense changes nothing."""
+        stamp = _stamp(self._file)
+        if stamp == self._stamp:
+            return
+        self._stamp = stamp
+        try:
+            self._keys = [] if stamp is None else read_keys(self._file)
+        except WrongKeyFile as error:
+            logger.error("the API keys are those of before", extra={"reason": str(error)})
+        else:
+            logger.info("API keys read", extra={"keys": len(self._keys)})
+
+
+def _stamp(file: Path) -> _Stamp | None:
+    """What differs once the file was written or replaced; None without a file."""
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns

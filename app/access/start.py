@@ -1,0 +1,57 @@
+"""What the service checks and says of access when it starts."""
+
+from __future__ import annotations
+
+import logging
+from ipaddress import ip_address
+
+from app.access.key_file import WrongKeyFile
+from app.access.key_ring import KeyRing
+from app.settings import Settings, WrongSettings
+
+logger = logging.getLogger(__name__)
+
+
+def key_ring(settings: Settings) -> KeyRing | None:
+    """The API keys; None where access is open. Raises WrongSettings."""
+    if settings.api_keys_file is None:
+        return None
+    try:
+        return KeyRing(settings.api_keys_file)
+    except WrongKeyFile as error:
+        raise WrongSettings(f"JOULEPATH_API_KEYS_FILE: {error}") from None
+
+
+def check_access(settings: Settings) -> None:
+    """Raises WrongSettings if other machines could reach a service without API keys that was not told to be open."""
+    if key_ring(settings) is None and not settings.open and not is_loopback(settings.host):
+        raise WrongSettings(
+            f"JOULEPATH_HOST={settings.host!r} is reached from other machines, and there are no API keys: anyone "
+            "there could read, change and delete everything.\n"
+            "Either make a key by `joulepath keys add NAME --file FILE` and set JOULEPATH_API_KEYS_FILE=FILE,\n"
+            "or set JOULEPATH_OPEN=1 if only clients that you trust can reach this address."
+        )
+
+
+def log_access(settings: Settings) -> None:
+    """Says in the log who may do what."""
+    if settings.api_keys_file is not None:
+        logger.info("API keys are required", extra={"file": str(settings.api_keys_file)})
+    elif is_loopback(settings.host):
+        logger.info("access is open", extra={"to": "every user and program of this machine"})
+    else:
+        logger.warning(
+            "access is open",
+            extra={
+                "to": f"everyone who reaches {settings.host}, port {settings.port}",
+                "remedy": "JOULEPATH_API_KEYS_FILE",
+            },
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine reaches an address to listen on."""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

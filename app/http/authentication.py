@@ -1,0 +1,45 @@
+"""API keys of requests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from starlette.requests import Request
+
+from app.access.key_ring import KeyRing
+from app.access.rules import check_role, needed_role
+from app.exceptions import NoKey, WrongKey
+from app.http.client import client_of
+
+SCHEME = "Bearer"
+REALM = "joulepath"
+
+
+def authenticated(keys: KeyRing) -> Callable[[Request], None]:
+    """A check of the header Authorization, which puts the key's name and role into the request's client.
+
+    It raises NoKey, WrongKey or RoleTooLow.
+    """
+
+    def check(request: Request) -> None:
+        needed = needed_role(request.method, request.scope["path"])
+        if needed is None:
+            return
+        given = request.headers.getlist("authorization")
+        scheme, _, secret = given[0].partition(" ") if len(given) == 1 else ("", "", "")
+        if scheme.lower() != SCHEME.lower() or not secret.strip():
+            raise NoKey
+        key = keys.find(secret.strip())
+        if key is None:
+            raise WrongKey
+        client = replace(client_of(request), key=key.name, role=key.role)
+        request.state.client = client
+        check_role(client, needed)
+
+    return check
+
+
+def challenge(error: NoKey) -> str:
+    """The header WWW-Authenticate of a refusal (RFC 6750)."""
+    return f'{SCHEME} realm="{REALM}"' + (', error="invalid_token"' if isinstance(error, WrongKey) else "")

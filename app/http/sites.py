@@ -1,0 +1,82 @@
+"""What keeps web pages out: the names of this service, and the pages that may call it."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Callable, Collection
+from ipaddress import ip_address
+from urllib.parse import urlsplit
+
+from starlette.requests import Request
+
+from app.access.rules import needed_role
+from app.exceptions import CrossSite, WrongHost
+
+EVERYONE = "*"
+_HOST = re.compile(r"(\[(?P<address>[0-9A-Fa-f:.]+)\]|(?P<name>[^:\[\]]+))(:[0-9]*)?")
+PROBES = ("/healthz", "/readyz")
+"""They tell nothing, and load balancers send any name."""
+
+
+def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
+    """A check of the header Host, which raises WrongHost. `own`: what the service listens on.
+
+    A web page can give its own name the address of this service; the browser then takes the service for the page's own
+    (DNS rebinding). The header keeps the page's name. An address has no name to be given, so that any is allowed.
+    """
+    known = {*names, own.lower(), "localhost", socket.gethostname().lower()}
+
+    def check(request: Request) -> None:
+        hosts = request.headers.getlist("host")
+        if EVERYONE in known or request.scope["path"] in PROBES:
+            return
+        name = _host_name(hosts[0]) if len(hosts) == 1 else None
+        if name is None or not (name in known or _is_address(name)):
+            raise WrongHost
+
+    return check
+
+
+def same_site(origins: Collection[str]) -> Callable[[Request], None]:
+    """A check of Sec-Fetch-Site and Origin, which raises CrossSite; pages of `origins` pass.
+
+    Browsers set both, and pages cannot change them. What is not sent by a browser has neither, and passes.
+    Requests that only read pass, too: a page of another site cannot see the answer.
+    """
+
+    def check(request: Request) -> None:
+        origin = request.headers.get("origin")
+        preflight = request.method == "OPTIONS" and "access-control-request-method" in request.headers
+        changes = needed_role(request.method, request.scope["path"]) not in (None, "read")
+        if not (changes or preflight) or EVERYONE in origins or (origin is not None and origin.lower() in origins):
+            return
+        site = request.headers.get("sec-fetch-site")
+        # without a secure connection, browsers send Origin only
+        own = site in ("same-origin", "none") if site is not None else origin is None or _is_own(origin, request)
+        if not own:
+            raise CrossSite
+
+    return check
+
+
+def _is_own(origin: str, request: Request) -> bool:
+    """Whether an origin is this service, under the name and port that the request came for. A proxy may add TLS."""
+    try:
+        return urlsplit(origin).netloc.lower() == request.headers.get("host", "").lower() != ""
+    except ValueError:
+        return False
+
+
+def _host_name(host: str) -> str | None:
+    """The name or address in `name:port`, `[address]:port`; None if it has another form."""
+    found = _HOST.fullmatch(host)
+    return None if found is None else found["address"] or found["name"].lower().removesuffix(".")
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ip_address(name)
+    except ValueError:
+        return False
+    return True

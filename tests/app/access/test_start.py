@@ -1,0 +1,88 @@
+"""What the service says and refuses when it starts."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.access.start import check_access, is_loopback
+from app.settings import Settings, WrongSettings, read_settings
+from tests.app.access.test_key_file import add
+from tests.app.live import EXIT, ROOT, serving
+
+
+def test_listens_on_this_machine_by_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("JOULEPATH_HOST", raising=False)
+    assert is_loopback(Settings().host)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "::1", "localhost"])
+def test_needs_no_key_on_this_machine(host: str) -> None:
+    check_access(Settings(host=host))
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "robots.example", "", "localhost.example"])
+def test_other_addresses_need_keys_or_consent(host: str, tmp_path: Path) -> None:
+    with pytest.raises(WrongSettings, match=r"(?s)joulepath keys add.*JOULEPATH_OPEN=1"):
+        check_access(Settings(host=host))
+    check_access(Settings(host=host, open=True))
+    add(tmp_path / "keys.yaml", "press")
+    check_access(Settings(host=host, api_keys_file=tmp_path / "keys.yaml"))
+
+
+def test_a_file_that_is_not_there_never_means_open(tmp_path: Path) -> None:
+    for host in ("127.0.0.1", "0.0.0.0"):
+        with pytest.raises(WrongSettings, match=r"JOULEPATH_API_KEYS_FILE: .*cannot be read"):
+            check_access(Settings(host=host, open=True, api_keys_file=tmp_path / "keys.yaml"))
+
+
+def test_the_process_ends_with_the_remedies() -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "app"],
+        cwd=ROOT,
+        env=os.environ | {"JOULEPATH_HOST": "0.0.0.0", "PORT": "0"},
+        capture_output=True,
+        timeout=EXIT,
+    )
+    assert run.returncode == 1
+    assert b"joulepath keys add" in run.stderr and b"JOULEPATH_OPEN=1" in run.stderr
+    assert b"Traceback" not in run.stderr
+
+
+def test_the_log_says_who_may_do_what(tmp_path: Path) -> None:
+    with serving(warm=False, workers=1, robots="") as server:
+        server.wait_listening()
+        (entry,) = [entry for entry in server.logged() if entry["message"] == "access is open"]
+        assert (entry["level"], entry["to"]) == ("info", "every user and program of this machine")
+    with serving(warm=False, workers=1, robots="", host="0.0.0.0", open=1) as server:
+        server.wait_listening()
+        (entry,) = [entry for entry in server.logged() if entry["message"] == "access is open"]
+        assert entry["level"] == "warning" and entry["to"].startswith("everyone who reaches 0.0.0.0, port ")
+
+
+def test_the_image_is_told_to_be_open() -> None:
+    words = (ROOT / "Dockerfile").read_text().split()
+    assert {"JOULEPATH_OPEN=1", "JOULEPATH_HOST=0.0.0.0"} <= set(words)
+
+
+@pytest.mark.parametrize(
+    ("variable", "value"),
+    [
+        ("ALLOWED_HOSTS", "https://robots.example"),
+        ("ALLOWED_HOSTS", "robots.example:8000"),
+        ("CORS_ORIGINS", "cell4.example"),
+        ("CORS_ORIGINS", "https://cell4.example/page"),
+        ("CORS_ORIGINS", "null"),
+        ("TRUSTED_PROXIES", "10.0.0.1/8"),
+        ("TRUSTED_PROXIES", "proxy"),
+        ("OPEN", "perhaps"),
+    ],
+)
+def test_settings_that_are_none(variable: str, value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(f"JOULEPATH_{variable}", value)
+    with pytest.raises(WrongSettings, match=f"JOULEPATH_{variable}="):
+        read_settings()

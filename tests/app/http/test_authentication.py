@@ -1,0 +1,255 @@
+"""API keys over a real socket: who gets in, who may do what, whose things are whose, and what the log says."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from starlette.testclient import TestClient
+
+from app.access.key_file import changing, hash_of
+from app.main import create_app
+from app.schemas import errors as problems
+from app.schemas.examples.own_arm import PUT_EXAMPLES
+from app.schemas.examples.values import STUDY_ID
+from app.settings import Settings
+from app.store import answers
+from tests.app.access.test_key_file import add
+from tests.app.live import ANSWER, CLIENT, LOCAL, Server, serving
+from tests.app.routes.test_problems import refused
+from tests.app.store.test_store import with_store
+
+STUDY = {"name": "press", "threshold": 60.0}
+ARM = PUT_EXAMPLES["makers_figures"]["value"]
+STEP = {"evaluate": {"configurations": [[0.0] * 6, [0.1] * 6], "time_per_segment": 1.5}}
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """A service that needs keys, one client of each role, and another that computes."""
+
+    server: Server
+    file: Path
+    keys: dict[str, str]
+    database: str
+
+    def send(self, who: str | None, method: str, path: str, body: Any = None, **headers: str) -> httpx2.Response:
+        if who is not None:
+            headers["Authorization"] = f"Bearer {self.keys[who]}"
+        return CLIENT.request(method, self.server.url + path, json=body, headers=headers)
+
+    def study(self, who: str) -> str:
+        answer = self.send(who, "POST", "/studies", STUDY)
+        assert answer.status_code == 201, answer.text
+        return f"/studies/{answer.json()['id']}"
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
+    folder = tmp_path_factory.mktemp("guarded")
+    file, database = folder / "keys.yaml", f"sqlite:///{folder}/joulepath.db"
+    keys = {
+        "viewer": add(file, "viewer", "read"),
+        "press": add(file, "press", "compute"),
+        "cell": add(file, "cell", "compute"),
+        "boss": add(file, "boss", "admin"),
+    }
+    with serving(workers=1, robots="", api_keys_file=file, database_url=database) as server:
+        yield Guarded(server, file, keys, database)
+
+
+@pytest.fixture(scope="module")
+def document(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The OpenAPI document of a service with keys."""
+    file = tmp_path_factory.mktemp("document") / "keys.yaml"
+    add(file, "press")
+    return create_app(Settings(api_keys_file=file)).openapi()
+
+
+PUBLIC = [
+    "/healthz",
+    "/readyz",
+    "/openapi.json",
+    "/docs",
+    "/redoc",
+    "/docs/swagger-ui.css",
+    "/problems/unauthenticated",
+]
+
+
+@pytest.mark.parametrize("path", PUBLIC)
+def test_needs_no_key(guarded: Guarded, path: str) -> None:
+    assert guarded.send(None, "GET", path).status_code == 200
+
+
+def test_everything_else_needs_one(guarded: Guarded, document: dict[str, Any]) -> None:
+    for template, operations in document["paths"].items():
+        path = template.format(id=STUDY_ID, name="ur5e", number=1, slug="validation")
+        for method, operation in operations.items():
+            answer = guarded.send(None, method.upper(), path)
+            if path in PUBLIC or template.startswith("/problems/"):
+                assert answer.status_code == 200 and "security" not in operation
+            else:
+                refused(answer, problems.Unauthenticated)
+                assert answer.headers["www-authenticate"] == 'Bearer realm="joulepath"'
+                assert {"401"} <= operation["responses"].keys() and operation["security"]
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/nothing", "//studies", "/studies/", "/docs/../studies", "/docs/%2e%2e/studies", "/healthz/../studies",
+     "/%2fdocs", "/docs%2f..%2fstudies", "/problems/../studies", "/HEALTHZ", "/healthz%0a",
+     "/docs;/../studies", "/metrics", "*"],
+)  # fmt: skip
+def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
+    """Sent as it is: clients normalise paths."""
+    host, port = guarded.server.url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port)), timeout=ANSWER) as connection:
+        connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
+        # a path that is public but unknown is answered as such; no other one is answered at all
+        assert connection.recv(1000).split()[1] in (b"401", b"404", b"400")
+
+
+@pytest.mark.parametrize(
+    "given",
+    ["Bearer", "Bearer wrong", "Basic {press}", "{press}", "Bearer {press}x", "Bearer {hash}", "Bearer \xff",
+     "Bearer {press} {press}", "Token {press}"],
+)  # fmt: skip
+def test_what_is_no_key(guarded: Guarded, given: str) -> None:
+    header = given.format(press=guarded.keys["press"], hash=hash_of(guarded.keys["press"])).encode("latin-1")
+    answer = CLIENT.get(guarded.server.url + "/studies", headers={b"Authorization": header})
+    refused(answer, problems.Unauthenticated)
+    assert answer.headers["www-authenticate"].startswith('Bearer realm="joulepath"')
+    assert guarded.keys["press"] not in answer.text
+
+
+def test_two_keys_are_none(guarded: Guarded) -> None:
+    headers = [("Authorization", f"Bearer {guarded.keys[who]}") for who in ("press", "boss")]
+    refused(CLIENT.get(guarded.server.url + "/studies", headers=headers), problems.Unauthenticated)
+
+
+def test_the_scheme_is_of_any_case(guarded: Guarded) -> None:
+    headers = {"Authorization": f"bEARER  {guarded.keys['press']}"}
+    assert CLIENT.get(guarded.server.url + "/studies", headers=headers).status_code == 200
+
+
+def test_a_key_that_is_wrong_is_said_to_be(guarded: Guarded) -> None:
+    answer = CLIENT.get(guarded.server.url + "/studies", headers={"Authorization": "Bearer wrong"})
+    assert 'error="invalid_token"' in answer.headers["www-authenticate"]
+
+
+def test_a_refused_body_is_not_read(guarded: Guarded) -> None:
+    host, port = guarded.server.url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port)), timeout=ANSWER) as connection:
+        head = b"POST /evaluate HTTP/1.1\r\nHost: localhost\r\nContent-Length: 60000000\r\n\r\n"
+        connection.sendall(head)
+        assert connection.recv(1000).split()[1] == b"401", "answered before any of the body was sent"
+
+
+def test_a_reader_only_reads(guarded: Guarded) -> None:
+    study = guarded.study("press")
+    for path in ("/studies", study, "/robots", "/robots/ur5e"):
+        assert guarded.send("viewer", "GET", path).status_code == 200
+    for method, path in (
+        ("POST", "/optimize"),
+        ("POST", "/studies"),
+        ("GET", f"{study}/suggest"),
+        ("PUT", "/robots/mine"),
+        ("DELETE", study),
+        ("PATCH", study),
+    ):
+        content = refused(guarded.send("viewer", method, path), problems.RoleTooLow)
+        assert (content["role"], content["needed"]) == ("read", "compute")
+
+
+def test_a_study_is_its_owners(guarded: Guarded) -> None:
+    study = guarded.study("press")
+    assert guarded.send("cell", "GET", study).json()["owner"] == "press"
+    for method, path, body in (("DELETE", study, None), ("POST", f"{study}/iterations", STEP)):
+        assert refused(guarded.send("cell", method, path, body), problems.NotOwner)["owner"] == "press"
+    assert guarded.send("press", "POST", f"{study}/iterations", STEP).status_code == 201
+    assert guarded.send("press", "DELETE", study).status_code == 204
+    study = guarded.study("press")
+    assert guarded.send("boss", "DELETE", study).status_code == 204
+
+
+def test_the_same_idempotency_key_of_another_client_is_not_replayed(guarded: Guarded) -> None:
+    key = {"Idempotency-Key": "try-1"}
+    assert guarded.send("press", "POST", "/studies", STUDY, **key).status_code == 201
+    again = guarded.send("press", "POST", "/studies", STUDY, **key)
+    assert again.headers["idempotency-replayed"] == "true"
+    refused(guarded.send("cell", "POST", "/studies", STUDY, **key), problems.KeyReused)
+
+
+def test_a_robot_is_its_owners(guarded: Guarded) -> None:
+    robot = "/robots/press_arm"
+    assert guarded.send("press", "PUT", robot, ARM).json()["owner"] == "press"
+    refused(guarded.send("cell", "PUT", robot, ARM), problems.NotOwner)
+    refused(guarded.send("cell", "DELETE", robot), problems.NotOwner)
+    assert guarded.send("boss", "PUT", robot, ARM).json()["owner"] == "press", "a replaced robot keeps its owner"
+    assert guarded.send("press", "DELETE", robot).status_code == 204
+
+
+def test_an_answer_is_its_owners(guarded: Guarded) -> None:
+    ids: list[str] = []
+
+    async def put(store: Any) -> None:
+        for owner in ("press", None):
+            work = partial(answers.put, kind="optimize", body=b"{}", owner=owner)
+            ids.append(await store.write(work))
+
+    with_store(guarded.database, put)
+    owned, free = (f"/answers/{id}" for id in ids)
+    assert guarded.send("viewer", "GET", owned).json()["owner"] == "press"
+    for path in (owned, free):
+        refused(guarded.send("cell", "DELETE", path), problems.NotOwner)
+    assert guarded.send("press", "DELETE", owned).status_code == 204
+    refused(guarded.send("press", "DELETE", free), problems.NotOwner)
+    assert guarded.send("boss", "DELETE", free).status_code == 204
+    refused(guarded.send("boss", "DELETE", free), problems.UnknownAnswer)
+
+
+def test_an_answer_of_a_study_goes_with_it(guarded: Guarded) -> None:
+    study = guarded.study("press")
+    step = guarded.send("press", "POST", f"{study}/iterations", STEP).json()
+    refused(guarded.send("press", "DELETE", f"/answers/{step['answer']}"), problems.AnswerInUse)
+    assert guarded.send("press", "GET", study).json()["history"]
+
+
+def test_a_removed_key_is_refused_from_the_next_request_on(guarded: Guarded) -> None:
+    guarded.keys["guest"] = add(guarded.file, "guest", "read")
+    assert guarded.send("guest", "GET", "/studies").status_code == 200
+    with changing(guarded.file) as entries:
+        entries[:] = [entry for entry in entries if entry.name != "guest"]
+    refused(guarded.send("guest", "GET", "/studies"), problems.Unauthenticated)
+
+
+def test_the_log_has_names_and_no_keys(guarded: Guarded) -> None:
+    guarded.send("press", "GET", "/robots/named_in_the_log")
+    assert guarded.server.request_logged("/robots/named_in_the_log")["key"] == "press"
+    guarded.send(None, "GET", "/robots/without_a_key")
+    assert guarded.server.request_logged("/robots/without_a_key")["key"] is None
+    text = guarded.server.log.read_text()
+    assert not any(secret in text for secret in guarded.keys.values())
+
+
+def test_the_document_declares_the_keys(document: dict[str, Any]) -> None:
+    (name,) = document["components"]["securitySchemes"]
+    assert document["components"]["securitySchemes"][name]["scheme"] == "bearer"
+    assert document["paths"]["/studies"]["get"]["security"] == [{name: ["read"]}]
+    assert document["paths"]["/optimize"]["post"]["security"] == [{name: ["compute"]}]
+    refs = document["paths"]["/studies/{id}"]["delete"]["responses"]["403"]["content"]["application/problem+json"]
+    named = {each["$ref"].rpartition("/")[2] for each in refs["schema"]["oneOf"]}
+    assert named == {"NotOwner", "RoleTooLow", "CrossSite"}
+
+
+def test_an_open_service_declares_none() -> None:
+    open_document = TestClient(create_app(), base_url=LOCAL).get("/openapi.json").json()
+    assert "securitySchemes" not in open_document["components"]
+    assert "401" not in open_document["paths"]["/studies"]["get"]["responses"]
