@@ -21,6 +21,7 @@ from app.http.client import sender
 from app.http.gate import Gate
 from app.http.handlers import install_handlers
 from app.http.json_body import JsonBody
+from app.http.metrics import Metrics, RouteNote
 from app.http.openapi import install_openapi
 from app.http.request_context import RequestContext
 from app.http.sites import known_host, same_site
@@ -34,6 +35,7 @@ from app.routes import (
     ik,
     ik_path,
     iterations,
+    metrics,
     optimize,
     pareto,
     problems,
@@ -60,6 +62,7 @@ ROUTES = (
     answers,
     robots,
     health,
+    metrics,
     problems,
     docs,
 )
@@ -85,6 +88,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=_lifespan,
     )
     app.state.settings = settings
+    app.state.metrics = Metrics()
     keys = key_ring(settings)
     _add_middleware(app, settings, keys)
     install_handlers(app)
@@ -114,6 +118,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
         "/evaluate|/robots|/robots/[^/]+": settings.max_upload_bytes,
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }
+    app.add_middleware(RouteNote)
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
     if keys is not None:
@@ -130,5 +135,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
     app.add_middleware(Gate, check=same_site(settings.cors_origins))
     app.add_middleware(Gate, check=known_host(settings.allowed_hosts, settings.host))
     app.add_middleware(
-        RequestContext, sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header)
+        RequestContext,
+        sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header),
+        metrics=app.state.metrics,
     )

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+from app.engine.census import Census
 from app.engine.forkserver import start_forkserver
 from app.engine.result import TaskResult
 from app.engine.task import Task
@@ -27,6 +28,7 @@ class Engine:
     """Runs tasks in `settings.workers` processes; `settings.queue_size` more may wait for one."""
 
     def __init__(self, settings: Settings, warm: Callable[[], None]) -> None:
+        self.census = Census()
         self._settings = settings
         self._warm = warm
         self._capacity = settings.workers + settings.queue_size
@@ -104,16 +106,18 @@ class Engine:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
     async def _run_in_worker(self, task: Task, end: float, limit: asyncio.Timeout) -> TaskResult:
-        worker = await self._idle.get()
-        while not worker.alive:
+        with self.census.waits():
             worker = await self._idle.get()
+            while not worker.alive:
+                worker = await self._idle.get()
         # the optimiser watches the deadline and returns its best motion: the grace is for that
         limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
         try:
             left = end - asyncio.get_running_loop().time()
             if left <= 0:
                 raise DeadlineExceeded([])
-            return await worker.ask(task, left)
+            with self.census.works():
+                return await worker.ask(task, left)
         finally:
             if worker.alive:
                 self._idle.put_nowait(worker)
@@ -137,6 +141,7 @@ class Engine:
             self._has_warmed(worker)
             await worker.ended.wait()
             self._workers.discard(worker)
+            self.census.restarts += 1
 
     def _has_warmed(self, worker: Worker) -> None:
         self._workers.add(worker)

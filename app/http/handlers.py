@@ -37,6 +37,7 @@ async def problem_response(request: Request, error: Exception) -> Response:
     elif isinstance(error, NoKey):
         headers["WWW-Authenticate"] = challenge(error)
     problem = problem_type(error)
+    request.state.problem = problem.slug()
     if problem.retry_after is not None:
         headers["Retry-After"] = str(problem.retry_after)
     # a problem can list thousands of candidates: a thread encodes it, so that the event loop serves others meanwhile

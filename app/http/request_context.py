@@ -15,10 +15,12 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.access.client import Client
 from app.exceptions import ClientDisconnected
 from app.http.handlers import problem_response
+from app.http.metrics import Metrics
 from app.http.sites import PROBES
 
 logger = logging.getLogger("app.request")
 
+METRICS = "/metrics"
 REQUEST_ID_HEADER = "X-Request-ID"
 _SANE_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _CLIENT_CLOSED_REQUEST = 499
@@ -26,14 +28,15 @@ _CLIENT_CLOSED_REQUEST = 499
 
 
 class RequestContext:
-    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log.
+    """ASGI middleware: the id goes to `request.state.id`, the header of the response and the log. Requests are counted.
 
     The client, as `sender` finds it, goes to `request.state.client` and the log. Layers inside may put another there.
     """
 
-    def __init__(self, app: ASGIApp, sender: Callable[[Scope], Client]) -> None:
+    def __init__(self, app: ASGIApp, sender: Callable[[Scope], Client], metrics: Metrics) -> None:
         self._app = app
         self._sender = sender
+        self._metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers the request, also if an exception comes from inside."""
@@ -67,12 +70,15 @@ class RequestContext:
             response = await problem_response(Request(scope), error)
             await response(scope, receive, send_with_id)
         finally:
+            duration = time.perf_counter() - began
+            problem = state.get("problem")
+            self._metrics.observe(scope["method"], state.get("route"), status, problem, duration)
             client: Client = state["client"]
             logger.log(
-                # probes come every second or so
-                logging.DEBUG if scope["path"] in PROBES else logging.INFO,
+                # these come every few seconds
+                logging.DEBUG if scope["path"] in (*PROBES, METRICS) else logging.INFO,
                 "request",
                 extra=asked
                 | {"client": client.address, "key": client.key}
-                | {"status": status, "duration": round(time.perf_counter() - began, 6)},
+                | {"status": status, "problem": problem, "duration": round(duration, 6)},
             )

@@ -1,0 +1,40 @@
+"""GET /metrics."""
+
+from __future__ import annotations
+
+import asyncio
+
+from fastapi import APIRouter, Request, Response
+
+from app.exceptions import StoreUnavailable
+from app.http.metrics import Metrics
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceEngine, ServiceStore
+from app.store.store import Store
+
+router = APIRouter(tags=["health"])
+
+_PATIENCE = 2.0
+"""Longest wait [s] for the database: Prometheus gives up after 10 s."""
+
+
+@router.get(
+    "/metrics",
+    summary="Measurements for Prometheus",
+    response_class=Response,
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}, **problem_responses()},
+)
+async def metrics(request: Request, engine: ServiceEngine, store: ServiceStore) -> Response:
+    """Requests, durations, problems, the queue, the workers, the database and the process, in the text format of
+    Prometheus."""
+    measured: Metrics = request.app.state.metrics
+    document, media_type = measured.document(request.headers.get("accept", ""), engine, await _answers(store))
+    return Response(document, media_type=media_type)
+
+
+async def _answers(store: Store) -> bool:
+    try:
+        await asyncio.wait_for(store.read(lambda session: None), _PATIENCE)
+    except (StoreUnavailable, TimeoutError):
+        return False
+    return True
