@@ -43,9 +43,7 @@ def test_requests_are_counted_by_route_method_and_status(service: Server) -> Non
         ("POST", "/optimize", "422"): lambda: service.post("/optimize", {}),
         ("DELETE", "/optimize", "405"): lambda: CLIENT.delete(service.url + "/optimize"),
         # a body without a type is declared JSON on the way
-        ("POST", "/studies", "201"): lambda: CLIENT.post(
-            service.url + "/studies", content=b'{"name":"n","threshold":1}'
-        ),
+        ("POST", "/studies", "201"): lambda: CLIENT.post(service.url + "/studies", content=study),
     }.items():
         before = value(service, REQUESTS, *label)
         send()

@@ -1,0 +1,89 @@
+"""The documentation page in a browser: its Authorize button gives the key to the requests that it sends."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect, sync_playwright
+
+from tests.app.access.test_key_file import add
+from tests.app.live import ANSWER, Server, serving
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PATIENCE = 1000 * ANSWER  # [ms]
+
+pytestmark = [pytest.mark.long, pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")]
+
+
+POST = """([url, mode, key]) => fetch(url + "/studies", {
+    method: "POST", mode, body: '{"name": "x", "threshold": 1}', headers: key ? {Authorization: "Bearer " + key} : {},
+}).then(answer => answer.type, error => "refused")"""
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, str]]:
+    """A service that needs keys, and a key."""
+    file: Path = tmp_path_factory.mktemp("keys") / "keys.yaml"
+    secret = add(file, "press")
+    with serving(warm=False, workers=1, robots="", api_keys_file=file) as server:
+        server.wait_listening()
+        yield server, secret
+
+
+@pytest.fixture
+def page() -> Iterator[Page]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.set_default_timeout(PATIENCE)
+        yield page
+        browser.close()
+
+
+def test_authorize(guarded: tuple[Server, str], page: Page) -> None:
+    server, secret = guarded
+    sent: list[str] = []
+    blocked: list[str] = []
+    page.on("request", lambda request: sent.append(request.url))
+    page.on("console", lambda message: blocked.append(message.text) if "Content Security" in message.text else None)
+    page.goto(f"{server.url}/docs")
+
+    operation = page.locator("#operations-studies-list_studies_studies_get")
+    status = operation.locator(".live-responses-table .response-col_status").last
+    operation.locator(".opblock-summary-control").click()
+    operation.locator(".try-out__btn").click()
+    operation.locator(".execute").click()
+    expect(status).to_contain_text("401", timeout=PATIENCE)
+
+    page.locator(".auth-wrapper > .authorize").click()
+    page.locator(".auth-container input").fill(secret)
+    page.locator(".auth-btn-wrapper .authorize").click()
+    page.locator(".auth-btn-wrapper .btn-done").click()
+    operation.locator(".execute").click()
+    expect(status).to_contain_text("200", timeout=PATIENCE)
+
+    assert all(url.startswith((server.url, "data:")) for url in sent), "nothing comes from elsewhere"
+    assert not blocked
+
+
+def test_a_page_of_another_site_reaches_nothing(guarded: tuple[Server, str], page: Page) -> None:
+    """A real browser on a page of another port: neither a form nor a script gets through, with the key or without."""
+    server, secret = guarded
+    with serving(warm=False, workers=1, robots="") as other:
+        other.wait_listening()
+        page.goto(f"{other.url}/healthz")
+        assert page.evaluate(POST, [server.url, "no-cors", ""]) == "opaque"
+        assert page.evaluate(POST, [server.url, "cors", secret]) == "refused"
+        page.set_content(
+            f"<form method=post enctype=text/plain action={server.url}/studies>"
+            """<input name='{"name": "x", "threshold": 1, "a' value='": 1}'><button>go</button></form>"""
+        )
+        with page.expect_response(f"{server.url}/studies") as answer:
+            page.locator("button").click()
+        assert answer.value.status == 403
+    requests = [entry for entry in server.logged() if entry["message"] == "request"]
+    refusals = [entry["problem"] for entry in requests if entry["method"] != "GET"]
+    assert refusals == ["cross-site"] * 3
