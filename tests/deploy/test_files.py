@@ -1,0 +1,114 @@
+"""The files of `deploy/`: well-formed, true to the settings, and checked by the programs that read them."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import crossplane
+import pytest
+import yaml
+
+from app.settings import Settings
+from tests.app.live import ROOT
+
+DEPLOY = ROOT / "deploy"
+KNOWN = {f"JOULEPATH_{name.upper()}" for name in Settings.model_fields} | {"JOULEPATH_CACHE_DIR", "MPLCONFIGDIR"}
+UNITS = {"s": 1, "m": 60, "h": 3600}
+
+
+def nginx(name: str) -> list[dict[str, Any]]:
+    """The directives of a file; what is unknown, or at a wrong place, is an error."""
+    parsed = crossplane.parse(str(DEPLOY / "nginx" / name), check_ctx=False)
+    assert parsed["errors"] == []
+    directives: list[dict[str, Any]] = parsed["config"][0]["parsed"]
+    return directives
+
+
+def inside(block: list[dict[str, Any]], name: str) -> list[list[str]]:
+    """The arguments of each directive of this name in a block, not in the blocks inside."""
+    return [each["args"] for each in block if each["directive"] == name]
+
+
+@pytest.fixture(scope="module")
+def tls() -> list[dict[str, Any]]:
+    """The server that speaks TLS."""
+    (server,) = (
+        each["block"]
+        for each in nginx("joulepath.conf")
+        if each["directive"] == "server" and ["443", "ssl"] in inside(each["block"], "listen")
+    )
+    return list(server)
+
+
+def test_nginx_waits_as_long_as_the_service_works(tls: list[dict[str, Any]]) -> None:
+    ((timeout,),) = inside(tls, "proxy_read_timeout")
+    settings = Settings()
+    assert int(timeout[:-1]) * UNITS[timeout[-1]] > settings.max_deadline + settings.deadline_grace
+    ((size,),) = inside(tls, "client_max_body_size")
+    assert size == "64m" and settings.max_upload_bytes == 64 << 20
+
+
+def test_nginx_replaces_what_a_client_says_of_itself(tls: list[dict[str, Any]]) -> None:
+    headers = dict(inside(tls, "proxy_set_header"))
+    assert headers.items() >= {"X-Forwarded-For": "$remote_addr", "Forwarded": "", "Host": "$http_host"}.items()
+    # a location with one such directive would lose all of these
+    locations = [each["block"] for each in tls if each["directive"] == "location"]
+    assert locations and not any(inside(block, "proxy_set_header") for block in locations)
+
+
+@pytest.fixture(scope="module")
+def compose() -> dict[str, Any]:
+    content: dict[str, Any] = yaml.safe_load((DEPLOY / "compose.yaml").read_text())
+    return content
+
+
+def test_compose_names_what_there_is(compose: dict[str, Any]) -> None:
+    for service in compose["services"].values():
+        assert service["networks"] if "network_mode" not in service else True
+        assert set(service.get("networks", ())) <= compose["networks"].keys()
+        assert {name for name in service.get("environment", ()) if name.startswith("JOULEPATH_")} <= KNOWN
+        for volume in service.get("volumes", ()):
+            source = volume.split(":")[0]
+            made_by_operator = source in ("./keys", "./tls")
+            assert made_by_operator or source in compose["volumes"] or (DEPLOY / source).exists(), source
+    (upstream,) = nginx("upstream-compose.conf")
+    servers = {server.partition(":")[0] for (server,) in inside(upstream["block"], "server")}
+    assert servers == {name for name in compose["services"] if name.startswith("joulepath")}
+    assert len(servers) == 2
+
+
+def test_compose_is_not_open(compose: dict[str, Any]) -> None:
+    for name, service in compose["services"].items():
+        assert ("ports" in service) == (name == "proxy"), "only the proxy is reached from outside"
+        if name.startswith("joulepath"):
+            assert service["environment"]["JOULEPATH_API_KEYS_FILE"].startswith("/etc/joulepath/")
+            # a mount of the file alone would keep the old one when it is replaced
+            assert "./keys:/etc/joulepath:ro" in service["volumes"]
+            subnet = compose["networks"]["front"]["ipam"]["config"][0]["subnet"]
+            assert service["environment"]["JOULEPATH_TRUSTED_PROXIES"] == subnet
+
+
+def test_the_unit_sets_what_there_is() -> None:
+    text = (DEPLOY / "joulepath.service").read_text()
+    assert set(re.findall(r"^Environment=(\w+)=", text, re.M)) <= KNOWN
+    (stop,) = re.findall(r"^TimeoutStopSec=(\d+)$", text, re.M)
+    assert int(stop) > Settings().shutdown_grace
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not installed")
+def test_systemd_takes_the_unit(tmp_path: Path) -> None:
+    unit = tmp_path / "joulepath.service"
+    # the program is not installed here
+    unit.write_text(re.sub(r"^ExecStart=.*$", "ExecStart=/bin/true", (DEPLOY / unit.name).read_text(), flags=re.M))
+    verified = subprocess.run(["systemd-analyze", "verify", unit], capture_output=True, text=True)
+    assert (verified.returncode, verified.stderr) == (0, "")
+
+
+def test_the_page_says_which_settings_there_are() -> None:
+    page = (ROOT / "docs" / "settings.md").read_text()
+    missing = [name for name in KNOWN if name.startswith("JOULEPATH_") and f"`{name}`" not in page]
+    assert missing == []

@@ -1,0 +1,169 @@
+"""What `deploy/compose.yaml` describes, from plain processes: nginx with TLS, two services, one PostgreSQL."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import signal
+import socket
+import ssl
+import subprocess
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+
+from app.schemas import errors as problems
+from tests.app.access.test_key_file import add
+from tests.app.databases import postgres, why_no_postgres
+from tests.app.live import ANSWER, ROOT, Server, serving
+from tests.app.requests import move
+from tests.app.routes.test_problems import refused
+from tests.app.test_server import until
+
+NAME = "robots.example"
+START = 30.0
+"""Until nginx takes connections, at most [s]."""
+MISSING = why_no_postgres() or ", ".join(f"no {it}" for it in ("nginx", "openssl") if shutil.which(it) is None)
+
+pytestmark = [pytest.mark.long, pytest.mark.skipif(bool(MISSING), reason=MISSING)]
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A deployment: clients know the proxy only."""
+
+    url: str
+    client: httpx2.Client
+    services: list[Server]
+    keys: Path
+
+    def send(self, method: str, path: str, body: object = None, **headers: str) -> httpx2.Response:
+        host = f"{NAME}:{self.url.rpartition(':')[2]}"
+        return self.client.request(method, self.url + path, json=body, headers={"Host": host, **headers})
+
+
+def free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return int(free.getsockname()[1])
+
+
+def certificate(folder: Path) -> None:
+    subject = ["-subj", f"/CN={NAME}", "-addext", f"subjectAltName=DNS:{NAME},IP:127.0.0.1"]
+    key = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-keyout", folder / "key.pem"]
+    subprocess.run(
+        ["openssl", "req", "-x509", *key, *subject, "-days", "2", "-out", folder / "fullchain.pem"],
+        check=True,
+        capture_output=True,
+    )
+
+
+def configuration(folder: Path, port: int, services: list[Server]) -> Path:
+    """The files of `deploy/nginx` with other ports, addresses and paths, in a main file as Debian has it."""
+    site = (ROOT / "deploy" / "nginx" / "joulepath.conf").read_text()
+    site = re.sub(r"^ *listen \[::\].*\n", "", site, flags=re.M)
+    site = site.replace("listen 80;", f"listen 127.0.0.1:{free_port()};")
+    site = site.replace("listen 443 ssl;", f"listen 127.0.0.1:{port} ssl;").replace("/etc/ssl/joulepath", str(folder))
+    upstream = (ROOT / "deploy" / "nginx" / "upstream-compose.conf").read_text()
+    for k, service in enumerate(services, start=1):
+        upstream = upstream.replace(f"joulepath-{k}:8000", service.url.removeprefix("http://"))
+    folders = "".join(
+        f"{kind}_temp_path {folder}/{kind};" for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    )
+    main = folder / "nginx.conf"
+    main.write_text(
+        f"user root; daemon off; worker_processes 1; pid {folder}/pid; error_log {folder}/error.log;\n"
+        f"events {{}}\nhttp {{ access_log off; {folders}\n{upstream}\n{site}\n}}\n"
+    )
+    return main
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Whole]:
+    folder = tmp_path_factory.mktemp("whole")
+    add(folder / "keys.yaml", "nobody")
+    certificate(folder)
+    settings = {
+        "workers": 1,
+        "api_keys_file": folder / "keys.yaml",
+        "allowed_hosts": NAME,
+        "trusted_proxies": "127.0.0.1",
+    }
+    with postgres() as database:
+        settings["database_url"] = database.url
+        with serving(**settings) as first, serving(**settings) as second:
+            port = free_port()
+            main = configuration(folder, port, [first, second])
+            subprocess.run(["nginx", "-t", "-c", main], check=True, capture_output=True)
+            nginx = subprocess.Popen(["nginx", "-c", main])
+            context = ssl.create_default_context(cafile=folder / "fullchain.pem")
+            client = httpx2.Client(timeout=ANSWER, verify=context)
+            found = Whole(f"https://127.0.0.1:{port}", client, [first, second], folder / "keys.yaml")
+            end = time.monotonic() + START
+            while True:
+                assert time.monotonic() < end and nginx.poll() is None, (folder / "error.log").read_text()
+                try:
+                    found.send("GET", "/readyz")
+                    break
+                except httpx2.TransportError:
+                    time.sleep(0.05)
+            yield found
+            client.close()
+            nginx.send_signal(signal.SIGQUIT)
+            nginx.wait(START)
+
+
+@pytest.fixture(scope="module")
+def key(whole: Whole) -> dict[str, str]:
+    """The header with a key that is made while the services run."""
+    return {"Authorization": f"Bearer {add(whole.keys, 'press')}"}
+
+
+def test_answers_over_tls(whole: Whole, key: dict[str, str]) -> None:
+    assert whole.send("GET", "/readyz").status_code == 200
+    refused(whole.send("POST", "/optimize", move()), problems.Unauthenticated)
+    assert whole.send("POST", "/optimize", move(), **key).status_code == 200
+
+
+def test_both_services_have_one_database(whole: Whole, key: dict[str, str]) -> None:
+    study = whole.send("POST", "/studies", {"name": "shared", "threshold": 1.0}, **key).json()["id"]
+    for service in whole.services:
+        answer = httpx2.get(f"{service.url}/studies/{study}", headers=key)
+        assert answer.status_code == 200 and answer.json()["owner"] == "press"
+
+
+def test_the_log_has_the_clients_address_and_not_what_it_says(whole: Whole, key: dict[str, str]) -> None:
+    spoofed = {"X-Forwarded-For": "192.0.2.66", "Forwarded": "for=192.0.2.66", "X-Request-ID": "spoofed"}
+    whole.send("GET", "/robots/ur5e", **key, **spoofed)
+
+    def entries() -> list[dict[str, Any]]:
+        logged = (entry for service in whole.services for entry in service.logged())
+        return [each for each in logged if each["message"] == "request" and each["path"] == "/robots/ur5e"]
+
+    until(lambda: bool(entries()))
+    assert [(each["client"], each["key"]) for each in entries()] == [("127.0.0.1", "press")]
+
+
+def test_a_page_behind_the_proxy_may_post(whole: Whole, key: dict[str, str]) -> None:
+    study = {"name": "page", "threshold": 1.0}
+    own = f"https://{NAME}:{whole.url.rpartition(':')[2]}"
+    assert whole.send("POST", "/studies", study, Origin=own, **key).status_code == 201
+    refused(whole.send("POST", "/studies", study, Origin="https://evil.example", **key), problems.CrossSite)
+    refused(whole.send("POST", "/studies", study, **key, Host="evil.example"), problems.WrongHost)
+
+
+def test_measurements_are_not_public(whole: Whole, key: dict[str, str]) -> None:
+    assert whole.send("GET", "/metrics", **key).status_code == 404
+    assert httpx2.get(whole.services[0].url + "/metrics", headers=key).status_code == 200
+
+
+def test_a_service_that_dies_leaves_the_other(whole: Whole, key: dict[str, str]) -> None:
+    whole.services[0].process.kill()
+    whole.services[0].process.wait()
+    for _ in range(10):
+        assert whole.send("GET", "/studies", **key).status_code == 200
