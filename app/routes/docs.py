@@ -24,7 +24,9 @@ _NO_PICTURE = "data:,"
 # the browser blocks anything else that a later version of the scripts would fetch from elsewhere
 _HEADERS = {
     "Content-Security-Policy": "default-src 'self'; script-src 'self' 'unsafe-inline'; "
-    "style-src 'self' 'unsafe-inline'; img-src 'self' data:; worker-src 'self' blob:"
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data:; worker-src 'self' blob:; "
+    # no page of another site has its users click here unawares
+    "frame-ancestors 'none'"
 }
 
 

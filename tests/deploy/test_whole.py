@@ -8,9 +8,12 @@ import signal
 import socket
 import ssl
 import subprocess
+import threading
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +66,7 @@ def certificate(folder: Path) -> None:
     )
 
 
-def configuration(folder: Path, port: int, services: list[Server]) -> Path:
+def configuration(folder: Path, port: int, services: list[str]) -> Path:
     """The files of `deploy/nginx` with other ports, addresses and paths, in a main file as Debian has it."""
     site = (ROOT / "deploy" / "nginx" / "joulepath.conf").read_text()
     site = re.sub(r"^ *listen \[::\].*\n", "", site, flags=re.M)
@@ -71,7 +74,7 @@ def configuration(folder: Path, port: int, services: list[Server]) -> Path:
     site = site.replace("listen 443 ssl;", f"listen 127.0.0.1:{port} ssl;").replace("/etc/ssl/joulepath", str(folder))
     upstream = (ROOT / "deploy" / "nginx" / "upstream-compose.conf").read_text()
     for k, service in enumerate(services, start=1):
-        upstream = upstream.replace(f"joulepath-{k}:8000", service.url.removeprefix("http://"))
+        upstream = upstream.replace(f"joulepath-{k}:8000", service)
     folders = "".join(
         f"{kind}_temp_path {folder}/{kind};" for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
     )
@@ -81,6 +84,30 @@ def configuration(folder: Path, port: int, services: list[Server]) -> Path:
         f"events {{}}\nhttp {{ access_log off; {folders}\n{upstream}\n{site}\n}}\n"
     )
     return main
+
+
+@contextmanager
+def nginx(folder: Path, services: list[str]) -> Iterator[tuple[str, httpx2.Client]]:
+    """nginx with the certificate in `folder`, in front of two services: its URL, and a client that trusts it."""
+    port = free_port()
+    main = configuration(folder, port, services)
+    subprocess.run(["nginx", "-t", "-c", main], check=True, capture_output=True)
+    process = subprocess.Popen(["nginx", "-c", main])
+    try:
+        end = time.monotonic() + START
+        while True:
+            assert time.monotonic() < end and process.poll() is None, (folder / "error.log").read_text()
+            try:
+                socket.create_connection(("127.0.0.1", port)).close()
+                break
+            except ConnectionRefusedError:
+                time.sleep(0.05)
+        context = ssl.create_default_context(cafile=folder / "fullchain.pem")
+        with httpx2.Client(timeout=ANSWER, verify=context) as client:
+            yield f"https://127.0.0.1:{port}", client
+    finally:
+        process.send_signal(signal.SIGQUIT)
+        process.wait(START)
 
 
 @pytest.fixture(scope="module")
@@ -97,25 +124,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Whole]:
     with postgres() as database:
         settings["database_url"] = database.url
         with serving(**settings) as first, serving(**settings) as second:
-            port = free_port()
-            main = configuration(folder, port, [first, second])
-            subprocess.run(["nginx", "-t", "-c", main], check=True, capture_output=True)
-            nginx = subprocess.Popen(["nginx", "-c", main])
-            context = ssl.create_default_context(cafile=folder / "fullchain.pem")
-            client = httpx2.Client(timeout=ANSWER, verify=context)
-            found = Whole(f"https://127.0.0.1:{port}", client, [first, second], folder / "keys.yaml")
-            end = time.monotonic() + START
-            while True:
-                assert time.monotonic() < end and nginx.poll() is None, (folder / "error.log").read_text()
-                try:
-                    found.send("GET", "/readyz")
-                    break
-                except httpx2.TransportError:
-                    time.sleep(0.05)
-            yield found
-            client.close()
-            nginx.send_signal(signal.SIGQUIT)
-            nginx.wait(START)
+            addresses = [service.url.removeprefix("http://") for service in (first, second)]
+            with nginx(folder, addresses) as (url, client):
+                yield Whole(url, client, [first, second], folder / "keys.yaml")
 
 
 @pytest.fixture(scope="module")
@@ -160,6 +171,41 @@ def test_a_page_behind_the_proxy_may_post(whole: Whole, key: dict[str, str]) -> 
 def test_measurements_are_not_public(whole: Whole, key: dict[str, str]) -> None:
     assert whole.send("GET", "/metrics", **key).status_code == 404
     assert httpx2.get(whole.services[0].url + "/metrics", headers=key).status_code == 200
+
+
+@pytest.mark.parametrize(("path", "says_so"), [("/jobs/1/events", False), ("/optimize", True)])
+def test_events_come_one_by_one(path: str, says_so: bool, tmp_path: Path) -> None:
+    """The second event is sent only when the first was received."""
+    received = threading.Event()
+
+    class Events(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/event-stream")
+            self.send_header("Connection", "close")
+            if says_so:
+                self.send_header("X-Accel-Buffering", "no")
+            self.end_headers()
+            self.wfile.write(b"data: 1\n\n")
+            assert received.wait(ANSWER)
+            self.wfile.write(b"data: 2\n\n")
+            self.close_connection = True
+
+    upstream = ThreadingHTTPServer(("127.0.0.1", 0), Events)
+    threading.Thread(target=upstream.serve_forever, daemon=True).start()
+    certificate(tmp_path)
+    address = f"127.0.0.1:{upstream.server_port}"
+    try:
+        with nginx(tmp_path, [address, address]) as (url, client), client.stream("GET", url + path) as answer:
+            events = answer.iter_lines()
+            assert next(events) == "data: 1"
+            received.set()
+            assert [line for line in events if line] == ["data: 2"]
+    finally:
+        upstream.shutdown()
+        upstream.server_close()
 
 
 def test_a_service_that_dies_leaves_the_other(whole: Whole, key: dict[str, str]) -> None:

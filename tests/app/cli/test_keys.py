@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from app.access.key_ring import KeyRing
-from tests.app.cli.console import Here
+from tests.app.cli.console import ROOT, Here
 
 
 def test_a_key_is_made_listed_and_removed(here: Here, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,6 +53,13 @@ def test_what_is_refused(arguments: tuple[str, ...], word: str, here: Here, tmp_
     file = () if "--file" in arguments else ("--file", str(tmp_path / "keys.yaml"))
     code, out, err = here.run("keys", *arguments, *file)
     assert (code, out) == (2, b"") and word in err.decode()
+
+
+def test_where_the_package_is_not_installed(tmp_path: Path) -> None:
+    """As in the image and in `deploy/compose.yaml`."""
+    command = [sys.executable, "-m", "app.cli", "keys", "add", "press", "--file", tmp_path / "keys.yaml"]
+    made = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert KeyRing(tmp_path / "keys.yaml").find(made.stdout.strip())
 
 
 def test_without_a_file_it_says_which_variable(here: Here, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -154,6 +154,11 @@ def test_a_name_of_this_service(service: Server, host: str) -> None:
     assert by_host(service, host).status_code == 200
 
 
+def test_no_page_frames_the_docs(service: Server) -> None:
+    for path in ("/docs", "/redoc"):
+        assert "frame-ancestors 'none'" in service.get(path).headers["content-security-policy"]
+
+
 def test_probes_come_under_any_name(service: Server) -> None:
     assert by_host(service, "pod-7", path="/healthz").status_code == 200
     assert by_host(service, path="/healthz", version="1.0").status_code == 200
