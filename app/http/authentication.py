@@ -23,6 +23,8 @@ def authenticated(keys: KeyRing) -> Callable[[Request], None]:
     """
 
     def check(request: Request) -> None:
+        # without a key, a client may read at most
+        client = request.state.client = replace(client_of(request), role="read")
         needed = needed_role(request.method, request.scope["path"])
         if needed is None:
             return
@@ -33,8 +35,7 @@ def authenticated(keys: KeyRing) -> Callable[[Request], None]:
         key = keys.find(secret.strip())
         if key is None:
             raise WrongKey
-        client = replace(client_of(request), key=key.name, role=key.role)
-        request.state.client = client
+        client = request.state.client = replace(client, key=key.name, role=key.role)
         check_role(client, needed)
 
     return check

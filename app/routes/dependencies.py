@@ -9,6 +9,7 @@ from fastapi import Depends, Request
 from app.access.client import Client
 from app.engine.pool import Engine
 from app.http.client import client_of
+from app.http.metrics import Metrics
 from app.settings import Settings
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
@@ -31,6 +32,11 @@ async def _store(request: Request) -> Store:
     return store
 
 
+async def _metrics(request: Request) -> Metrics:
+    metrics: Metrics = request.app.state.metrics
+    return metrics
+
+
 async def _client(request: Request) -> Client:
     return client_of(request)
 
@@ -38,6 +44,7 @@ async def _client(request: Request) -> Client:
 ServiceClient = Annotated[Client, Depends(_client)]
 """Who sent the request."""
 ServiceSettings = Annotated[Settings, Depends(_settings)]
+ServiceMetrics = Annotated[Metrics, Depends(_metrics)]
 ServiceEngine = Annotated[Engine, Depends(_engine)]
 ServiceStore = Annotated[Store, Depends(_store)]
 

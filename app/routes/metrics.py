@@ -7,9 +7,8 @@ import asyncio
 from fastapi import APIRouter, Request, Response
 
 from app.exceptions import StoreUnavailable
-from app.http.metrics import Metrics
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine, ServiceStore
+from app.routes.dependencies import ServiceEngine, ServiceMetrics, ServiceStore
 from app.store.store import Store
 
 router = APIRouter(tags=["health"])
@@ -24,10 +23,9 @@ _PATIENCE = 2.0
     response_class=Response,
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}, **problem_responses()},
 )
-async def metrics(request: Request, engine: ServiceEngine, store: ServiceStore) -> Response:
+async def metrics(request: Request, measured: ServiceMetrics, engine: ServiceEngine, store: ServiceStore) -> Response:
     """Requests, durations, problems, the queue, the workers, the database and the process, in the text format of
     Prometheus."""
-    measured: Metrics = request.app.state.metrics
     document, media_type = measured.document(request.headers.get("accept", ""), engine, await _answers(store))
     return Response(document, media_type=media_type)
 

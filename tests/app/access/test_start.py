@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import subprocess
 import sys
@@ -9,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from app.access.start import check_access, is_loopback
+from app.access.start import check_access, is_loopback, log_access
 from app.settings import Settings, WrongSettings, read_settings
 from tests.app.access.test_key_file import add
-from tests.app.live import EXIT, ROOT, serving
+from tests.app.live import EXIT, ROOT
 
 
 def test_listens_on_this_machine_by_default(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,15 +54,24 @@ def test_the_process_ends_with_the_remedies() -> None:
     assert b"Traceback" not in run.stderr
 
 
-def test_the_log_says_who_may_do_what(tmp_path: Path) -> None:
-    with serving(warm=False, workers=1, robots="") as server:
-        server.wait_listening()
-        (entry,) = [entry for entry in server.logged() if entry["message"] == "access is open"]
-        assert (entry["level"], entry["to"]) == ("info", "every user and program of this machine")
-    with serving(warm=False, workers=1, robots="", host="0.0.0.0", open=1) as server:
-        server.wait_listening()
-        (entry,) = [entry for entry in server.logged() if entry["message"] == "access is open"]
-        assert entry["level"] == "warning" and entry["to"].startswith("everyone who reaches 0.0.0.0, port ")
+@pytest.mark.parametrize(
+    ("host", "level", "to"),
+    [
+        ("127.0.0.1", logging.INFO, "every user and program of this machine"),
+        ("0.0.0.0", logging.WARNING, "everyone who reaches 0.0.0.0, port 8000"),
+    ],
+)
+def test_the_log_says_to_whom_access_is_open(host: str, level: int, to: str, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO):
+        log_access(Settings(host=host, port=8000, open=True))
+    (record,) = caplog.records
+    assert (record.message, record.levelno, vars(record)["to"]) == ("access is open", level, to)
+
+
+def test_the_log_says_that_keys_are_required(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO):
+        log_access(Settings(host="0.0.0.0", open=True, api_keys_file=tmp_path / "keys.yaml"))
+    assert [record.message for record in caplog.records] == ["API keys are required"]
 
 
 def test_the_image_is_told_to_be_open() -> None:

@@ -60,7 +60,8 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Guarded]:
         "cell": add(file, "cell", "compute"),
         "boss": add(file, "boss", "admin"),
     }
-    with serving(workers=1, robots="", api_keys_file=file, database_url=database) as server:
+    settings = {"api_keys_file": file, "database_url": database, "trusted_proxies": "127.0.0.1"}
+    with serving(workers=1, robots="", **settings) as server:
         yield Guarded(server, file, keys, database)
 
 
@@ -231,8 +232,9 @@ def test_a_removed_key_is_refused_from_the_next_request_on(guarded: Guarded) -> 
 
 
 def test_the_log_has_names_and_no_keys(guarded: Guarded) -> None:
-    guarded.send("press", "GET", "/robots/named_in_the_log")
-    assert guarded.server.request_logged("/robots/named_in_the_log")["key"] == "press"
+    guarded.send("press", "GET", "/robots/named_in_the_log", **{"X-Forwarded-For": "192.0.2.66, 203.0.113.1"})
+    entry = guarded.server.request_logged("/robots/named_in_the_log")
+    assert (entry["client"], entry["key"], entry["problem"]) == ("203.0.113.1", "press", "unknown-robot")
     guarded.send(None, "GET", "/robots/without_a_key")
     assert guarded.server.request_logged("/robots/without_a_key")["key"] is None
     text = guarded.server.log.read_text()

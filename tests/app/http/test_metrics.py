@@ -8,8 +8,11 @@ from collections.abc import Iterator
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
+from starlette.testclient import TestClient
 
-from tests.app.live import CLIENT, Server, serving
+from app.main import create_app
+from app.settings import Settings
+from tests.app.live import CLIENT, LOCAL, Server, serving
 from tests.app.requests import long_search, move
 from tests.app.test_server import until, until_replaced
 
@@ -107,11 +110,10 @@ def test_the_database_and_the_process(service: Server) -> None:
 
 
 def test_a_database_that_does_not_answer() -> None:
-    with serving(
-        warm=False, workers=1, robots="", database_url="postgresql://tester:secret-word@127.0.0.1:1/postgres"
-    ) as server:
-        server.wait_listening()
-        assert value(server, "joulepath_store_up") == 0
+    settings = Settings(workers=1, robots=(), database_url="postgresql://tester:secret-word@127.0.0.1:1/postgres")
+    with TestClient(create_app(settings), base_url=LOCAL) as client:
+        text = client.get("/metrics").text
+    assert "joulepath_store_up 0.0" in text and "joulepath_ready 0.0" in text
 
 
 def test_the_format_of_openmetrics(service: Server) -> None:

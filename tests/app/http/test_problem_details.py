@@ -50,7 +50,11 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.TaskFailed, service.StoreUnavailable, service.UnknownAnswer, service.EmptyStudy)),
     *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
     *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
-    *(kind() for kind in (service.RobotExists, service.TooManyRobots)),
+    *(kind() for kind in (service.RobotExists, service.TooManyRobots, service.AnswerInUse)),
+    *(kind() for kind in (service.NoKey, service.WrongKey, service.CrossSite, service.WrongHost)),
+    service.RoleTooLow("read", "compute"),
+    service.NotOwner("press_shop"),
+    service.NotOwner(None),
 ]
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
-from typing import Any
 
 import httpx2
 import pytest
+from starlette.testclient import TestClient
 
+from app.main import create_app
 from app.schemas import errors as problems
+from app.settings import Settings
 from tests.app.live import CLIENT, Server, serving
 from tests.app.routes.test_problems import refused
 
@@ -164,11 +166,22 @@ def test_probes_come_under_any_name(service: Server) -> None:
     assert by_host(service, path="/healthz", version="1.0").status_code == 200
 
 
+def test_what_a_client_says_of_its_address_is_not_believed(service: Server) -> None:
+    """No proxy is trusted unless set, not even one on this machine."""
+    headers = {"X_Forwarded_For": "203.0.113.1", "Forwarded": "for=203.0.113.1"}
+    send(service, "GET", "/robots/without_a_proxy", **headers)
+    assert service.request_logged("/robots/without_a_proxy")["client"] == "127.0.0.1"
+
+
+def test_the_log_says_that_access_is_open(service: Server) -> None:
+    (entry,) = [entry for entry in service.logged() if entry["message"] == "access is open"]
+    assert (entry["level"], entry["to"]) == ("info", "every user and program of this machine")
+
+
 def test_any_name_and_page_where_the_operator_says_so() -> None:
-    settings: dict[str, Any] = {"allowed_hosts": "*", "cors_origins": "*"}
-    with serving(warm=False, workers=1, robots="", **settings) as server:
-        server.wait_listening()
-        assert by_host(server, "evil.example").status_code == 200
-        answer = send(server, "POST", "/studies", BODY, Content_Type=FORM, Origin="https://evil.example")
-        assert answer.status_code == 201
-        assert answer.headers["access-control-allow-origin"] == "*"
+    client = TestClient(create_app(Settings(allowed_hosts=("*",), cors_origins=("*",))), base_url="http://evil.example")
+    headers = {"Origin": "https://evil.example", "Sec-Fetch-Site": "cross-site"}
+    assert client.get("/problems/busy", headers=headers).headers["access-control-allow-origin"] == "*"
+    preflight = client.options("/studies", headers=headers | {"Access-Control-Request-Method": "DELETE"})
+    assert (preflight.status_code, preflight.headers["access-control-allow-origin"]) == (200, "*")
+    assert client.post("/problems/busy", headers=headers).status_code == 405, "not refused, but no such route"
