@@ -7,7 +7,7 @@ ServiceError
 ├── ShuttingDown        the service stops before the request is done
 ├── WorkerDied          the worker process ended during the task
 ├── TaskFailed          the task raised an unforeseen exception
-├── StoreUnavailable    the database cannot be reached
+├── StoreUnavailable    the database cannot be reached, read or written
 ├── UnknownAnswer       no stored answer has that id
 ├── UnknownStudy        no study has that id
 │   └── UnknownIteration
@@ -22,14 +22,14 @@ ServiceError
 ├── AnswerInUse         the answer belongs to a study
 ├── CrossSite           a web page of another site sent the request
 ├── WrongHost           the request is for another host
-└── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType
+└── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType, UnsupportedCoding, NotAcceptable, MalformedHttp
 """
 
 from __future__ import annotations
 
 import copyreg
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 
 class ServiceError(Exception):
@@ -85,10 +85,27 @@ class TaskFailed(ServiceError):
     MESSAGE = "This is a defect of the service: report it with the id in `instance`."
 
 
-class StoreUnavailable(ServiceError):
-    """The database cannot be reached, read or written; the log has the cause."""
+StoreFault = Literal["full", "read-only", "locked", "deleted", "unreachable"]
+"""What is wrong with the database."""
 
-    MESSAGE = "The database does not answer: try again later, or ask the operator of the service."
+
+class StoreUnavailable(ServiceError):
+    """The database cannot be reached, read or written; the log has the driver's words."""
+
+    MESSAGES: ClassVar[dict[StoreFault, str]] = {
+        "full": "The disk of the database is full: delete studies that are not needed, or enlarge the disk. Deleting "
+        "works.",
+        "read-only": "The database is read-only: reading works, and the operator of the service must make it writable.",
+        "locked": "Another process locks the database: try again later, or ask the operator of the service to end that "
+        "process.",
+        "deleted": "The file of the database was deleted or replaced: the operator of the service must put it back, or "
+        "restart the service, which then begins an empty one.",
+        "unreachable": "The database does not answer: try again later, or ask the operator of the service.",
+    }
+
+    def __init__(self, cause: StoreFault) -> None:
+        Exception.__init__(self, self.MESSAGES[cause])
+        self.cause = cause
 
 
 class UnknownAnswer(ServiceError):
@@ -212,7 +229,31 @@ class BodyTooLarge(ServiceError):
 class UnsupportedMediaType(ServiceError):
     """The path does not accept the media type of the body."""
 
-    MESSAGE = "This path takes JSON or CSV: declare the body as application/json or text/csv."
+    MESSAGE = (
+        "The header Content-Type declares something else than this path takes: send JSON as application/json, and to "
+        "POST /evaluate also CSV as text/csv. The body is the document itself, not a form with a file."
+    )
+
+
+class UnsupportedCoding(ServiceError):
+    """The body is packed in a way that the service cannot unpack."""
+
+    MESSAGE = "The header Content-Encoding names something else than gzip or deflate: use one of them, or none."
+
+
+class MalformedHttp(ServiceError):
+    """What arrived is no HTTP."""
+
+    MESSAGE = (
+        "What arrived is no HTTP/1.1 request: check the address and that the client speaks HTTP, not HTTPS, to this "
+        "port, and the request line, the headers and the chunks of the body."
+    )
+
+
+class NotAcceptable(ServiceError):
+    """The header `Accept-Encoding` allows no coding that the service has."""
+
+    MESSAGE = "The header Accept-Encoding excludes all of zstd, gzip and identity: allow one of them."
 
 
 class ClientDisconnected(Exception):

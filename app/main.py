@@ -18,6 +18,8 @@ from app.engine.warm_up import warm
 from app.http.authentication import authenticated
 from app.http.body_limit import BodyLimit
 from app.http.client import sender
+from app.http.compression import Compression
+from app.http.content_coding import ContentCoding
 from app.http.gate import Gate
 from app.http.handlers import install_handlers
 from app.http.json_body import JsonBody
@@ -119,6 +121,9 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }
     app.add_middleware(RouteNote)
+    # the inner one counts the body as it is unpacked
+    app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
+    app.add_middleware(ContentCoding)
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(JsonBody)
     if keys is not None:
@@ -134,6 +139,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
         )
     app.add_middleware(Gate, check=same_site(settings.cors_origins))
     app.add_middleware(Gate, check=known_host(settings.allowed_hosts, settings.host))
+    app.add_middleware(Compression)
     app.add_middleware(
         RequestContext,
         sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header),

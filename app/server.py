@@ -11,6 +11,7 @@ from fastapi import FastAPI
 
 from app.access.start import log_access
 from app.engine.pool import Engine
+from app.http.malformed import TypedHttpProtocol
 from app.main import create_app
 from app.settings import Settings
 
@@ -47,7 +48,7 @@ def serve(settings: Settings) -> None:
         host=settings.host,
         port=settings.port,
         loop="uvloop",
-        http="httptools",
+        http=TypedHttpProtocol,
         ws="none",
         log_config=None,
         access_log=False,

@@ -68,7 +68,7 @@ def examine(task: RequestTask, answer: Answer) -> Outcome:
     outcome.energy = objective(content)
     outcome.gap = content["energy"]["optimality_gap"]
     outcome.balance_error = balance_error(content)
-    outcome.candidates = len(content["candidates"])
+    outcome.candidates = sum(content["candidate_counts"].values())
     outcome.solves = content["solver"]["nlp_solves"]
     outcome.optimal = content["status"] == "optimal"
     return outcome

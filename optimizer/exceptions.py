@@ -59,13 +59,18 @@ class InvalidProblem(JoulepathError):
         self.field = field
 
 
+_LIKE_DEGREES = 20.0
+"""Joint positions [rad] beyond this are beyond three turns: no arm has such a range."""
+
+
 class OutsideLimits(InvalidProblem):
     """A given joint position lies beyond its limit [rad]."""
 
     def __init__(self, target: str, joint: str, value: float, lower: float, upper: float) -> None:
         super().__init__(
             f"{target}.q",
-            f"The {target}'s {joint} is at {value:.6g} rad: give a value between {lower:.6g} and {upper:.6g} rad.",
+            f"The {target}'s {joint} is at {value:.6g} rad: give a value between {lower:.6g} and {upper:.6g} rad."
+            + (" It looks like degrees: divide it by 57.29578." if abs(value) > _LIKE_DEGREES else ""),
         )
         self.target, self.joint, self.value, self.lower, self.upper = target, joint, value, lower, upper
 

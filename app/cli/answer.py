@@ -49,10 +49,14 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
     """The request in a JSON body. Raises Refused."""
     from pydantic import ValidationError
 
+    from app.convert.json_text import parsed_json
+    from app.exceptions import InvalidRequest
     from app.http.problem_details import invalid_request
 
     try:
-        return model.model_validate_json(body)
+        return model.model_validate(parsed_json(body))
+    except InvalidRequest as error:
+        raise refused(error, request_id) from None
     except ValidationError as error:
         raise refused(invalid_request(error, "body"), request_id) from None
 
@@ -65,9 +69,10 @@ def answered(task: Task, deadline: float, request_id: str) -> bytes:
 
     try:
         try:
-            return task.run(deadline).document
+            result = task.run(deadline)
         except UnknownRobot as error:
-            return with_own_robot(task, error.name).run(deadline).document
+            result = with_own_robot(task, error.name).run(deadline)
+        return (result if result.kept_as is None else result.without_path()).document
     except (JoulepathError, ServiceError) as error:
         raise refused(error, request_id) from None
 

@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from optimizer.solution import CandidateReport, UnreachableTarget
-
-
-def candidate_fields(candidate: CandidateReport) -> dict[str, Any]:
-    """One entry of `candidates`."""
-    ends = ("start", "start_target", "goal", "goal_target", "q_start", "q_goal")
-    return fields(candidate, *ends, "status", "reason", "lower_bound", "energy", "duration")
+from optimizer.exceptions import InvalidProblem
+from optimizer.solution import UnreachableTarget
 
 
 def unreachable_fields(target: UnreachableTarget) -> dict[str, Any]:
     """One entry of `unreachable`."""
     return fields(target, "end", "target", "reason")
+
+
+def location(error: InvalidProblem, where: str) -> list[str | int]:
+    """Path in the request of the field that the error is about; `where` is the part of the request."""
+    return [where, *(int(part) if part.isdigit() else part for part in error.field.split("."))]
 
 
 def fields(source: object, *names: str) -> dict[str, Any]:

@@ -22,11 +22,18 @@ FIRST_ROW = 2
 """Line of the first row of numbers: the header is line 1."""
 LONGEST_LINE = 4096
 _COLUMN = re.compile(r"t|[qva][1-9][0-9]?")
+_SEPARATORS = ",;\t"
+_WORDS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+_SPREADSHEET = b"PK\x03\x04"
+_NUMBER = re.compile(r'"?[-+]?[0-9.]')
 
 
 @dataclass(frozen=True)
 class MotionCsv:
     """A CSV file after its header: columns t, q1 … qn, then v1 … vn, then a1 … an; or q1 … qn alone.
+
+    The header tells what separates the columns: a comma, a semicolon or a tab. With the latter two, numbers may have a
+    decimal comma.
 
     `rows` are the lines that are not read yet, in blocks (k, columns) in the units of the file. `scale` converts joint
     columns to rad, rad/s, rad/s².
@@ -48,9 +55,11 @@ class MotionCsv:
         first = _line(file, 1)
         if not first:
             raise InvalidTable("The file is empty: send a header and two or more rows.")
-        columns = [name.strip().strip('"').strip() for name in first.removeprefix("\ufeff").strip().split(",")]
+        header = first.removeprefix("\ufeff").strip()
+        separator = max(_SEPARATORS, key=header.count)
+        columns = [name.strip().strip('"').strip().lower() for name in header.split(separator)]
         _check_header(columns, nq)
-        return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns))
+        return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns, separator))
 
     def log(self) -> Iterator[LogBlock]:
         """The rows of a log, in s, rad, rad/s, rad/s²."""
@@ -76,9 +85,16 @@ def _check_header(columns: list[str], nq: int) -> None:
     if columns in (q, ["t", *q], ["t", *q, *v], ["t", *q, *v, *a]):
         return
     wanted = f"t,q1,…,q{nq}, then v1,…,v{nq} and a1,…,a{nq} if they were logged, or q1,…,q{nq} alone"
+    wanted += ". Separate columns by commas, semicolons or tabs."
+    if all(_NUMBER.match(name) for name in columns):
+        raise InvalidTable(f"The first line has numbers: put a header with the names of the columns first, {wanted}", 1)
     if not any(_COLUMN.fullmatch(name) for name in columns):
-        raise InvalidTable(f"The first line is no header: begin the file with the names of the columns, {wanted}.", 1)
-    raise InvalidTable(f"The header is not that of a motion: its columns must be {wanted}.", 1)
+        raise InvalidTable(f"The first line is no header: begin the file with the names of the columns, {wanted}", 1)
+    expected = q if columns[0] in q else ["t", *q, *v, *a]
+    for k, (name, right) in enumerate(zip(columns, expected, strict=False), 1):
+        if name != right:
+            raise InvalidTable(f"Column {k} of the header is not `{right}`: its columns must be {wanted}", 1, right)
+    raise InvalidTable(f"The header has {len(columns)} columns: they must be {wanted}", 1)
 
 
 def _line(file: BufferedReader, row: int) -> str:
@@ -86,6 +102,10 @@ def _line(file: BufferedReader, row: int) -> str:
     raw = file.readline(LONGEST_LINE + 1)
     if len(raw) > LONGEST_LINE:
         raise InvalidTable(f"Line {row} is longer than {LONGEST_LINE} characters: send one row per line.", row)
+    if row == 1 and raw.startswith(_SPREADSHEET):
+        raise InvalidTable("The file is a spreadsheet: export it as CSV.", row)
+    if row == 1 and raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InvalidTable("The file is UTF-16: save it as CSV in UTF-8.", row)
     if b"\0" in raw:
         raise InvalidTable(f"Line {row} has binary data: send CSV as plain text.", row)
     try:
@@ -94,10 +114,12 @@ def _line(file: BufferedReader, row: int) -> str:
         raise InvalidTable(f"Line {row} is no UTF-8 text: send CSV as plain text.", row) from None
 
 
-def _blocks(file: BufferedReader, columns: list[str]) -> Iterator[Array]:
+def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:
     row = FIRST_ROW
     while lines := [*islice(_lines(file, row), BLOCK)]:
-        yield _numbers(lines, row, columns)
+        if separator != ",":
+            lines = [*_with_points(lines, row)]
+        yield _numbers(lines, row, columns, separator)
         row += len(lines)
         if len(lines) < BLOCK:
             return
@@ -115,23 +137,41 @@ def _lines(file: BufferedReader, row: int) -> Iterator[str]:
         row += 1
 
 
-def _numbers(lines: list[str], row: int, columns: list[str]) -> Array:
+def _with_points(lines: list[str], first: int) -> Iterator[str]:
+    """Lines with decimal points in place of decimal commas."""
+    for row, line in enumerate(lines, first):
+        if "," not in line:
+            yield line
+        elif "." in line:
+            raise InvalidTable(
+                f"Line {row} has both commas and points in its numbers: use one of them as the decimal sign, and "
+                "nothing between thousands.",
+                row,
+            )
+        else:
+            yield line.replace(",", ".")
+
+
+def _numbers(lines: list[str], row: int, columns: list[str], separator: str) -> Array:
     """Lines as numbers (k, columns)."""
     try:
-        values = np.loadtxt(lines, delimiter=",", comments=None, quotechar='"', ndmin=2)
+        values = np.loadtxt(lines, delimiter=separator, comments=None, quotechar='"', ndmin=2)
     except ValueError:
-        raise _first_error(lines, row, columns) from None
+        raise _first_error(lines, row, columns, separator) from None
     if values.shape != (len(lines), len(columns)) or not np.isfinite(values).all():
-        raise _first_error(lines, row, columns)
+        raise _first_error(lines, row, columns, separator)
     return np.asarray(values, dtype=float)
 
 
-def _first_error(lines: list[str], first: int, columns: list[str]) -> InvalidTable:
+def _first_error(lines: list[str], first: int, columns: list[str], separator: str) -> InvalidTable:
     for row, line in enumerate(lines, first):
-        cells = next(csv.reader([line]), [])
+        cells = next(csv.reader([line], delimiter=separator), [])
         if len(cells) != len(columns):
-            hint = " Separate columns by commas, and use a decimal point." if ";" in line else ""
-            message = f"Line {row} has {len(cells)} columns, but the header has {len(columns)}: correct the line.{hint}"
+            message = f"Line {row} has {len(cells)} columns, but the header has {len(columns)}: correct the line."
+            if separator == "," and len(cells) == 2 * len(columns):
+                message += " For numbers with a decimal comma, separate the columns by semicolons, also in the header."
+            elif any(other in line for other in _SEPARATORS.replace(separator, "")):
+                message += f" The header separates them by {_WORDS[separator]}: do so in every line."
             return InvalidTable(message, row)
         for name, cell in zip(columns, cells, strict=True):
             try:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from app.convert.fields import candidate_fields, fields, unreachable_fields
+from app.convert.candidates import candidate_counts, candidate_fields, chosen
+from app.convert.fields import fields, unreachable_fields
 from app.convert.warnings import certified_warnings
+from app.schemas.request import WhichCandidates
 from app.schemas.response import Clearance
 from optimizer.problem.problem import MethodName
 from optimizer.solution import Certificate, ElectricalEnergy, Energy, Objective, Solution, StorageUse
@@ -16,6 +18,7 @@ class Asked(Protocol):
 
     robot: str
     method: MethodName
+    candidates: WhichCandidates
 
     @property
     def objective(self) -> Objective:
@@ -24,7 +27,10 @@ class Asked(Protocol):
 
 
 def to_optimize_response(request: Asked, request_id: str, solution: Solution) -> dict[str, Any]:
-    """The answer of `POST /optimize`: numbers, strings, lists, dicts, and arrays in C order."""
+    """The answer of `POST /optimize`: numbers, strings, lists, dicts, and arrays in C order.
+
+    Its last field, `answer`, is None: who keeps the answer sets it.
+    """
     trajectory = solution.trajectory
     return {
         "id": request_id,
@@ -44,11 +50,14 @@ def to_optimize_response(request: Asked, request_id: str, solution: Solution) ->
             "optimality_gap": optimality_gap(solution.lower_bound, solution.energy.of(request.objective)),
         },
         "baselines": baseline_fields(solution),
-        "candidates": [candidate_fields(candidate) for candidate in solution.candidates],
+        "candidates": [candidate_fields(candidate) for candidate in chosen(solution.candidates, request.candidates)],
+        "candidate_counts": candidate_counts(solution.candidates),
         "unreachable": [unreachable_fields(target) for target in solution.unreachable],
         "certificate": certificate_fields(solution.certificate),
         "warnings": certified_warnings(solution),
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
+        # the last: see `TaskResult.of_kept_json`
+        "answer": None,
     }
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import orjson
@@ -31,11 +32,13 @@ class TaskResult:
     """A document and its media type. A task that fails raises an exception instead.
 
     `stored` are complete answers that belong into the database before the document is sent: it refers to them.
+    `kept_as` is the id under which the document itself is to be kept; its last field, `answer`, has the path.
     """
 
     document: bytes
     media_type: str
     stored: tuple[StoredAnswer, ...] = ()
+    kept_as: str | None = None
 
     @classmethod
     def of_json(cls, content: Mapping[str, Any], stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
@@ -43,9 +46,26 @@ class TaskResult:
         return cls(json_document(content), "application/json", stored)
 
     @classmethod
+    def of_kept_json(cls, content: Mapping[str, Any]) -> TaskResult:
+        """A JSON document that is to be kept, with its path as the last field, `answer`."""
+        kept = StoredAnswer(str(uuid.uuid4()), b"")
+        return cls(json_document({**content, "answer": kept.path}), "application/json", kept_as=kept.id)
+
+    def without_path(self) -> TaskResult:
+        """The same document, which was not kept: its field `answer` is null."""
+        assert self.kept_as is not None
+        end = _last_field(self.kept_as)
+        assert self.document.endswith(end)
+        return replace(self, document=self.document[: -len(end)] + b',"answer":null}', kept_as=None)
+
+    @classmethod
     def of_csv(cls, table: str, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
         """A CSV document."""
         return cls(table.encode(), "text/csv", stored)
+
+
+def _last_field(answer_id: str) -> bytes:
+    return b',"answer":"%s"}' % StoredAnswer(answer_id, b"").path.encode()
 
 
 def json_document(content: Mapping[str, Any]) -> bytes:

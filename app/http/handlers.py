@@ -10,9 +10,18 @@ from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from app.engine.result import TaskResult, json_document
-from app.exceptions import BodyTooLarge, InvalidRequest, MethodNotAllowed, NoKey, NotFound, ServiceError
+from app.exceptions import (
+    BodyTooLarge,
+    InvalidRequest,
+    MethodNotAllowed,
+    NoKey,
+    NotFound,
+    ServiceError,
+    UnsupportedMediaType,
+)
 from app.http.authentication import challenge
 from app.http.problem_details import invalid_request, problem_content, problem_type
+from app.http.refused_body import RefusedBody
 from optimizer.exceptions import JoulepathError
 
 PROBLEM_MEDIA_TYPE = "application/problem+json"
@@ -28,7 +37,7 @@ async def problem_response(request: Request, error: Exception) -> Response:
     """The response to a request that failed with `error`: a problem (RFC 9457)."""
     headers: dict[str, str] = {}
     if isinstance(error, RequestValidationError):
-        error = invalid_request(error)
+        error = UnsupportedMediaType() if _is_not_json(request, error) else invalid_request(error)
     elif isinstance(error, HTTPException):
         headers |= error.headers or {}
         if error.status_code == 405:
@@ -50,6 +59,13 @@ def result_response(result: TaskResult) -> Response:
     return Response(result.document, media_type=result.media_type)
 
 
+def _is_not_json(request: Request, error: RequestValidationError) -> bool:
+    """Whether the body was not read because it is declared as something else. FastAPI then validates its bytes."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    is_json = kind.startswith("application/") and kind.endswith(("/json", "+json"))
+    return not is_json and kind != "" and any(each["loc"] == ("body",) for each in error.errors())
+
+
 def _allowed(request: Request) -> list[str]:
     """Every method that the path accepts. Starlette's own list is that of the first route with this path only."""
     return [
@@ -61,6 +77,8 @@ def _allowed(request: Request) -> list[str]:
 
 def _from_framework(error: HTTPException) -> Exception:
     """The service's error for one of the framework."""
+    if isinstance(error, RefusedBody):
+        return error.error
     if error.status_code == 400:  # the body could not be read: not UTF-8, nested too deep, ...
         return InvalidRequest([{"loc": ["body"], "msg": "The body cannot be read as JSON"}])
     errors: dict[int, type[ServiceError]] = {404: NotFound, 405: MethodNotAllowed, 413: BodyTooLarge}

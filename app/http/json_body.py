@@ -1,4 +1,7 @@
-"""Treats the body of `curl -d @file` as JSON. curl declares it as a form, but no route takes forms."""
+"""Treats the body of `curl -d @file` as JSON. curl declares it as a form, but no route takes forms.
+
+The same holds for plain text, which some clients declare if they are told nothing.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,14 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 FORM = "application/x-www-form-urlencoded"
+TEXT = "text/plain"
 
 
 class JsonBody:
-    """ASGI middleware: declares a body as JSON if it is declared as a form or not at all."""
+    """ASGI middleware: declares a body as JSON if it is declared as a form, as plain text, or not at all.
+
+    `POST /evaluate` looks at such a body itself: it takes CSV, too.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -18,7 +25,8 @@ class JsonBody:
         """Passes the request on."""
         if scope["type"] == "http":
             headers = MutableHeaders(raw=list(scope["headers"]))
-            if headers.get("content-type", FORM).partition(";")[0].strip().lower() == FORM:
+            declared = headers.get("content-type", FORM).partition(";")[0].strip().lower()
+            if declared in (FORM, TEXT) and scope["path"] != "/evaluate":
                 headers["content-type"] = "application/json"
                 scope = {**scope, "headers": headers.raw}
         await self._app(scope, receive, send)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 
-from app.convert.fields import candidate_fields, fields, unreachable_fields
+from app.convert.candidates import candidate_counts, candidate_fields, most_telling
+from app.convert.fields import fields, location, unreachable_fields
 from app.exceptions import (
     AnswerInUse,
     BodyTooLarge,
@@ -17,8 +17,10 @@ from app.exceptions import (
     EmptyStudy,
     InvalidRequest,
     KeyReused,
+    MalformedHttp,
     MethodNotAllowed,
     NoKey,
+    NotAcceptable,
     NotFound,
     NotOwner,
     NotReady,
@@ -31,13 +33,13 @@ from app.exceptions import (
     TooManyRobots,
     UnknownAnswer,
     UnknownStudy,
+    UnsupportedCoding,
     UnsupportedMediaType,
     WorkerDied,
     WrongHost,
 )
+from app.http.validation_messages import told
 from app.schemas import errors as problems
-from app.schemas.common import KEY_HEADER
-from app.schemas.common import Request as RequestModel
 from optimizer import exceptions as optimizer_errors
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
@@ -80,6 +82,9 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     MethodNotAllowed: problems.MethodNotAllowed,
     BodyTooLarge: problems.BodyTooLarge,
     UnsupportedMediaType: problems.UnsupportedMediaType,
+    UnsupportedCoding: problems.UnsupportedCoding,
+    NotAcceptable: problems.NotAcceptable,
+    MalformedHttp: problems.MalformedHttp,
     WorkerDied: problems.Internal,
     TaskFailed: problems.Internal,
 }
@@ -106,33 +111,17 @@ def problem_content(error: Exception, instance: str) -> dict[str, Any]:
 def invalid_request(error: ValidationError | RequestValidationError, *where: str) -> InvalidRequest:
     """The InvalidRequest for errors of pydantic or FastAPI; their locations start with `where`.
 
-    Locations keep only names that the contract knows, and pydantic's `input` is left out: both may repeat what the
-    client sent.
+    What each says is in `validation_messages`.
     """
-    known = _field_names()
-    return InvalidRequest(
-        [
-            {
-                "loc": [*where, *(part for part in each["loc"] if isinstance(part, int) or part in known)],
-                "msg": each["msg"],
-            }
-            for each in error.errors()[:MOST_ERRORS]
-        ]
-    )
-
-
-@cache
-def _field_names() -> set[str]:
-    def names(model: type[RequestModel]) -> set[str]:
-        return set(model.model_fields).union(*(names(child) for child in model.__subclasses__()))
-
-    return names(RequestModel) | {"body", "path", "query", "header", KEY_HEADER}
+    entries = [entry for each in error.errors()[:MOST_ERRORS] for entry in told(each, where)]
+    return InvalidRequest(entries[:MOST_ERRORS])
 
 
 def _own_field(error: Exception, name: str) -> Any:
     if name == "errors" and isinstance(error, optimizer_errors.InvalidProblem):
-        path = [int(part) if part.isdigit() else part for part in error.field.split(".")]
-        return [{"loc": ["body", *path], "msg": str(error)}]
+        return [{"loc": location(error, "body"), "msg": str(error)}]
+    if name == "candidate_counts":
+        return candidate_counts(error.candidates)  # type: ignore[attr-defined]
     value = getattr(error, name)
     if name == "unreachable":
         return [unreachable_fields(target) for target in value]
@@ -140,4 +129,4 @@ def _own_field(error: Exception, name: str) -> Any:
         return [fields(branch, *problems.CollidingBranch.model_fields) for branch in value]
     if name == "attempts":
         return [fields(attempt, "label", "followed", "reason") for attempt in value]
-    return [candidate_fields(candidate) for candidate in value] if name == "candidates" else value
+    return [candidate_fields(candidate) for candidate in most_telling(value)] if name == "candidates" else value

@@ -46,4 +46,4 @@ async def show(id: AnswerId, store: ServiceStore) -> Response:
 )
 async def delete(id: AnswerId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes an answer. One of a study is deleted with its study."""
-    await store.write(partial(answers.delete, answer_id=id, client=client))
+    await store.write(partial(answers.delete, answer_id=id, client=client), frees=True)

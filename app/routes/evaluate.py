@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from tempfile import NamedTemporaryFile
-from typing import Any, Literal
+from typing import IO, Any, Literal
 
 from fastapi import APIRouter, Request, Response
 
 from app.exceptions import UnsupportedMediaType
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
+from app.http.json_body import FORM, TEXT
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.parameters import WantedFormat
@@ -21,7 +22,11 @@ from app.tasks.evaluate import EvaluateTask
 
 router = APIRouter(tags=["motion"])
 
-_KINDS: dict[str, Literal["json", "csv"]] = {"application/json": "json", "text/csv": "csv"}
+_Kind = Literal["json", "csv"]
+_KINDS: dict[str, _Kind] = {"application/json": "json", "text/csv": "csv"}
+_ANY = ("", FORM, TEXT)
+"""Declared by clients that were told nothing: the first character tells JSON from CSV."""
+_BEGINNING = 4096
 _REF = "#/components/schemas/{model}"
 
 
@@ -50,6 +55,13 @@ def _openapi() -> dict[str, Any]:
     }
 
 
+def _kind_of(file: IO[bytes]) -> _Kind:
+    """What a body is that nothing is said about: a JSON object, or else CSV."""
+    file.seek(0)
+    begins = file.read(_BEGINNING).removeprefix(b"\xef\xbb\xbf").lstrip()
+    return "json" if not begins or begins.startswith((b"{", b"[")) else "csv"
+
+
 @router.post(
     "/evaluate",
     summary="The energy of a given motion",
@@ -66,12 +78,14 @@ async def evaluate(
     """The energy of a given motion, per segment and in total, and the limits that it violates. The motion is a list of
     configurations with the times between them, or a log. It is sent as JSON, or as CSV with the settings as query
     parameters. `Accept: text/csv` returns the table of energies as CSV."""
-    kind = _KINDS.get(request.headers.get("content-type", "").partition(";")[0].strip().lower())
-    if kind is None:
+    declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    kind = _KINDS.get(declared)
+    if kind is None and declared not in _ANY:
         raise UnsupportedMediaType
-    with NamedTemporaryFile(prefix="joulepath-", suffix=f".{kind}") as file:
+    with NamedTemporaryFile(prefix="joulepath-") as file:
         async for chunk in request.stream():
             file.write(chunk)
         file.flush()
+        kind = kind or _kind_of(file)
         task = EvaluateTask(file.name, kind, dict(request.query_params), wanted, request.state.id)
         return result_response(await unless_disconnected(request, engine.run(task, settings.max_deadline)))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from app.exceptions import NotReady
+from app.exceptions import NotReady, StoreUnavailable
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceEngine
+from app.routes.dependencies import ServiceEngine, ServiceStore
 from app.schemas import errors as problems
 from app.schemas.health import Alive, Ready
 
@@ -21,12 +21,15 @@ async def healthz() -> Alive:
 
 @router.get(
     "/readyz",
-    summary="Are the workers warm?",
+    summary="Are the workers warm, and is the database there?",
     response_model=Ready,
-    responses=problem_responses(problems.NotReady),
+    responses=problem_responses(problems.NotReady, problems.StoreUnavailable),
 )
-async def readyz(engine: ServiceEngine) -> Ready:
-    """200 from the time when all workers are warm until the service stops."""
+async def readyz(engine: ServiceEngine, store: ServiceStore) -> Ready:
+    """200 from the time when all workers are warm until the service stops, while the database can be read and
+    written."""
     if not engine.ready:
         raise NotReady
+    if store.fault is not None:
+        raise StoreUnavailable(store.fault)
     return Ready(status="ready", workers=engine.warm_workers)

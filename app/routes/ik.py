@@ -9,6 +9,7 @@ from app.convert.ik import to_collision_arm, to_ik_response
 from app.convert.pose import to_matrix
 from app.engine.result import TaskResult
 from app.http.handlers import result_response
+from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceStore
 from app.schemas import errors as problems
@@ -18,7 +19,7 @@ from models.robot import Robot
 from optimizer.collision.model import collision_model
 from optimizer.kinematics.inverse import required_inverse_kinematics
 
-router = APIRouter(tags=["motion"])
+router = APIRouter(route_class=JsonRoute, tags=["motion"])
 
 
 @router.post(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Coroutine
 from functools import partial
 from tempfile import NamedTemporaryFile
 from typing import Annotated, Any, TypeVar
@@ -11,7 +12,9 @@ from fastapi import APIRouter, Body, Path, Request, Response
 
 from app.access.rules import check_owner
 from app.engine.result import TaskResult
+from app.exceptions import InvalidRequest
 from app.http.disconnect import unless_disconnected
+from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
@@ -26,11 +29,11 @@ from app.studies.answers import detail
 from app.tasks.arm_engine import ArmEngine
 from app.tasks.evaluate import EvaluateTask
 from app.tasks.optimize import OptimizeTask
-from optimizer.exceptions import InvalidProblem
+from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
 
 R = TypeVar("R", OptimizeRequest, EvaluateRequest)
 
-router = APIRouter(prefix="/studies", tags=["studies"])
+router = APIRouter(route_class=JsonRoute, prefix="/studies", tags=["studies"])
 
 MOST_ITERATIONS = 2**31 - 1
 """Largest iteration number of the database."""
@@ -67,19 +70,32 @@ async def add(
 ) -> Any:
     """Computes the next iteration and stores the request and the complete answer. Returns its energy and the changes
     from the previous and the best iteration. A failed request returns its problem, and the study does not record it."""
-    study = (await store.read(partial(studies.history, study_id=id))).study
+    study = (await store.read(partial(studies.state, study_id=id))).study
     check_owner(client, study.owner)
     kind, asked = _completed(body, study)
     sent = asked.model_dump(mode="json", exclude_unset=True)
     known = await store.read(partial(studies.known_step, study_id=id, kind=kind, request=sent, key=key))
     if known is None:
-        work = _result(asked, request.state.id, engine, settings.max_deadline)
-        step = _step(kind, sent, (await unless_disconnected(request, work)).document)
+        work = _located(kind, _result(asked, request.state.id, engine, settings.max_deadline))
+        step = _step(kind, sent, await unless_disconnected(request, work))
         number, again = await store.write(partial(studies.add, study_id=id, step=step, key=key, client=client))
     else:
         number, again = known, True
     set_location(request, response, f"{id}/iterations/{number}", again)
-    return detail(await store.read(partial(studies.up_to, study_id=id, number=number)))
+    return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
+
+
+async def _located(kind: str, work: Coroutine[Any, Any, TaskResult]) -> TaskResult:
+    """What `work` returns. Raises what it raises; errors about a field with its path in this request."""
+    try:
+        return await work
+    except InvalidRequest as error:
+        moved = [{**each, "loc": [each["loc"][0], kind, *each["loc"][1:]]} for each in error.errors]
+        raise InvalidRequest(moved) from None
+    except InvalidProblem as error:
+        if isinstance(error, InvalidTable | OutsideLimits):
+            raise  # about the motion
+        raise InvalidProblem(f"{kind}.{error.field}", str(error)) from None
 
 
 async def _result(
@@ -87,6 +103,8 @@ async def _result(
 ) -> TaskResult:
     """The answer of the endpoint that the request is for."""
     if isinstance(asked, OptimizeRequest):
+        # all candidates: suggestions start from those that were ruled out, too
+        asked = asked.model_copy(update={"candidates": "all"})
         return await engine.run(OptimizeTask(asked, request_id), deadline_of(asked, max_deadline))
     with NamedTemporaryFile(prefix="joulepath-", suffix=".json") as file:
         file.write(asked.model_dump_json(exclude_unset=True).encode())
@@ -106,14 +124,20 @@ async def show(
     store: ServiceStore,
 ) -> IterationDetail:
     """The request, its energy, and the state of the study after this iteration."""
-    return detail(await store.read(partial(studies.up_to, study_id=id, number=number)))
+    return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
 
 
-def _step(kind: str, sent: dict[str, Any], document: bytes) -> studies.Step:
-    answer = orjson.loads(document)
+def _step(kind: str, sent: dict[str, Any], result: TaskResult) -> studies.Step:
+    answer = orjson.loads(result.document)
     energy = answer["energy"] if kind == "optimize" else answer["total"]["energy"]
     return studies.Step(
-        kind, sent, document, answer["duration"], energy["electrical"]["total"], energy["mechanical"]["total"]
+        kind,
+        sent,
+        result.document,
+        answer["duration"],
+        energy["electrical"]["total"],
+        energy["mechanical"]["total"],
+        result.kept_as,
     )
 
 

@@ -6,27 +6,29 @@ from typing import Annotated, Literal
 
 from fastapi import Depends, Header, Path, Request, Response
 
+from app.exceptions import InvalidRequest
 from app.schemas.common import KEY_HEADER
 from app.schemas.cycle import CycleRequest
 from app.schemas.examples.values import STUDY_ID
 from app.schemas.request import MotionRequest
 from app.schemas.studies import IdempotencyKey
 from app.schemas.whatif import WhatifRequest
-from optimizer.exceptions import InvalidProblem
 
 
 def deadline_of(body: MotionRequest | WhatifRequest | CycleRequest, longest: float) -> float:
-    """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises InvalidProblem."""
+    """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises InvalidRequest."""
     given = body.deadline if "deadline" in body.model_fields_set else None
     return allowed_deadline(given, body.deadline, longest)
 
 
-def allowed_deadline(given: float | None, default: float, longest: float) -> float:
-    """`given` [s], or if it is None, the default, but at most `longest`. Raises InvalidProblem above it."""
+def allowed_deadline(given: float | None, default: float, longest: float, where: str = "body") -> float:
+    """`given` [s], or if it is None, the default, but at most `longest`. Raises InvalidRequest above it, with the part
+    `where` of the request."""
     if given is None:
         return min(default, longest)
     if given > longest:
-        raise InvalidProblem("deadline", f"deadline must be at most {longest:g} s.")
+        msg = f"deadline must be at most {longest:g} s: the operator of the service has set this."
+        raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
     return given
 
 

@@ -13,6 +13,7 @@ from sqlalchemy.exc import IntegrityError
 from app.access.client import Client
 from app.exceptions import RobotExists
 from app.http.disconnect import unless_disconnected
+from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceEngine, ServiceSettings, ServiceStore
 from app.routes.parameters import LOCATION_HEADER
@@ -27,7 +28,7 @@ from models.registry import load_robot, robot_names
 from models.robot import FrictionLaw as Law
 from models.trust import TRUST, energy_trust
 
-router = APIRouter(prefix="/robots", tags=["robots"])
+router = APIRouter(route_class=JsonRoute, prefix="/robots", tags=["robots"])
 
 Name = Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])]
 NewName = Annotated[OwnName, Path(description="Name of the robot.", examples=["my_arm"])]
@@ -134,7 +135,7 @@ async def put(
 )
 async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes a robot that was added. Studies and stored answers about it stay."""
-    await store.write(partial(robots.delete, name=name, client=client))
+    await store.write(partial(robots.delete, name=name, client=client), frees=True)
 
 
 async def _computed(

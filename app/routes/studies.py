@@ -6,8 +6,10 @@ from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
@@ -18,7 +20,7 @@ from app.store import studies
 from app.studies.answers import as_csv, full, summary
 from app.tasks.arm_engine import robot_in
 
-router = APIRouter(prefix="/studies", tags=["studies"])
+router = APIRouter(route_class=JsonRoute, prefix="/studies", tags=["studies"])
 
 
 @router.post(
@@ -53,7 +55,7 @@ async def create(
     except IntegrityError:  # another process has just created the study of this key
         made, again = await store.write(partial(studies.create, study=study))
     set_location(request, response, made.id, again)
-    return StudySummary(**summary(await store.read(partial(studies.history, study_id=made.id))))
+    return StudySummary(**summary(await store.read(partial(studies.state, study_id=made.id))))
 
 
 @router.get(
@@ -65,7 +67,7 @@ async def create(
 async def list_studies(page: Annotated[StudyPage, Query()], store: ServiceStore) -> StudyList:
     """All studies with their state, newest first, page by page."""
     found, following = await store.read(partial(studies.page, limit=page.limit, after=page.after))
-    return StudyList(studies=[StudySummary(**summary(history)) for history in found], next=following)
+    return StudyList(studies=[StudySummary(**summary(state)) for state in found], next=following)
 
 
 @router.get(
@@ -82,8 +84,8 @@ async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Respon
     threshold is met. `Accept: text/csv` returns the history as a table."""
     history = await store.read(partial(studies.history, study_id=id))
     if wanted == "csv":
-        return Response(as_csv(history), media_type="text/csv")
-    return Response(Study(**full(history)).model_dump_json(), media_type="application/json")
+        return Response(await run_in_threadpool(as_csv, history), media_type="text/csv")
+    return Response(await run_in_threadpool(_document, history), media_type="application/json")
 
 
 @router.delete(
@@ -94,4 +96,8 @@ async def show(id: StudyId, wanted: WantedFormat, store: ServiceStore) -> Respon
 )
 async def delete(id: StudyId, store: ServiceStore, client: ServiceClient) -> None:
     """Deletes the study with its iterations and their answers."""
-    await store.write(partial(studies.delete, study_id=id, client=client))
+    await store.write(partial(studies.delete, study_id=id, client=client), frees=True)
+
+
+def _document(history: studies.History) -> str:
+    return Study(**full(history)).model_dump_json()

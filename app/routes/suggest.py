@@ -23,7 +23,6 @@ from app.schemas.request import OptimizeRequest
 from app.schemas.suggestions import Suggestions, SuggestQuery
 from app.store import answers, studies
 from app.store.store import Store
-from app.studies.progress import best_of
 from app.studies.suggestions import Proposal, base_of, proposals
 from app.tasks.arm_engine import ArmEngine, known_here
 from app.tasks.optimize import OptimizeTask
@@ -58,7 +57,7 @@ async def suggest(
     """Suggestions for the next iteration: each differs from the best iteration (or the last) in one respect. The
     optimiser computes every suggestion. They are in order of the energy that they save, each with its body for
     `POST /studies/{id}/iterations`."""
-    deadline = allowed_deadline(query.deadline, SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline)
+    deadline = allowed_deadline(query.deadline, SuggestQuery.DEFAULT_DEADLINE, settings.max_deadline, "query")
     end = asyncio.get_running_loop().time() + deadline
     # if there are several workers, one stays free for other clients
     computing = _Computing(engine, asyncio.Semaphore(max(1, settings.workers - 1)), request.state.id, end)
@@ -67,15 +66,14 @@ async def suggest(
 
 
 async def _suggestions(store: Store, study_id: str, which: str, computing: _Computing) -> dict[str, Any]:
-    history = await store.read(partial(studies.history, study_id=study_id))
-    energies, study = history.energies, history.study
-    index = best_of(energies) if which == "best" else len(energies) - 1 if energies else None
-    if index is None:
+    state = await store.read(partial(studies.state, study_id=study_id))
+    known, study = state.best if which == "best" else state.last, state.study
+    if known is None:
         raise EmptyStudy
-    iteration = history.iterations[index]
-    up_to_base = await store.read(partial(studies.up_to, study_id=study_id, number=iteration.number))
+    iteration = (await store.read(partial(studies.entry, study_id=study_id, number=known.number))).iteration
+    least = studies.energy_of(study, iteration)
     _, body = await store.read(partial(answers.get, answer_id=iteration.answer_id))
-    base = base_of(iteration.kind, up_to_base.iterations[-1].request, orjson.loads(body), study.objective)
+    base = base_of(iteration.kind, iteration.request, orjson.loads(body), study.objective)
     with await known_here(store, study.robot):
         found = [] if base is None else proposals(base)
     outcomes = await computing.outcomes(found, study.objective)
@@ -83,10 +81,10 @@ async def _suggestions(store: Store, study_id: str, which: str, computing: _Comp
     for outcome in outcomes:
         if "energy" in outcome:
             energy = outcome["energy"]
-            computed.append(outcome | {"gain": energies[index] - energy, "threshold_met": energy <= study.threshold})
+            computed.append(outcome | {"gain": least - energy, "threshold_met": energy <= study.threshold})
     return {
         "study": study.id,
-        "base": {"number": iteration.number, "energy": energies[index]},
+        "base": {"number": iteration.number, "energy": least},
         "suggestions": sorted(computed, key=lambda entry: entry["gain"], reverse=True),
         "not_computed": [outcome for outcome in outcomes if "problem" in outcome],
     }

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
@@ -13,7 +15,32 @@ from app.schemas.lengths import ROBOT_LENGTH
 from optimizer.problem.names import is_plain
 from optimizer.problem.pose import QUATERNION_TOLERANCE
 
+_LONGEST_TYPO = 64
+_SHORTEST = 3
+_ALIKE, _NEARLY_SAME = 0.6, 0.8
 KEY_HEADER = "Idempotency-Key"
+
+
+UNKNOWN_FIELD = "unknown_field"
+"""Type of the error about fields that a model does not have; its context has `known`, and `unknown`: the nearest known
+one, or None, by the name of each."""
+
+
+def nearest(name: str, known: Iterable[str], alike: float = _ALIKE) -> str | None:
+    """The one of the known names that `name` was meant to be; None if none is like it.
+
+    `alike` is the least share of letters in common, see difflib.
+    """
+    by_form = {_form(each): each for each in known}
+    begun = [each for form, each in by_form.items() if len(name) >= _SHORTEST and form.startswith(_form(name))]
+    if len(begun) == 1:
+        return begun[0]
+    found = get_close_matches(_form(name[:_LONGEST_TYPO]), by_form, n=1, cutoff=alike)
+    return by_form[found[0]] if found else None
+
+
+def _form(name: str) -> str:
+    return name.lower().replace("-", "_")
 
 
 def described(description: str, unit: str | None, example: Any, **constraints: Any) -> Any:
@@ -39,8 +66,11 @@ class Request(BaseModel):
     def _refuse_unknown_fields(cls, data: Any) -> Any:
         # before `extra="forbid"`, whose error repeats the unknown name: no answer echoes the caller's input
         if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
+            unknown = {str(name): nearest(str(name), cls.model_fields) for name in data if name not in cls.model_fields}
             raise PydanticCustomError(
-                "unknown_field", "Unknown field: use only {known}", {"known": ", ".join(cls.model_fields)}
+                UNKNOWN_FIELD,
+                "Unknown field: use only {known}",
+                {"known": ", ".join(cls.model_fields), "unknown": unknown},
             )
         return data
 
@@ -58,17 +88,25 @@ class Answer(Response):
     robot: str = described("Name of the robot.", None, "ur5e")
 
 
-def by_field(*names: str) -> Discriminator:
-    """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one field of `names`."""
+def by_field(*names: str, beside: str | None = None) -> Discriminator:
+    """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one field of `names`.
+
+    `beside` is a field that all members have.
+    """
 
     def choose(value: Any) -> str | None:
         present = [name for name in names if (name in value if isinstance(value, dict) else hasattr(value, name))]
+        if not present and isinstance(value, dict):
+            # a name that is nearly one of them: the member that has the right name says so
+            meant = (nearest(str(given), names, _NEARLY_SAME) for given in value)
+            present = [name for name in meant if name is not None][:1]
         return f"by {present[0]}" if len(present) == 1 else None
 
+    also = f"{beside} and " if beside else ""
     return Discriminator(
         choose,
         custom_error_type="exactly_one",
-        custom_error_message=f"Give an object with exactly one of {', '.join(names)}",
+        custom_error_message=f"Give an object with {also}exactly one of {', '.join(names)}",
     )
 
 
@@ -151,7 +189,7 @@ Pose = Annotated[
     Annotated[QuaternionPose, Tag("by quaternion")]
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")],
-    by_field("quaternion", "rpy", "rotvec"),
+    by_field("quaternion", "rpy", "rotvec", beside="position"),
 ]
 
 IDENTITY = QuaternionPose(position=[0.0, 0.0, 0.0], quaternion=[0.0, 0.0, 0.0, 1.0])

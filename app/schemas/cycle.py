@@ -11,7 +11,15 @@ from app.schemas.arm import ArmRequest, MoveLimits, Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH
 from app.schemas.path import Line
-from app.schemas.request import SECONDS_OR_RANGE, Branch, DurationRange, Holding, Target
+from app.schemas.request import (
+    SECONDS_OR_RANGE,
+    Branch,
+    DurationRange,
+    Holding,
+    Target,
+    WhichCandidates,
+    which_candidates,
+)
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
 from optimizer.problem.free_order import MOST_FREE_STOPS
 from optimizer.problem.names import LONGEST_NAME
@@ -176,6 +184,7 @@ class CycleRequest(ArmRequest):
         True,
         default=True,
     )
+    candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
         "Time between the samples of the answers of the moves.", "s", 0.008, default=0.008, ge=1e-4, le=1
     )

@@ -114,7 +114,7 @@ class EvaluateRequest(EvaluateSettings):
         if (self.configurations is None) == (self.trajectory is None):
             raise PydanticCustomError("exactly_one", "Give exactly one of `configurations` and `trajectory`")
         if self.configurations is not None and self.time_per_segment is None:
-            raise PydanticCustomError("missing", "`configurations` require `time_per_segment`")
+            raise PydanticCustomError("times", "`configurations` require `time_per_segment`")
         given = self.model_fields_set & {"time_per_segment", "interpolation"}
         if self.trajectory is not None and given:
             raise PydanticCustomError(

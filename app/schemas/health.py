@@ -14,7 +14,7 @@ class Alive(Response):
 
 
 class Ready(Response):
-    """All workers are warm: started, with the kernel loaded."""
+    """All workers are warm: started, with the kernel loaded. The database can be read and written."""
 
     status: Literal["ready"] = described("Always `ready`.", None, "ready")
     workers: int = described("Number of warm workers.", "1", 2)

@@ -117,5 +117,5 @@ TargetPose = Annotated[
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")]
     | Annotated[ConeOrientedPose, Tag("by orientation")],
-    by_field("quaternion", "rpy", "rotvec", "orientation"),
+    by_field("quaternion", "rpy", "rotvec", "orientation", beside="position"),
 ]

@@ -18,6 +18,21 @@ from optimizer.solution import Objective
 Seconds = Annotated[float, Field(ge=1e-3, le=LONGEST_DURATION)]
 
 
+WhichCandidates = Literal["all", "computed", "none"]
+
+
+def which_candidates() -> Any:
+    """The field `candidates` of a request."""
+    return described(
+        "Candidates that the answer lists. `computed`: those for which a motion was computed, found or not (`solved` "
+        "and `failed`). `all`: also those that were ruled out or not reached, thousands for two poses. `none`: no "
+        "candidates. `candidate_counts` counts all of them in any case.",
+        None,
+        "all",
+        default="computed",
+    )
+
+
 class JointTarget(Request):
     """A target as joint positions."""
 
@@ -185,6 +200,7 @@ class MotionRequest(ArmRequest):
         True,
         default=True,
     )
+    candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
         "Time between the returned samples. The last sample is at the end of the motion.",
         "s",

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.common import Answer, Response, described, part
-from app.schemas.examples.values import HOME, LABEL, STANDING_STILL
+from app.schemas.examples.values import ANSWER_PATH, HOME, LABEL, STANDING_STILL
 from optimizer.collision.close_pass import CLOSE
 from optimizer.problem.problem import MethodName
 from optimizer.solution import Objective
@@ -200,6 +200,16 @@ class Candidate(Response):
     duration: float | None = described("Duration of the motion found; null if not solved.", "s", 1.9)
 
 
+class CandidateCounts(Response):
+    """How many candidates have each status; all of them, listed or not."""
+
+    solved: int = described("A motion was found.", "1", 9)
+    pruned: int = described("Ruled out by the lower bound or by the energy.", "1", 247)
+    infeasible: int = described("No motion exists, at least none of this method.", "1", 0)
+    failed: int = described("No motion was found, but one may exist.", "1", 0)
+    unvisited: int = described("Not solved.", "1", 0)
+
+
 class UnreachableTarget(Response):
     """A target of an `any_of` that the arm cannot reach. It has no candidates."""
 
@@ -316,10 +326,17 @@ class OptimizeResponse(Answer):
     trajectory: Trajectory = part("The motion.")
     energy: Energy = part("Energy and power of the motion.")
     baselines: Annotated[list[Baseline], Field(min_length=1)] = part("The same task by other planners.")
-    candidates: Annotated[list[Candidate], Field(min_length=1)] = part(
-        "Every pair of a start and a goal configuration, with its result."
+    candidates: list[Candidate] = part(
+        "Pairs of a start and a goal configuration, with their results, as `candidates` of the request asks."
     )
+    candidate_counts: CandidateCounts = part("Number of all candidates by status.")
     unreachable: list[UnreachableTarget] = part("Targets of an `any_of` without candidates, each with the cause.")
     certificate: Certificate = part("Independent check of the motion.")
     warnings: list[str] = described(WARNINGS, None, [])
     solver: Solver = part("Effort of the computation.")
+    answer: str | None = described(
+        "Path under which this answer is kept: `GET` returns it again. Null if it is not kept: the database cannot be "
+        "written, the answer is larger than all that the service may keep, or it is a part of another answer.",
+        None,
+        ANSWER_PATH,
+    )

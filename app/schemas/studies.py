@@ -14,6 +14,7 @@ from app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
 from app.schemas.request import OptimizeRequest
 from optimizer.solution import Objective
 
+PAGE_PATTERN = r"^[0-9]{1,16}_[0-9a-f-]{36}$"
 Name = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
 IdempotencyKey = Annotated[str, Field(min_length=1, max_length=KEY_LENGTH, pattern=r"^[!-~]+$")]
 
@@ -48,7 +49,7 @@ class StudyPage(Query):
         None,
         f"1741944413589793_{STUDY_ID}",
         default=None,
-        pattern=r"^[0-9]{1,16}_[0-9a-f-]{36}$",
+        pattern=PAGE_PATTERN,
     )
 
 

@@ -65,7 +65,6 @@ def delete(session: Session, answer_id: str, client: Client) -> None:
 
 def prune(session: Session, max_bytes: int, max_age: timedelta) -> None:
     """Deletes answers of no study: those older than `max_age`, then the oldest until the rest fit `max_bytes`."""
-    session.flush()
     free = Answer.study_id.is_(None)
     session.execute(delete_from(Answer).where(free, Answer.created < now() - max_age))
     newest_first = func.sum(Answer.size).over(order_by=(Answer.created.desc(), Answer.id))

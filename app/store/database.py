@@ -5,17 +5,29 @@ from __future__ import annotations
 import logging
 import sqlite3
 from pathlib import Path
-from typing import Any
 
 from alembic import command
 from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy.orm import Session
+from sqlalchemy.pool import ConnectionPoolEntry
+
+from app.store.sqlite_file import check, identity
 
 logger = logging.getLogger(__name__)
 
+OPENED = "opened"
+"""Key of the identity of a connection's files, in the connection's `info`; empty for PostgreSQL."""
 _MIGRATIONS = Path(__file__).parent / "migrations"
-_LOCK_TIMEOUT = 10.0
-"""Longest wait [s] of a statement for another process's transaction, and of a connection for its server."""
+_LOCK_TIMEOUT = 2.0
+"""Longest wait [s] of a statement for another process's transaction."""
+_MIGRATION_TIMEOUT = 30.0
+"""The same, while another process may be migrating the tables."""
+_SERVER_TIMEOUT = 5.0
+"""Longest wait [s] for an answer of PostgreSQL."""
+_PAGES = ("freelist_count", "page_size")
 _MIGRATION_LOCK = 0x6A6F756C65
 """Key of the advisory lock in PostgreSQL: any number that no other program uses in this database."""
 
@@ -29,29 +41,53 @@ def create_database_engine(url: str) -> Engine:
     if parsed.get_backend_name() == "sqlite":
         return _sqlite(parsed)
     # pg8000: its licence permits redistribution, and it needs no C library
-    return create_engine(
+    engine = create_engine(
         parsed.set(drivername="postgresql+pg8000"),
-        connect_args={"timeout": _LOCK_TIMEOUT},
+        connect_args={"timeout": _SERVER_TIMEOUT},
         # after a restart of the server, the connections of the pool are closed
         pool_pre_ping=True,
-        pool_timeout=_LOCK_TIMEOUT,
+        pool_timeout=_SERVER_TIMEOUT,
     )
+
+    @event.listens_for(engine, "begin")
+    def begin(connection: Connection) -> None:
+        connection.exec_driver_sql(f"SET LOCAL lock_timeout = {_lock_timeout(connection)}")
+
+    return engine
+
+
+def sqlite_file(url: URL) -> Path | None:
+    """The file of an SQLite database; None for PostgreSQL, and for a database in memory."""
+    given = url.database if url.get_backend_name() == "sqlite" else None
+    return Path(given) if given and given != ":memory:" and not given.startswith("file:") else None
+
+
+def _lock_timeout(connection: Connection) -> int:
+    """Longest wait for a lock in this transaction [ms]."""
+    migrates = connection.get_execution_options().get("migrates", False)
+    return int(1000 * (_MIGRATION_TIMEOUT if migrates else _LOCK_TIMEOUT))
 
 
 def _sqlite(url: URL) -> Engine:
-    engine = create_engine(url, connect_args={"timeout": _LOCK_TIMEOUT}, pool_timeout=_LOCK_TIMEOUT)
+    engine = create_engine(url, pool_timeout=_LOCK_TIMEOUT)
+    file = sqlite_file(url)
 
     @event.listens_for(engine, "connect")
-    def configure(connection: sqlite3.Connection, _: Any) -> None:
+    def configure(connection: sqlite3.Connection, record: ConnectionPoolEntry) -> None:
         connection.isolation_level = None  # `begin` below starts each transaction, also around DDL
         # FULL: a committed transaction survives a killed process and a power failure
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"):
+        # secure_delete=FAST: with ON, the default of some builds, deleting needs as much space as what is deleted
+        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "secure_delete=FAST"):
             connection.execute(f"PRAGMA {pragma}")
+        connection.execute("SELECT count(*) FROM sqlite_master")  # opens the log, too
+        record.info[OPENED] = {} if file is None else identity(file)
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
         # without IMMEDIATE, a transaction that reads and then writes fails if another one writes in between
+        check(connection.info[OPENED])
         writes = connection.get_execution_options().get("writes", False)
+        connection.exec_driver_sql(f"PRAGMA busy_timeout = {_lock_timeout(connection)}")
         connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
 
     return engine
@@ -62,12 +98,35 @@ def migrate(engine: Engine) -> None:
 
     Raises CommandError if a later version of the service created the database.
     """
-    if engine.url.get_backend_name() == "sqlite" and engine.url.database:
-        Path(engine.url.database).parent.mkdir(parents=True, exist_ok=True)
+    file = sqlite_file(engine.url)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
     config = Config()
     config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
-    with engine.execution_options(writes=True).begin() as connection:
+    with engine.connect() as connection:
+        # without a lock, so that a database that cannot be written can be read
+        present = MigrationContext.configure(connection).get_current_revision()
+    if present == ScriptDirectory.from_config(config).get_current_head():
+        return
+    with engine.execution_options(writes=True, migrates=True).begin() as connection:
         if connection.dialect.name == "postgresql":
             connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})
         config.attributes["connection"] = connection
         command.upgrade(config, "head")
+
+
+def room_inside(session: Session) -> int:
+    """Bytes of an SQLite database that hold nothing and are used before its file grows."""
+    pages, size = (session.connection().exec_driver_sql(f"PRAGMA {name}").scalar_one() for name in _PAGES)
+    return int(pages) * int(size)
+
+
+def is_writable(session: Session) -> bool:
+    """Whether the database takes changes. Nothing is written. Raises DBAPIError, of SQLite also if it does not."""
+    connection = session.connection()
+    if connection.dialect.name == "postgresql":
+        return str(connection.exec_driver_sql("SHOW transaction_read_only").scalar_one()) == "off"
+    # SQLite begins a transaction that writes on a read-only database, too
+    connection.exec_driver_sql("UPDATE alembic_version SET version_num = version_num")
+    session.rollback()
+    return True

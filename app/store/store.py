@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
+import sqlite3
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
@@ -14,8 +17,11 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
-from app.exceptions import StoreUnavailable
-from app.store.database import create_database_engine, migrate
+from app.exceptions import StoreFault, StoreUnavailable
+from app.store.database import OPENED, create_database_engine, is_writable, migrate, room_inside, sqlite_file
+from app.store.faults import LEAST_ROOM, DatabaseMoved, fault_of, room
+from app.store.pruning import Pruning
+from app.store.sqlite_file import Reserve, check, log_size
 
 logger = logging.getLogger(__name__)
 
@@ -24,66 +30,170 @@ T = TypeVar("T")
 _THREADS = 4
 """A statement takes milliseconds, so a few threads suffice; the connection pool has more connections than this."""
 _UNAVAILABLE = (DBAPIError, PoolTimeout, OSError, CommandError)
+_LONG = 0.5
+"""Time [s] above which a failure was a wait for a lock or a server."""
+_PAUSE = 1.0
+"""Time [s] after such a failure in which all work fails at once, so that a client waits for one time-out at most."""
+_CHECK_PERIOD = 2.0
+"""Time [s] between two checks of the database."""
 
 
 class Store:
-    """A database, migrated on first contact."""
+    """A database, migrated on first contact. `clock` [s] measures the pauses."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, clock: Callable[[], float] = time.monotonic) -> None:
         self._engine = create_database_engine(url)
+        self._file = sqlite_file(self._engine.url)
+        self._reserve = None if self._file is None else Reserve(self._file)
+        self._clock = clock
         self._threads = ThreadPoolExecutor(_THREADS, thread_name_prefix="store")
         self._migrating = threading.Lock()
         self._migrated = False
+        self._was_open = False
+        self.pruning = Pruning(clock)
+        self._paused: dict[bool, tuple[float, StoreFault]] = {}
+        self._checking: asyncio.Task[None] | None = None
+        self.fault: StoreFault | None = None
+        """What is wrong with the database, as far as known; None if it was last read and written."""
 
     async def open(self) -> None:
-        """Tries to reach the database. If that fails, logs an error; later work tries again."""
-        try:
-            await self.read(lambda session: None)
-        except StoreUnavailable:
-            logger.error(
-                "the database cannot be reached: requests that need studies or stored answers return 503 until it "
-                "answers; all other requests work",
-                extra={"database": str(self)},
-            )
+        """Tries to reach the database, and checks it from then on. If a check fails, logs an error once."""
+        await self.check()
+        self._checking = asyncio.create_task(self._check_often())
 
     async def close(self) -> None:
         """Waits for the work in progress, then closes the connections."""
+        if self._checking is not None:
+            self._checking.cancel()
         await asyncio.to_thread(self._threads.shutdown, cancel_futures=True)
         self._engine.dispose()
+
+    async def check(self) -> None:
+        """Brings `fault` up to date, without writing anything."""
+        known = self.fault
+        try:
+            await asyncio.get_running_loop().run_in_executor(self._threads, self._check)
+        except StoreUnavailable as error:
+            if known != error.cause:
+                logger.error(
+                    "the database cannot be used: requests that need studies or stored answers return 503 until it "
+                    "can; all other requests work",
+                    extra={"database": str(self), "cause": error.cause},
+                )
+        else:
+            if known is not None:
+                logger.info("the database can be used again", extra={"database": str(self)})
 
     async def read(self, work: Callable[[Session], T]) -> T:
         """The result of `work` on a session. Raises StoreUnavailable."""
         return await asyncio.get_running_loop().run_in_executor(self._threads, self._do, work, False)
 
-    async def write(self, work: Callable[[Session], T]) -> T:
+    async def write(self, work: Callable[[Session], T], frees: bool = False) -> T:
         """The result of `work`, after its changes are on the disk. If `work` raises, nothing changes.
+
+        `frees`: the work deletes. On a full disk, it gets the space that is held back for deleting.
 
         Raises StoreUnavailable.
         """
-        return await asyncio.get_running_loop().run_in_executor(self._threads, self._do, work, True)
+        do = self._free if frees else self._write
+        return await asyncio.get_running_loop().run_in_executor(self._threads, do, work)
 
     def __str__(self) -> str:
         return self._engine.url.render_as_string(hide_password=True)
 
+    def _write(self, work: Callable[[Session], T]) -> T:
+        try:
+            result = self._do(work, True)
+        except StoreUnavailable as error:
+            if error.cause != "full" or self._file is None:
+                raise
+            # what the log takes of the disk may be all that is missing
+            self._empty_log()
+            result = self._do(work, True)
+        self.fault = None
+        return result
+
+    def _free(self, work: Callable[[Session], T]) -> T:
+        try:
+            return self._write(work)
+        except StoreUnavailable as error:
+            if error.cause != "full" or self._reserve is None or not self._reserve.release():
+                raise
+        result = self._write(work)
+        self._empty_log()
+        assert self._reserve is not None
+        self._reserve.fill()
+        return result
+
+    def _empty_log(self) -> None:
+        """Gives the space of SQLite's log back to the disk, if nobody reads from it."""
+        with contextlib.suppress(*_UNAVAILABLE, sqlite3.Error):
+            connection = self._engine.raw_connection()
+            try:
+                connection.driver_connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # type: ignore[union-attr]
+            finally:
+                connection.close()
+
     def _do(self, work: Callable[[Session], T], writes: bool) -> T:
+        began = self._clock()
+        until, fault = self._paused.get(writes, (began, None))
+        if fault is not None and began < until:
+            raise StoreUnavailable(fault)
         try:
             self._migrate()
             engine = self._engine.execution_options(writes=writes)
-            with Session(engine, expire_on_commit=False) as session, session.begin():
-                return work(session)
+            with Session(engine, expire_on_commit=False) as session:
+                with session.begin():
+                    opened = session.connection().info.get(OPENED, {})
+                    result = work(session)
+                check(opened)  # what was committed to a file that is gone is not stored
+            return result
         except IntegrityError:
             raise  # the work handles it
         except _UNAVAILABLE as error:
-            # without the statement and its parameters: they hold data of the client
-            reason = str(error.orig) if isinstance(error, DBAPIError) else str(error)
-            logger.error("database unavailable", extra={"database": str(self), "reason": reason})
-            raise StoreUnavailable from None
+            raise self._failed(error, writes, began) from None
+
+    def _failed(self, error: Exception, writes: bool, began: float) -> StoreUnavailable:
+        fault = fault_of(error, self._file)
+        # without the statement and its parameters: they hold data of the client
+        reason = str(error.orig) if isinstance(error, DBAPIError) else str(error)
+        # once, not with every check; each request that it fails is in the log of requests
+        level = logging.DEBUG if fault == self.fault else logging.ERROR
+        logger.log(level, "database unavailable", extra={"database": str(self), "cause": fault, "reason": reason})
+        if self._clock() - began > _LONG:
+            self._paused[writes] = self._clock() + _PAUSE, fault
+        if fault == "deleted":
+            # new connections open the file that is there then
+            self._migrated = False
+            self._engine.dispose()
+        self.fault = fault
+        return StoreUnavailable(fault)
+
+    def _check(self) -> None:
+        if not self._do(is_writable, True):
+            self.fault = "read-only"
+            raise StoreUnavailable("read-only")
+        if self._file is not None and self._reserve is not None:
+            self._reserve.fill()
+            free, inside = room(self._file), self._do(room_inside, False)
+            # the log and the file itself both grow
+            if free + min(inside, log_size(self._file)) < LEAST_ROOM:
+                self.fault = "full"
+                raise StoreUnavailable("full")
+        self.fault = None
+
+    async def _check_often(self) -> None:
+        while True:
+            await asyncio.sleep(_CHECK_PERIOD)
+            await self.check()
 
     def _migrate(self) -> None:
-        if self._migrated:
-            return
         with self._migrating:
-            if not self._migrated:
-                migrate(self._engine)
-                self._migrated = True
-                logger.info("database ready", extra={"database": str(self)})
+            if self._migrated:
+                return
+            if self._was_open and self._file is not None and not self._file.exists():
+                # an empty database in place of one that is missing, for example with its volume, would hide the loss
+                raise DatabaseMoved(f"{self._file} is gone")
+            migrate(self._engine)
+            self._migrated = self._was_open = True
+            logger.info("database ready", extra={"database": str(self)})

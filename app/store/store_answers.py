@@ -1,16 +1,24 @@
-"""Stores the answers that a task's result refers to."""
+"""Stores the answers that a task's result refers to, and the result itself."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 
 from sqlalchemy.orm import Session
 
-from app.engine.result import TaskResult
+from app.engine.result import StoredAnswer, TaskResult
+from app.exceptions import StoreUnavailable
 from app.settings import Settings
 from app.store import answers
 from app.store.store import Store
+from app.store.tables import Answer
+
+
+class _TooLarge(Exception):
+    """The answer alone is larger than all that may be stored."""
 
 
 async def store_answers(
@@ -21,13 +29,45 @@ async def store_answers(
     Stores `result.stored`, answers of the endpoint `kind` that belong to `owner`. Deletes answers that are too old or
     too many. Raises StoreUnavailable.
     """
-    if not result.stored:
-        return result
-
-    def put(session: Session) -> None:
-        for answer in result.stored:
-            answers.put(session, kind, answer.body, answer_id=answer.id, owner=owner)
-        answers.prune(session, settings.answers_max_bytes, timedelta(days=settings.answers_max_age))
-
-    await store.write(put)
+    if result.stored:
+        await _put(store, settings, kind, result.stored, owner)
     return replace(result, stored=())
+
+
+async def keep_answer(store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None) -> TaskResult:
+    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without a path of its own."""
+    assert result.kept_as is not None
+    kept = StoredAnswer(result.kept_as, result.document)
+    try:
+        await _put(store, settings, kind, [kept], owner, most=settings.answers_max_bytes)
+    except (StoreUnavailable, _TooLarge):
+        return result.without_path()
+    return replace(result, kept_as=None)
+
+
+async def _put(
+    store: Store,
+    settings: Settings,
+    kind: str,
+    stored: Sequence[StoredAnswer],
+    owner: str | None,
+    most: int | None = None,
+) -> None:
+    """Stores answers, and prunes if it is time. Raises StoreUnavailable, or _TooLarge above `most` bytes."""
+
+    def put(session: Session) -> int:
+        for answer in stored:
+            answers.put(session, kind, answer.body, answer_id=answer.id, owner=owner)
+        session.flush()
+        size = sum(session.get_one(Answer, answer.id).size for answer in stored)
+        if most is not None and size > most:
+            raise _TooLarge
+        return size
+
+    if not store.pruning.due(await store.write(put), settings.answers_max_bytes):
+        return
+    target, age = store.pruning.target(settings.answers_max_bytes), timedelta(days=settings.answers_max_age)
+    try:
+        await store.write(partial(answers.prune, max_bytes=target, max_age=age), frees=True)
+    except StoreUnavailable:
+        store.pruning.failed()  # the answers are stored

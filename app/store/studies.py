@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -19,6 +18,8 @@ from app.store.tables import Iteration, Study, is_id, new_id, now
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
+_LIGHT = defer(Iteration.request, raiseload=True)
+"""Leaves out the request of an iteration."""
 
 
 @dataclass(frozen=True)
@@ -31,19 +32,42 @@ class Step:
     duration: float
     electrical: float
     mechanical: float
+    answer_id: str | None = None
+    """Id under which the answer is to be stored, if it holds one."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An iteration, the one before it, and the best ones up to that and up to itself. Requests are loaded for
+    `iteration` only, and there only by `entry`."""
+
+    study: Study
+    iteration: Iteration
+    before: Iteration | None
+    best_before: Iteration | None
+    best: Iteration
+
+
+@dataclass(frozen=True)
+class State:
+    """A study with its last and its best iteration; both None if it has none. Their requests are not loaded."""
+
+    study: Study
+    last: Iteration | None
+    best: Iteration | None
 
 
 @dataclass(frozen=True)
 class History:
-    """A study and its iterations in order of their numbers. Their requests are loaded for one iteration only."""
+    """A study with its iterations in order of their numbers. Their requests are not loaded."""
 
-    study: Study
+    state: State
     iterations: list[Iteration]
 
-    @property
-    def energies(self) -> list[float]:
-        """Energy of each iteration, of the study's objective [J]."""
-        return [getattr(iteration, self.study.objective) for iteration in self.iterations]
+
+def energy_of(study: Study, iteration: Iteration | Step) -> float:
+    """Energy of an iteration, of the study's objective [J]."""
+    return float(getattr(iteration, study.objective))
 
 
 def create(session: Session, study: Study) -> tuple[Study, bool]:
@@ -66,10 +90,16 @@ def create(session: Session, study: Study) -> tuple[Study, bool]:
 
 def history(session: Session, study_id: str) -> History:
     """A study with all its iterations. Raises UnknownStudy."""
-    return History(_study(session, study_id), _iterations(session, [study_id]))
+    query = select(Iteration).where(Iteration.study_id == study_id).order_by(Iteration.number)
+    return History(state(session, study_id), list(session.scalars(query.options(_LIGHT))))
 
 
-def page(session: Session, limit: int, after: str | None) -> tuple[list[History], str | None]:
+def state(session: Session, study_id: str) -> State:
+    """A study with its last and its best iteration. Raises UnknownStudy."""
+    return _state(session, _study(session, study_id))
+
+
+def page(session: Session, limit: int, after: str | None) -> tuple[list[State], str | None]:
     """Up to `limit` studies, newest first, and the `after` of the next page; None on the last page."""
     query = select(Study).order_by(Study.created.desc(), Study.id.desc()).limit(limit + 1)
     if after is not None:
@@ -78,10 +108,9 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[History]
         query = query.where(or_(Study.created < created, and_(Study.created == created, Study.id < study_id)))
     studies = list(session.scalars(query))
     more, studies = len(studies) > limit, studies[:limit]
-    found = _iterations(session, [study.id for study in studies])
-    histories = [History(study, [entry for entry in found if entry.study_id == study.id]) for study in studies]
     last = studies[-1] if more else None
-    return histories, None if last is None else f"{(last.created - _EPOCH) // _MICROSECOND}_{last.id}"
+    following = None if last is None else f"{(last.created - _EPOCH) // _MICROSECOND}_{last.id}"
+    return [_state(session, study) for study in studies], following
 
 
 def delete(session: Session, study_id: str, client: Client) -> None:
@@ -114,17 +143,20 @@ def add(session: Session, study_id: str, step: Step, key: str | None, client: Cl
     """
     check_owner(client, _study(session, study_id).owner)
     # locks the study (PostgreSQL), so that numbers have no gaps; SQLite has one writer at a time anyway
-    if session.scalar(select(Study.id).where(Study.id == study_id).with_for_update()) is None:
+    study = session.scalar(select(Study).where(Study.id == study_id).with_for_update())
+    if study is None:
         raise UnknownStudy
     known = known_step(session, study_id, step.kind, step.request, key)
     if known is not None:
         return known, True
-    last = session.scalar(
-        select(Iteration.number).where(Iteration.study_id == study_id).order_by(Iteration.number.desc()).limit(1)
-    )
-    answer_id = answers.put(session, step.kind, step.answer, study_id, owner=client.owner)
+    answer_id = answers.put(session, step.kind, step.answer, study_id, step.answer_id, owner=client.owner)
     session.flush()
-    number = (last or 0) + 1
+    so_far, energy = _state(session, study), energy_of(study, step)
+    number = 1 if so_far.last is None else so_far.last.number + 1
+    met_by = number if energy <= study.threshold else None
+    if so_far.last is not None and so_far.last.met_by is not None:
+        met_by = so_far.last.met_by
+    best = so_far.best
     session.add(
         Iteration(
             study_id=study_id,
@@ -136,22 +168,26 @@ def add(session: Session, study_id: str, step: Step, key: str | None, client: Cl
             duration=step.duration,
             electrical=step.electrical,
             mechanical=step.mechanical,
+            best=number if best is None or energy < energy_of(study, best) else best.number,
+            met_by=met_by,
             idempotency_key=key,
         )
     )
     return number, False
 
 
-def up_to(session: Session, study_id: str, number: int) -> History:
-    """A study with its iterations up to `number`; the last one has its request.
+def entry(session: Session, study_id: str, number: int) -> Entry:
+    """An iteration with its request, and those that it is compared with.
 
     Raises UnknownStudy or UnknownIteration.
     """
     study = _study(session, study_id)
-    last = session.get(Iteration, (study_id, number))
-    if last is None:
+    iteration = session.get(Iteration, (study_id, number))
+    if iteration is None:
         raise UnknownIteration
-    return History(study, [entry for entry in _iterations(session, [study_id]) if entry.number <= number])
+    before = _iteration(session, study_id, number - 1) if number > 1 else None
+    best_before = None if before is None else _iteration(session, study_id, before.best)
+    return Entry(study, iteration, before, best_before, _iteration(session, study_id, iteration.best))
 
 
 def new_study(name: str, robot: str, objective: str, threshold: float, key: str | None, owner: str | None) -> Study:
@@ -175,6 +211,11 @@ def _study(session: Session, study_id: str) -> Study:
     return study
 
 
-def _iterations(session: Session, study_ids: Sequence[str]) -> list[Iteration]:
-    query = select(Iteration).where(Iteration.study_id.in_(study_ids)).order_by(Iteration.study_id, Iteration.number)
-    return list(session.scalars(query.options(defer(Iteration.request, raiseload=True))))
+def _state(session: Session, study: Study) -> State:
+    query = select(Iteration).where(Iteration.study_id == study.id).order_by(Iteration.number.desc()).limit(1)
+    last = session.scalar(query.options(_LIGHT))
+    return State(study, last, None if last is None else _iteration(session, study.id, last.best))
+
+
+def _iteration(session: Session, study_id: str, number: int) -> Iteration:
+    return session.get_one(Iteration, (study_id, number), options=[_LIGHT])

@@ -120,4 +120,8 @@ class Iteration(Table):
     duration: Mapped[float]
     electrical: Mapped[float]
     mechanical: Mapped[float]
+    best: Mapped[int]
+    """Number of the iteration of least energy up to this one, the first of equals."""
+    met_by: Mapped[int | None]
+    """Number of the first iteration up to this one with an energy of at most the threshold."""
     idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH))

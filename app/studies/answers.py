@@ -8,9 +8,9 @@ from io import StringIO
 from typing import Any
 
 from app.schemas import studies as schemas
-from app.store.studies import History
-from app.store.tables import Iteration
-from app.studies.progress import best_of, first_met, progress
+from app.store.studies import Entry, History, State, energy_of
+from app.store.tables import Iteration, Study
+from app.studies.progress import progress, step
 
 _COLUMNS = {
     "number": "iteration",
@@ -28,41 +28,52 @@ _COLUMNS = {
 _OF_STUDY = ("id", "name", "robot", "objective", "threshold", "created", "owner")
 
 
-def summary(history: History) -> dict[str, Any]:
+def summary(state: State) -> dict[str, Any]:
     """Fields of a StudySummary."""
-    study, energies = history.study, history.energies
-    met = first_met(energies, study.threshold)
+    study, last = state.study, state.last
+    met_by = None if last is None else last.met_by
     return {
         **{name: getattr(study, name) for name in _OF_STUDY},
-        "iterations": len(energies),
-        "last": _reached(history, len(energies) - 1 if energies else None),
-        "best": _reached(history, best_of(energies)),
-        "threshold_met": met is not None,
-        "threshold_met_by": None if met is None else history.iterations[met].number,
+        "iterations": 0 if last is None else last.number,
+        "last": None if last is None else _reached(study, last),
+        "best": None if state.best is None else _reached(study, state.best),
+        "threshold_met": met_by is not None,
+        "threshold_met_by": met_by,
     }
 
 
 def full(history: History) -> dict[str, Any]:
     """Fields of a Study."""
-    return {**summary(history), "history": entries(history)}
+    return {**summary(history.state), "history": entries(history)}
 
 
 def entries(history: History) -> list[dict[str, Any]]:
     """Fields of an Iteration, for each."""
-    steps = progress(history.energies, history.study.threshold)
+    study = history.state.study
+    energies = [energy_of(study, iteration) for iteration in history.iterations]
     return [
-        {**_columns_of(iteration), "energy": energy, **asdict(step)}
-        for iteration, energy, step in zip(history.iterations, history.energies, steps, strict=True)
+        {**_columns_of(iteration), "energy": energy, **asdict(made)}
+        for iteration, energy, made in zip(
+            history.iterations, energies, progress(energies, study.threshold), strict=True
+        )
     ]
 
 
-def detail(history: History) -> schemas.IterationDetail:
-    """The last iteration of a history. That iteration must have its request loaded."""
-    last, so_far = history.iterations[-1], summary(history)
+def detail(entry: Entry) -> schemas.IterationDetail:
+    """One iteration, and the state of its study after it."""
+    study, iteration = entry.study, entry.iteration
+    energy, last, best = (
+        None if each is None else energy_of(study, each) for each in (iteration, entry.before, entry.best_before)
+    )
+    assert energy is not None
     return schemas.IterationDetail(
-        **entries(history)[-1],
-        request={last.kind: last.request},
-        **{name: so_far[name] for name in ("best", "threshold", "threshold_met_by")},
+        **_columns_of(iteration),
+        energy=energy,
+        **asdict(step(energy, last, best, study.threshold)),
+        request={iteration.kind: iteration.request},
+        best=_reached(study, entry.best),
+        threshold=study.threshold,
+        threshold_met_by=iteration.met_by,
     )
 
 
@@ -85,7 +96,5 @@ def _columns_of(iteration: Iteration) -> dict[str, Any]:
     return {name: getattr(iteration, name) for name in names} | {"answer": iteration.answer_id}
 
 
-def _reached(history: History, index: int | None) -> schemas.IterationEnergy | None:
-    if index is None:
-        return None
-    return schemas.IterationEnergy(number=history.iterations[index].number, energy=history.energies[index])
+def _reached(study: Study, iteration: Iteration) -> schemas.IterationEnergy:
+    return schemas.IterationEnergy(number=iteration.number, energy=energy_of(study, iteration))

@@ -15,26 +15,19 @@ class Progress:
     threshold_met: bool
 
 
+def step(energy: float, last: float | None, best: float | None, threshold: float) -> Progress:
+    """The progress of one step of `energy` [J], from the previous energy and the least of all before; None: no step."""
+    return Progress(
+        change_from_last=None if last is None else energy - last,
+        change_from_best=None if best is None else energy - best,
+        threshold_met=energy <= threshold,
+    )
+
+
 def progress(energies: Sequence[float], threshold: float) -> list[Progress]:
     """The progress of each step, from the energies [J] of all steps."""
-    steps, best = [], None
-    for k, energy in enumerate(energies):
-        steps.append(
-            Progress(
-                change_from_last=energy - energies[k - 1] if k else None,
-                change_from_best=None if best is None else energy - best,
-                threshold_met=energy <= threshold,
-            )
-        )
-        best = energy if best is None else min(best, energy)
+    steps, last, best = [], None, None
+    for energy in energies:
+        steps.append(step(energy, last, best, threshold))
+        last, best = energy, energy if best is None else min(best, energy)
     return steps
-
-
-def best_of(energies: Sequence[float]) -> int | None:
-    """Index of the least energy, the first of equals; None for an empty sequence."""
-    return min(range(len(energies)), key=energies.__getitem__, default=None)
-
-
-def first_met(energies: Sequence[float], threshold: float) -> int | None:
-    """Index of the first energy of at most `threshold` [J]; None if there is none."""
-    return next((k for k, energy in enumerate(energies) if energy <= threshold), None)

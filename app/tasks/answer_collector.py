@@ -19,8 +19,14 @@ class AnswerCollector:
         self._answers: list[StoredAnswer] = []
 
     def add(self, content: dict[str, Any]) -> str:
-        """Adds an answer and returns its path. Raises InvalidRequest above MOST_BYTES."""
-        answer = StoredAnswer(str(uuid.uuid4()), json_document(content))
+        """Adds an answer and returns its path, which also goes into its field `answer` if it has one.
+
+        Raises InvalidRequest above MOST_BYTES.
+        """
+        answer_id = str(uuid.uuid4())
+        path = StoredAnswer(answer_id, b"").path
+        own = {"answer": path} if "answer" in content else {}
+        answer = StoredAnswer(answer_id, json_document({**content, **own}))
         self._answers.append(answer)
         if sum(len(each.body) for each in self._answers) > MOST_BYTES:
             message = "The answers are too large together: use a longer `sample_period`, or ask for fewer"

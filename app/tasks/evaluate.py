@@ -12,12 +12,15 @@ from pydantic import ValidationError
 
 from app.convert.arm import to_arm
 from app.convert.evaluation import to_csv_motion, to_csv_table, to_evaluate_response, to_motion
+from app.convert.fields import location
+from app.convert.json_text import parsed_json
 from app.convert.motion_csv import MotionCsv
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.problem_details import invalid_request
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from optimizer.deadline import Deadline
+from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
 from optimizer.replay.evaluate import Evaluation, evaluate
 
 M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
@@ -43,17 +46,23 @@ class EvaluateTask:
 
     def _evaluate_csv(self, end: Deadline) -> tuple[str, Evaluation]:
         settings = csv_settings(self.query)
-        arm = to_arm(settings)
-        with Path(self.file).open("rb") as file:
-            table = MotionCsv.of(file, arm.robot.nq, settings.units)
-            result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, end.left)
+        try:
+            arm = to_arm(settings)
+            with Path(self.file).open("rb") as file:
+                table = MotionCsv.of(file, arm.robot.nq, settings.units)
+                result = evaluate(arm, to_csv_motion(settings, table), settings.sample_period, end.left)
+        except InvalidProblem as error:
+            if isinstance(error, InvalidTable | OutsideLimits):
+                raise  # about the motion
+            raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
         return settings.robot, result
 
     def _evaluate_json(self, end: Deadline) -> tuple[str, Evaluation]:
         if self.query:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         body = Path(self.file).read_bytes()
-        request = _validated(lambda: EvaluateRequest.model_validate_json(body), "body")
+        content = parsed_json(body)
+        request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
         return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
 
 

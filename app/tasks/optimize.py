@@ -22,4 +22,4 @@ class OptimizeTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
         solution = certified(optimize(to_problem(self.request, deadline)))
-        return TaskResult.of_json(to_optimize_response(self.request, self.request_id, solution))
+        return TaskResult.of_kept_json(to_optimize_response(self.request, self.request_id, solution))

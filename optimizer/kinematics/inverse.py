@@ -33,6 +33,8 @@ from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
 from optimizer.problem.branches import BranchLabel
 
 # greatest error [m, rad] of the forward kinematics of a solution against the pose
+_LIKE_MILLIMETRES = 20.0
+"""Distance [m] out of reach beyond which a position was hardly meant in metres."""
 ACCURACY = 1e-9
 # members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
 # least so many
@@ -265,11 +267,12 @@ class ClosedFormInverseKinematics:
             )
         if distance <= ROUNDING:
             return SingularPose(target, 0.0)
+        hint = "give it in metres, not millimetres, or " if distance > _LIKE_MILLIMETRES else ""
         return UnreachablePose(
             target,
             distance,
-            f"The {target} pose is {distance:.4g} m out of reach in this orientation: move the position closer to the "
-            "robot's workspace, or change the orientation.",
+            f"The {target} pose is {distance:.4g} m out of reach in this orientation: {hint}move the position closer "
+            "to the robot's workspace, or change the orientation.",
         )
 
 

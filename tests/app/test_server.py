@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import httpx2
 import pytest
 
-from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, ShuttingDown
+from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, MalformedHttp, ShuttingDown
 from app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, EXIT, WARM_UP, Server, alive, processor_time, serving
 from tests.app.requests import EXAMPLES, long_search, move
@@ -164,11 +164,26 @@ def test_logs_one_line_per_request(server: Server) -> None:
     assert entry["duration"] > 0
 
 
-def test_survives_garbage_on_the_socket(server: Server) -> None:
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        b"\x16\x03\x01 hello\r\n\r\n",
+        b"GET /healthz\r\n\r\n",
+        b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: two\r\n\r\n",
+        b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{}",
+        b"GET /healthz HTTP/1.1\r\nHo st: x\r\n\r\n",
+    ],
+)
+def test_garbage_on_the_socket_is_answered_with_a_problem(server: Server, garbage: bytes) -> None:
     host, port = server.url.removeprefix("http://").split(":")
     with socket.create_connection((host, int(port)), timeout=PATIENCE) as connection:
-        connection.sendall(b"\x16\x03\x01 hello\r\n\r\n")
-        assert b"400" in connection.recv(1000)
+        connection.sendall(garbage)
+        answer = b""
+        while piece := connection.recv(4096):
+            answer += piece
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 400") and b"application/problem+json" in head
+    MalformedHttp.model_validate_json(body)
     assert server.get("/healthz").status_code == 200
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 from app.schemas.common import Response, described, part
 from app.schemas.errors.problem_details import ProblemDetails, fixed
 from app.schemas.examples.values import HOME, LABEL
-from app.schemas.response import BODIES, Candidate, UnreachableTarget
+from app.schemas.response import BODIES, Candidate, CandidateCounts, UnreachableTarget
 
 
 class UnknownRobot(ProblemDetails):
@@ -235,7 +235,10 @@ class TorqueInfeasible(ProblemDetails):
 
 
 class _SearchError(ProblemDetails):
-    candidates: list[Candidate] = part("Every candidate, with its status and its reason.")
+    candidates: list[Candidate] = part(
+        "Candidates with their status and their reason: those that failed first, at most 64."
+    )
+    candidate_counts: CandidateCounts = part("Number of all candidates by status.")
 
 
 class NoTrajectory(_SearchError):

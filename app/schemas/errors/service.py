@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
+from app.exceptions import StoreFault
 from app.schemas.common import Response, described, part
 from app.schemas.errors.problem_details import ProblemDetails, fixed
 
@@ -55,14 +56,21 @@ class ShuttingDown(ProblemDetails):
 
 
 class StoreUnavailable(ProblemDetails):
-    """The database of studies and answers cannot be reached, read or written; the service's log has the cause. Requests
-    that need no database, for example `POST /optimize`, still work. Try again after the time [s] in the header
+    """The database of studies and answers cannot be reached, read or written; `cause` says why, and the service's log
+    has more. Nothing of the request was stored. Requests that need no database, for example `POST /optimize`, still
+    work. On a full disk, `DELETE` works, so that space can be freed. Try again after the time [s] in the header
     `Retry-After`."""
 
     retry_after: ClassVar[int | None] = 5
     type: Literal["/problems/store-unavailable"] = fixed("type", "/problems/store-unavailable")
     title: Literal["Database unavailable"] = fixed("title", "Database unavailable")
     status: Literal[503] = fixed("status", 503)
+    cause: StoreFault = described(
+        "`full`: no space is left. `read-only`: it takes no changes. `locked`: another process locks it. `deleted`: "
+        "its file was deleted or replaced while the service ran. `unreachable`: it does not answer, or cannot be read.",
+        None,
+        "full",
+    )
 
 
 class UnknownAnswer(ProblemDetails):
@@ -205,11 +213,41 @@ class BodyTooLarge(ProblemDetails):
 
 
 class UnsupportedMediaType(ProblemDetails):
-    """This path accepts JSON or CSV only. Set the header `Content-Type` to `application/json` or `text/csv`."""
+    """The header `Content-Type` declares a body that this path does not take. JSON is `application/json`; the CSV of
+    `POST /evaluate` is `text/csv`. `text/plain`, a form, and no header at all are read as JSON, too. The body is the
+    document itself: `curl --data-binary @file`, not `curl -F file=@file`."""
 
     type: Literal["/problems/unsupported-media-type"] = fixed("type", "/problems/unsupported-media-type")
     title: Literal["Unsupported media type"] = fixed("title", "Unsupported media type")
     status: Literal[415] = fixed("status", 415)
+
+
+class UnsupportedCoding(ProblemDetails):
+    """The header `Content-Encoding` names a coding that the service cannot unpack, or several at once. Pack the body
+    with `gzip` or `deflate`, or send it as it is, without this header."""
+
+    type: Literal["/problems/unsupported-coding"] = fixed("type", "/problems/unsupported-coding")
+    title: Literal["Unsupported content coding"] = fixed("title", "Unsupported content coding")
+    status: Literal[415] = fixed("status", 415)
+
+
+class MalformedHttp(ProblemDetails):
+    """What arrived at the port is no HTTP/1.1 request, or contradicts itself: a TLS handshake, a request line or header
+    with other characters, two lengths of the body, or a chunk without a length. The service closes the connection.
+    Speak HTTP to this port, or HTTPS to the proxy before it."""
+
+    type: Literal["/problems/malformed-http"] = fixed("type", "/problems/malformed-http")
+    title: Literal["Malformed HTTP"] = fixed("title", "Malformed HTTP")
+    status: Literal[400] = fixed("status", 400)
+
+
+class NotAcceptable(ProblemDetails):
+    """The header `Accept-Encoding` allows no coding in which the service could answer: it has `zstd`, `gzip` and
+    `identity`, which is no coding. Allow one of them, or leave the header out. Nothing was computed."""
+
+    type: Literal["/problems/not-acceptable"] = fixed("type", "/problems/not-acceptable")
+    title: Literal["No acceptable coding"] = fixed("title", "No acceptable coding")
+    status: Literal[406] = fixed("status", 406)
 
 
 class Internal(ProblemDetails):

@@ -53,7 +53,7 @@ def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None
         (request(limits={"velocity": 1e300}), ["body", "limits", "velocity"]),
         (request(limits={"velocity": -1.0}), ["body", "limits", "velocity"]),
         (request(deadline=1e9), ["body", "deadline"]),
-        (request(colour="red"), ["body"]),
+        (request(colour="red"), ["body", "colour"]),
     ],
 )
 def test_an_invalid_request_is_a_validation_problem(here: Here, body: str | bytes, loc: list[str | int]) -> None:

@@ -47,7 +47,8 @@ ERRORS: list[JoulepathError] = [
 SERVICE_ERRORS: list[ServiceError] = [
     service.InvalidRequest([{"loc": ["body", "start"], "msg": "Field required"}]),
     *(kind() for kind in (service.Busy, service.NotReady, service.ShuttingDown, service.WorkerDied)),
-    *(kind() for kind in (service.TaskFailed, service.StoreUnavailable, service.UnknownAnswer, service.EmptyStudy)),
+    *(kind() for kind in (service.TaskFailed, service.UnknownAnswer, service.EmptyStudy)),
+    *(service.StoreUnavailable(cause) for cause in service.StoreUnavailable.MESSAGES),
     *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
     *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
     *(kind() for kind in (service.RobotExists, service.TooManyRobots, service.AnswerInUse)),
@@ -55,6 +56,7 @@ SERVICE_ERRORS: list[ServiceError] = [
     service.RoleTooLow("read", "compute"),
     service.NotOwner("press_shop"),
     service.NotOwner(None),
+    *(kind() for kind in (service.UnsupportedCoding, service.NotAcceptable, service.MalformedHttp)),
 ]
 
 

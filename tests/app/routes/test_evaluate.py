@@ -212,7 +212,7 @@ def test_refuses_settings_of_a_csv(content: str, query: dict[str, str], client: 
         {"trajectory": {"t": [0.0, 1.0], "q": [HOME, NEAR], "v": [HOME]}},
         {"trajectory": {"t": [0.0, 1.0], "q": [HOME, NEAR], "v": [HOME, HOME[:5]]}},
         {"trajectory": {"t": [0.0, 1.0], "q": [HOME, NEAR]}, "time_per_segment": 1.0},
-        {"secret": 1},
+        {"a secret": 1},
     ],
 )
 def test_refuses_json(body: dict[str, Any], client: TestClient) -> None:

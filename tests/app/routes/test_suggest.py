@@ -233,7 +233,7 @@ def test_an_empty_study_has_no_next_step(client: TestClient) -> None:
     problems.EmptyStudy.model_validate_json(answer.content)
 
 
-@pytest.mark.parametrize("query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"{SECRET}=1"])
+@pytest.mark.parametrize("query", ["base=worst", "deadline=0", "deadline=nan", "deadline=599", f"a%20{SECRET}=1"])
 def test_a_malformed_query_is_refused(client: TestClient, query: str) -> None:
     answer = client.get(f"/studies/{ABSENT}/suggest?{query}")
     assert problems.Validation.model_validate_json(answer.content).errors

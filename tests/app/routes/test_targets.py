@@ -18,7 +18,7 @@ FAR = {"pose": {"position": [2.0, 0.0, 0.3], "rpy": [0.0, 0.0, 0.0]}}
 
 def test_says_which_target_it_took(client: TestClient) -> None:
     goal = {"any_of": [FAR, {"pose": POSE}, {"q": NEAR}]}
-    answer = client.post("/optimize", json=move(goal=goal))
+    answer = client.post("/optimize", json=move(goal=goal, candidates="all"))
     assert answer.status_code == 200, answer.text
     OptimizeResponse.model_validate_json(answer.content)
     content = answer.json()
@@ -113,7 +113,7 @@ def test_other_endpoints_want_the_whole_pose(client: TestClient) -> None:
             ["body", "goal", "pose", "orientation", "free_about"],
         ),
         ({"any_of": [{"q": NEAR}], "q": NEAR}, ["body", "goal"]),
-        ({"any_of": [{"q": NEAR}], "all_of": []}, ["body", "goal"]),
+        ({"any_of": [{"q": NEAR}], "all_of": []}, ["body", "goal", "all_of"]),
     ],
 )
 def test_names_what_is_wrong(client: TestClient, goal: dict[str, Any], loc: list[str | int]) -> None:

@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.errors import Validation
+from app.schemas.errors import UnsupportedMediaType, Validation
 from tests.app.requests import HOME, move
 
 SECRET = "caller-secret-7f3a"
+BALL = {"name": "ball", "shape": "sphere", "radius": 0.1, "pose": {"position": [5, 5, 5], "rpy": [0, 0, 0]}}
 POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
 
 
@@ -89,16 +90,17 @@ def test_names_the_field(client: TestClient, body: dict[str, Any], loc: list[str
 @pytest.mark.parametrize(
     "body",
     [
-        move(**{SECRET: 1}),
-        move(start={"q": HOME, SECRET: 1}),
-        move(tcp={"position": [0, 0, 0], "rpy": [0, 0, 0], SECRET: 1}),
-        move(limits={"position": {SECRET: 1}}),
+        move(**{f"{SECRET}!": 1}),
+        move(start={"q": HOME, f"my {SECRET}": 1}),
+        move(tcp={"position": [0, 0, 0], "rpy": [0, 0, 0], f"{SECRET}\n": 1}),
+        move(limits={"position": {f"{SECRET}{'x' * 50}": 1}}),
         move(method=SECRET),
         move(friction=SECRET),
         move(branch={"elbow": SECRET}),
         move(duration=SECRET),
         move(start=SECRET),
         f'{{"start": {SECRET}',
+        f'{{"a {SECRET}": 1, "a {SECRET}": 2}}',
         f'"{SECRET}"',
     ],
 )
@@ -127,11 +129,13 @@ def test_survives_what_is_no_request(client: TestClient, body: bytes, path: str)
     refused(client, body, path)
 
 
-@pytest.mark.parametrize("content_type", ["text/plain", "application/xml", ""])
-def test_takes_json_only(client: TestClient, content_type: str) -> None:
-    answer = client.post("/optimize", content=json.dumps(move()), headers={"content-type": content_type})
-    assert answer.status_code == 422
-    Validation.model_validate_json(answer.content)
+@pytest.mark.parametrize("content_type", ["application/xml", "multipart/form-data; boundary=x", "text/csv", "x"])
+@pytest.mark.parametrize("path", ["/optimize", "/studies", "/robots", "/cycle", "/evaluate"])
+def test_what_is_declared_as_something_else_is_told_so(client: TestClient, content_type: str, path: str) -> None:
+    if (path, content_type) != ("/evaluate", "text/csv"):
+        answer = client.post(path, content=json.dumps(move()), headers={"content-type": content_type})
+        assert answer.status_code == 415
+        UnsupportedMediaType.model_validate_json(answer.content)
 
 
 def test_names_only_the_first_of_many_errors(client: TestClient) -> None:
@@ -139,7 +143,96 @@ def test_names_only_the_first_of_many_errors(client: TestClient) -> None:
     assert len(refused(client, move(limits=limits))) == 20
 
 
-def test_an_unknown_field_is_told_what_is_known(client: TestClient) -> None:
-    (error,) = refused(client, move(goall={}))
+@pytest.mark.parametrize(
+    ("body", "loc", "meant"),
+    [
+        (move(goall={}), ["goall"], "goal"),
+        (move(Duration=2), ["Duration"], "duration"),
+        (move(samplePeriod=0.1), ["samplePeriod"], "sample_period"),
+        (move(limits={"velocties": 1}), ["limits", "velocties"], "velocity"),
+        (move(goal={"pose": POSE | {"quaternions": [0, 1, 0, 0]}}), ["goal", "pose", "quaternions"], "quaternion"),
+        (move(goal={"pos": POSE}), ["goal", "pos"], "pose"),
+        (move(payload={"mas": 1, "com": [0, 0, 0]}), ["payload", "mas"], "mass"),
+        (
+            move(scene={"obstacles": [BALL, {**BALL, "name": "b", "radiuss": 1}]}),
+            ["scene", "obstacles", 1, "radiuss"],
+            "radius",
+        ),
+    ],
+)
+def test_an_unknown_field_is_named_with_the_nearest_known_one(
+    client: TestClient, body: dict[str, Any], loc: list[str | int], meant: str
+) -> None:
+    error = refused(client, body)[0]
+    assert error["loc"] == ["body", *loc]
+    assert f"`{loc[-1]}`" in error["msg"] and f"did you mean `{meant}`?" in error["msg"]
+
+
+def test_every_unknown_field_is_named(client: TestClient) -> None:
+    errors = refused(client, move(colour="red", veloicty=2))
+    assert [error["loc"] for error in errors] == [["body", "colour"], ["body", "veloicty"]]
+
+
+@pytest.mark.parametrize(
+    ("change", "loc"),
+    [
+        ({"shape": "ball"}, []),
+        ({"radius": 0}, ["radius"]),
+        ({"margin": "far"}, ["margin"]),
+        ({"name": "forearm"}, ["name"]),
+        ({"shape": "mesh", "vertices": [[0, 0, 0]] * 4}, ["vertices"]),
+        ({"shape": "mesh_file", "format": "stl", "data": "AAAA"}, ["data"]),
+        ({"shape": "voxels", "size": 0.1}, ["cells"]),
+    ],
+)
+def test_a_shape_is_named_by_the_index_of_its_obstacle(
+    client: TestClient, change: dict[str, Any], loc: list[str]
+) -> None:
+    wrong = {**BALL, "name": "second", **change}
+    if change.get("shape") in ("mesh", "mesh_file", "voxels"):
+        del wrong["radius"]
+    errors = refused(client, move(scene={"obstacles": [BALL, wrong]}))
+    assert ["body", "scene", "obstacles", 1, *loc] in [error["loc"] for error in errors], errors
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (b"", "empty"),
+        (b'{"start": 1,\n "goal": 2,\n}', "line 3, column 1: delete the comma"),
+        (b"{\n  'start': 1}", "line 2, column 3"),
+        (b'{"start": {"q": [0,5, 1], "goal": 3}', "ends too soon"),
+        (b'{"robot": None}', "line 1, column"),
+        (b'{"windings": True}', "true, false or null in small letters"),
+        (b'{"windings": true} // done', "line 1, column 20: nothing may follow"),
+        (b'{"duration": 1,5}', "line 1, column 16"),
+        (b'{"duration": 01}', "leading zeros"),
+        (b'{"duration" 1}', "a colon is expected"),
+        ('{"robot": "ur5e"}'.encode("utf-16"), "UTF-16"),
+        (b'{"start": {"q": 1, "q": 2}}', "`q` is given twice in one object at line 1, column 24"),
+        (b'{"robot": "ur5e",\n "goal": 1, "robot": "ur3e"}', "`robot` is given twice in one object at line 2"),
+    ],
+)
+@pytest.mark.parametrize("path", ["/optimize", "/evaluate", "/studies"])
+def test_where_json_is_wrong(client: TestClient, body: bytes, said: str, path: str) -> None:
+    (error,) = refused(client, body, path)
     assert error["loc"] == ["body"]
-    assert "goal" in error["msg"]
+    assert said in error["msg"]
+
+
+def test_a_byte_order_mark_is_no_error(client: TestClient) -> None:
+    assert client.post("/ik", content=b"\xef\xbb\xbf" + json.dumps({"pose": POSE}).encode()).status_code == 200
+
+
+@pytest.mark.parametrize("deadline", [1e6, 599])
+def test_a_deadline_in_a_query_is_named_there(client: TestClient, deadline: float) -> None:
+    study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
+    problem = client.get(f"{study}/suggest", params={"deadline": deadline}).json()
+    assert [error["loc"] for error in problem["errors"]] == [["query", "deadline"]]
+
+
+def test_fields_of_an_iteration_have_its_path(client: TestClient) -> None:
+    study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
+    for wrong, loc in (({"deadline": 599.0}, "deadline"), ({"friction": "butter"}, "friction")):
+        errors = refused(client, {"optimize": move(**wrong)}, f"{study}/iterations")
+        assert [error["loc"] for error in errors] == [["body", "optimize", loc]]

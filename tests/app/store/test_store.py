@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import httpx2
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
@@ -29,7 +32,7 @@ from app.store.store import Store
 from app.store.store_answers import store_answers
 from app.store.tables import Answer, Table, new_id, now
 from tests.app.databases import Postgres, postgres, why_no_postgres
-from tests.app.live import ROOT, serving
+from tests.app.live import ROOT, WARM_UP, Server, serving
 from tests.app.requests import move
 
 MISSING = why_no_postgres()
@@ -66,6 +69,22 @@ def with_store(url: str, test: Callable[[Store], Awaitable[None]]) -> None:
             await store.close()
 
     asyncio.run(run())
+
+
+def until_refused(server: Server, cause: str | None) -> None:
+    """Until `/readyz` names this cause; None: until it is ready."""
+    end = time.monotonic() + WARM_UP
+    while True:
+        assert time.monotonic() < end, f"/readyz never says {cause}"
+        with contextlib.suppress(httpx2.TransportError):
+            answer = server.get("/readyz")
+            if answer.status_code == 200 and cause is None:
+                return
+            if answer.json()["type"] == "/problems/store-unavailable":
+                problems.StoreUnavailable.model_validate_json(answer.content)
+                if answer.json()["cause"] == cause:
+                    return
+        time.sleep(0.05)
 
 
 def tables(url: str) -> list[Any]:
@@ -200,14 +219,16 @@ def test_unknown_answer(client: TestClient, id: str) -> None:
     ],
 )
 def test_without_its_database_the_service_goes_on(url: str) -> None:
-    with serving(workers=1, database_url=url) as server:
+    with serving(warm=False, workers=1, database_url=url) as server:
+        until_refused(server, "unreachable")
+        assert server.get("/healthz").status_code == 200
         assert server.post("/optimize", move()).status_code == 200
         answer = server.get("/answers/none")
         assert answer.status_code == 503
         problems.StoreUnavailable.model_validate_json(answer.content)
         assert int(answer.headers["retry-after"]) > 0
         errors = [entry for entry in server.logged() if entry["level"] == "error"]
-        assert any("studies" in entry["message"] for entry in errors)
+        assert sum("studies" in entry["message"] for entry in errors) == 1, "said once, not with every check"
         assert all(entry["reason"] for entry in errors if entry["message"] == "database unavailable")
         assert "secret-word" not in str(server.logged())
         assert server.terminate() == 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.studies.progress import Progress, best_of, first_met, progress
+from app.studies.progress import Progress, progress
 
 ENERGIES = [100.0, 80.0, 90.0, 60.0, 60.0]
 THRESHOLD = 80.0
@@ -22,13 +22,5 @@ def test_a_change_from_the_best_is_from_the_best_before() -> None:
     assert [step.change_from_best for step in progress([50.0, 70.0, 65.0], 1.0)] == [None, 20.0, 15.0]
 
 
-def test_the_first_of_several_is_the_best_and_the_threshold_counts_as_met() -> None:
-    assert best_of(ENERGIES) == 3
-    assert first_met(ENERGIES, THRESHOLD) == 1
-    assert first_met(ENERGIES, 59.9) is None
-
-
 def test_nothing_yet() -> None:
     assert progress([], 1.0) == []
-    assert best_of([]) is None
-    assert first_met([], 1.0) is None

@@ -1,0 +1,62 @@
+"""Reads JSON that a client sent: errors say line and column, and no name may be given twice in one object."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import jiter
+
+from app.exceptions import InvalidRequest
+
+_PLACE = re.compile(r"(?s)(.*) at line (\d+) column (\d+)")
+_REPEATED = re.compile(r'(?s)Detected duplicate key "(.*)"')
+PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,39}")
+"""A name that an answer may repeat: nothing but letters, digits, `_` and `-`."""
+_VALUE = (
+    "a value is expected here: a number, a text in double quotes, or true, false or null in small letters. JSON has no "
+    "comments"
+)
+_REMEDIES = {
+    "trailing comma": "delete the comma before the closing bracket",
+    "key must be a string": "a field's name in double quotes is expected here. Numbers have a decimal point, no comma",
+    "expected value": _VALUE,
+    "expected ident": _VALUE,
+    "expected `:`": "a colon is expected after a field's name",
+    "trailing characters": "nothing may follow the JSON document",
+    "invalid number": "write the number without leading zeros, and with digits on both sides of the decimal point",
+    "number out of range": "the number has too many digits",
+    "recursion limit exceeded": "it is nested too deep",
+    "control character": "write line breaks and tabs in a text as \\n and \\t",
+    "EOF while parsing": "it ends too soon: a quote or a closing bracket is missing",
+    "expected `,`": "a comma or a closing bracket is expected here",
+}
+EMPTY = "The body is empty: send a JSON object"
+_OTHER = "this is not allowed in JSON"
+
+
+def parsed_json(body: bytes) -> Any:
+    """The value of a JSON text in UTF-8. Raises InvalidRequest."""
+    if not body.strip():
+        raise _refused(EMPTY)
+    if body.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise _refused("The body is UTF-16: encode it in UTF-8")
+    try:
+        return jiter.from_json(body.removeprefix(b"\xef\xbb\xbf"), catch_duplicate_keys=True)
+    except ValueError as error:
+        raise _refused(_message(str(error))) from None
+
+
+def _message(said: str) -> str:
+    found = _PLACE.fullmatch(said)
+    what, place = (said, "") if found is None else (found[1], f" at line {found[2]}, column {found[3]}")
+    repeated = _REPEATED.fullmatch(what)
+    if repeated is not None:
+        name = f" `{repeated[1]}`" if PLAIN_NAME.fullmatch(repeated[1]) else ""
+        return f"The field{name} is given twice in one object{place}: give it once"
+    remedy = next((remedy for start, remedy in _REMEDIES.items() if what.startswith(start)), _OTHER)
+    return f"The body is no JSON{place}: {remedy}"
+
+
+def _refused(message: str) -> InvalidRequest:
+    return InvalidRequest([{"loc": ["body"], "msg": message}])

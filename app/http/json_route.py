@@ -1,0 +1,35 @@
+"""Routes whose JSON bodies are read strictly: no name twice, and errors that say line and column."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from app.convert.json_text import parsed_json
+from app.exceptions import InvalidRequest
+from app.http.refused_body import RefusedBody
+
+
+class _JsonRequest(Request):
+    async def json(self) -> Any:
+        """The body. Raises RefusedBody."""
+        try:
+            return parsed_json(await self.body())
+        except InvalidRequest as error:
+            raise RefusedBody(error) from None
+
+
+class JsonRoute(APIRoute):
+    """The class of every route that takes JSON: `APIRouter(route_class=JsonRoute)`."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """FastAPI's handler, for a request that reads JSON strictly."""
+        handler = super().get_route_handler()
+
+        async def strict(request: Request) -> Response:
+            return await handler(_JsonRequest(request.scope, request.receive))
+
+        return strict

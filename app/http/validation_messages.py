@@ -1,0 +1,100 @@
+"""What a client is told of an error of pydantic: where it is, and what to do.
+
+A location keeps only names that the contract knows, or that are plain; pydantic's `input` is left out. Both may repeat
+what the client sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from app.convert.json_text import EMPTY, PLAIN_NAME
+from app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD
+from app.schemas.common import Request as RequestModel
+from app.schemas.own_arm import NAME_PATTERN
+from app.schemas.scene import BASE64
+from app.schemas.studies import PAGE_PATTERN
+
+_OBJECT = "Give a JSON object: names and values in braces"
+_MESSAGES = {
+    "missing": "This field is required: add it",
+    "dict_type": _OBJECT,
+    "model_type": _OBJECT,
+    "model_attributes_type": _OBJECT,
+    "list_type": "Give a list, in square brackets",
+    "finite_number": "Give a finite number: neither NaN nor infinity",
+    "float_type": "Give a number, without quotes",
+    "int_type": "Give a whole number, without quotes",
+    "bool_type": "Give true or false, without quotes",
+    "string_type": "Give a text, in double quotes",
+    "int_parsing": "Give a whole number",
+    "float_parsing": "Give a number",
+}
+"""In place of pydantic's messages, which name Python's types."""
+_PATTERNS = {
+    BASE64: "Give base64 in the standard alphabet, without line breaks and blanks",
+    NO_CONTROLS: "Leave out line breaks, tabs and other control characters",
+    NAME_PATTERN.pattern: "Use small letters, digits, `-` and `_`; begin with a letter or a digit",
+    PAGE_PATTERN: "Give the value of `next` of the previous page",
+}
+
+
+def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[dict[str, Any]]:
+    """What is told of one error of pydantic: one entry, or one for each unknown field."""
+    loc = [*where]
+    for part in error["loc"]:
+        keyed = bool(loc) and loc[-1] in _keyed_fields() and PLAIN_NAME.fullmatch(str(part)) is not None
+        # the names of parameters are the service's own
+        parameter = loc[:1] in (["path"], ["query"], ["header"]) and error["type"] != UNKNOWN_FIELD
+        if isinstance(part, int) or keyed or parameter or part in _field_names():
+            loc.append(part)
+    if error["type"] != UNKNOWN_FIELD:
+        empty = error["type"] == "missing" and loc == ["body"]
+        yield {"loc": loc, "msg": EMPTY if empty else _message(error)}
+        return
+    context = error["ctx"]
+    for name, meant in context["unknown"].items():
+        # a name of any other form may be anything, also something secret: it is not repeated
+        plain = PLAIN_NAME.fullmatch(name) is not None
+        hint = f"did you mean `{meant}`?" if meant else "leave it out."
+        msg = f"Unknown field{f' `{name}`' if plain else ''}: {hint} Known here: {context['known']}"
+        yield {"loc": [*loc, name] if plain else loc, "msg": msg}
+
+
+def _message(error: Mapping[str, Any]) -> str:
+    context = error.get("ctx", {})
+    if error["type"] == "string_pattern_mismatch":
+        return _PATTERNS.get(context["pattern"], str(error["msg"]))
+    if error["type"] in ("too_short", "too_long"):
+        bound = "most {max_length}" if error["type"] == "too_long" else "least {min_length}"
+        return f"Give at {bound.format_map(context)} items, not {context['actual_length']}"
+    return str(_MESSAGES.get(error["type"], error["msg"]))
+
+
+@cache
+def _keyed_fields() -> set[str]:
+    """Fields whose value is an object with names of the caller's."""
+    return {name for model in _models(RequestModel) for name, field in model.model_fields.items() if _is_keyed(field)}
+
+
+def _is_keyed(field: FieldInfo) -> bool:
+    return any(get_origin(option) is dict for option in (field.annotation, *get_args(field.annotation)))
+
+
+def _models(model: type[RequestModel]) -> set[type[RequestModel]]:
+    return {model}.union(*(_models(child) for child in model.__subclasses__()))
+
+
+@cache
+def _field_names() -> set[str]:
+    return {name for model in _models(RequestModel) for name in model.model_fields} | {
+        "body",
+        "path",
+        "query",
+        "header",
+        KEY_HEADER,
+    }

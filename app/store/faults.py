@@ -1,0 +1,45 @@
+"""What can be wrong with the database, by what its driver says."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy.exc import DBAPIError
+
+from app.exceptions import StoreFault
+
+LEAST_ROOM = 1 << 20
+"""Below this many free bytes the disk counts as full: a commit of an ordinary answer may fail."""
+
+# https://sqlite.org/rescode.html: the first 8 bits of a result code are its kind
+_SQLITE: dict[int, StoreFault] = {5: "locked", 6: "locked", 8: "read-only", 13: "full"}
+_SQLITE_IO_ERROR = 10
+# https://www.postgresql.org/docs/current/errcodes-appendix.html
+_POSTGRESQL: dict[str, StoreFault] = {"53100": "full", "25006": "read-only", "55P03": "locked"}
+
+
+class DatabaseMoved(OSError):
+    """The file of the database is not the one that was opened."""
+
+
+def fault_of(error: Exception, file: Path | None) -> StoreFault:
+    """The fault that an error of the driver shows; `file` is that of an SQLite database."""
+    if isinstance(error, DatabaseMoved):
+        return "deleted"
+    if not isinstance(error, DBAPIError):
+        return "unreachable"
+    code = getattr(error.orig, "sqlite_errorcode", None)
+    if code is not None:
+        # the memory map beside the file grows by an I/O error where the file itself reports a full disk
+        full = code & 0xFF == _SQLITE_IO_ERROR and file is not None and room(file) < LEAST_ROOM
+        return "full" if full else _SQLITE.get(code & 0xFF, "unreachable")
+    told: Any = error.orig.args[0] if error.orig is not None and error.orig.args else None
+    return _POSTGRESQL.get(told.get("C", ""), "unreachable") if isinstance(told, dict) else "unreachable"
+
+
+def room(file: Path) -> int:
+    """Free bytes of the file system that holds `file`. Raises OSError."""
+    free = os.statvfs(file.parent)
+    return free.f_bavail * free.f_frsize

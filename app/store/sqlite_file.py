@@ -1,0 +1,86 @@
+"""The file of an SQLite database: which file it is, and bytes beside it that are held back for deleting.
+
+A connection stays on the file that it opened, even if that file is deleted or replaced: it would then acknowledge what
+nobody can ever read again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+from pathlib import Path
+
+from app.store.faults import DatabaseMoved, room
+
+logger = logging.getLogger(__name__)
+
+Identity = dict[Path, tuple[int, int] | None]
+"""Device and number of the database's file and of its write-ahead log."""
+
+_RESERVE = 8 << 20
+"""Bytes that are held back. A deletion writes one page for every thousand that it frees: enough for gigabytes."""
+_SMALLEST_RESERVE = 1 << 20
+
+
+def identity(file: Path) -> Identity:
+    """Which files a connection has just opened. It must have read: SQLite opens the log then."""
+    return {path: _number(path) for path in (file, Path(f"{file}-wal"))}
+
+
+def log_size(file: Path) -> int:
+    """Size of the write-ahead log [byte], which is written anew from its beginning."""
+    try:
+        return Path(f"{file}-wal").stat().st_size
+    except OSError:
+        return 0
+
+
+def check(opened: Identity) -> None:
+    """Raises DatabaseMoved if the files at their paths are not those that were opened."""
+    for path, number in opened.items():
+        if _number(path) != number:
+            raise DatabaseMoved(f"{path} is gone, or is another file than the one that was opened")
+
+
+def _number(path: Path) -> tuple[int, int] | None:
+    try:
+        status = path.stat()
+    except OSError:
+        return None
+    return status.st_dev, status.st_ino
+
+
+class Reserve:
+    """A file of unused bytes beside the database. SQLite needs space to delete: without it, a full disk stays full."""
+
+    def __init__(self, database: Path) -> None:
+        self._path = Path(f"{database}.reserve")
+
+    def fill(self) -> None:
+        """Takes `_RESERVE` bytes of the disk, or half of what is free. Without room for the log nothing can be written,
+        so that the other half stays."""
+        with contextlib.suppress(OSError):
+            held = self._path.stat().st_size if self._path.exists() else 0
+            size = min(_RESERVE, (room(self._path) + held) // 2)
+            if size >= max(_SMALLEST_RESERVE, 2 * held):
+                self._path.unlink(missing_ok=True)
+                self._take(size)
+
+    def release(self) -> bool:
+        """Gives the bytes back to the disk; whether there were any."""
+        try:
+            self._path.unlink()
+        except OSError:
+            return False
+        logger.warning("the disk is full: the reserve for deleting is in use", extra={"reserve": str(self._path)})
+        return True
+
+    def _take(self, size: int) -> None:
+        descriptor = os.open(self._path, os.O_CREAT | os.O_EXCL | os.O_WRONLY | os.O_CLOEXEC, 0o600)
+        try:
+            os.posix_fallocate(descriptor, 0, size)
+        except OSError:
+            self._path.unlink(missing_ok=True)
+        finally:
+            os.close(descriptor)

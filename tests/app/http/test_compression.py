@@ -1,0 +1,238 @@
+"""Answers by `Accept-Encoding`, and bodies by `Content-Encoding`, over a real socket."""
+
+from __future__ import annotations
+
+import asyncio
+import gzip
+import http.client
+import json
+import zlib
+from typing import Any
+
+import pytest
+import zstandard
+from starlette.responses import Response, StreamingResponse
+from starlette.types import Message, Receive, Scope, Send
+
+from app.http import content_coding
+from app.http.accept_encoding import preferred
+from app.http.compression import Compression
+from app.http.content_coding import ContentCoding
+from app.schemas import errors as problems
+from tests.app.live import ANSWER, Server
+from tests.app.requests import move
+
+POSE = {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
+
+
+def sent(server: Server, path: str, body: bytes | None, **headers: str) -> tuple[http.client.HTTPResponse, bytes]:
+    """The answer as its bytes are on the wire: no client unpacks it."""
+    connection = http.client.HTTPConnection(server.url.removeprefix("http://"), timeout=ANSWER)
+    connection.putrequest("GET" if body is None else "POST", path, skip_accept_encoding=True)
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    if body is not None:
+        given = {"Content-Type": "application/json", "Content-Length": str(len(body)), **given}
+    for name, value in given.items():
+        connection.putheader(name, value)
+    connection.endheaders(body)
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    return answer, content
+
+
+@pytest.mark.parametrize(
+    ("header", "coding"),
+    [
+        ("", "identity"),
+        ("gzip", "gzip"),
+        ("x-gzip", "gzip"),
+        ("GZIP", "gzip"),
+        ("gzip, deflate, br, zstd", "zstd"),
+        ("zstd;q=0.5, gzip;q=0.8", "gzip"),
+        ("zstd;q=0, gzip", "gzip"),
+        ("*", "zstd"),
+        ("*;q=0.1, identity", "identity"),
+        ("br", "identity"),
+        ("gzip;q=0", "identity"),
+        ("*;q=0, gzip;q=0.001", "gzip"),
+        ("identity;q=0", None),
+        ("*;q=0", None),
+        ("br, identity;q=0", None),
+        ("identity;q=0, *", "zstd"),
+        ("*;q=0, identity", "identity"),
+        ("gzip;q=nan, zstd;q=2, gzip ;q= 1", "gzip"),
+        (",,;;,", "identity"),
+        ("gzip;q=", "identity"),
+        ("gzip;level=9;q=0.4, identity;q=0.5", "identity"),
+    ],
+)
+def test_the_coding_of_greatest_weight(header: str, coding: str | None) -> None:
+    assert preferred(header) == coding
+
+
+def unpacked(coding: str | None, content: bytes) -> bytes:
+    if coding == "zstd":
+        return zstandard.ZstdDecompressor().decompress(content)
+    return gzip.decompress(content) if coding == "gzip" else content
+
+
+@pytest.mark.parametrize(("header", "coding"), [("gzip", "gzip"), ("zstd", "zstd"), ("identity", None)])
+def test_answers_are_the_same_in_every_coding(server: Server, header: str, coding: str | None) -> None:
+    plain, expected = sent(server, "/openapi.json", None)
+    answer, content = sent(server, "/openapi.json", None, Accept_Encoding=header)
+    assert (plain.status, plain.getheader("content-encoding")) == (200, None)
+    assert answer.getheader("content-encoding") == coding
+    assert "accept-encoding" in (answer.getheader("vary") or "").lower()
+    assert "accept-encoding" in (plain.getheader("vary") or "").lower()
+    assert int(answer.getheader("content-length") or 0) == len(content)
+    assert unpacked(coding, content) == expected
+    assert coding is None or len(content) < len(expected) / 4
+
+
+def test_a_coding_that_nobody_has_is_refused_before_any_work(server: Server) -> None:
+    answer, content = sent(server, "/optimize", json.dumps(move()).encode(), Accept_Encoding="br, identity;q=0")
+    assert answer.status == 406
+    problems.NotAcceptable.model_validate_json(content)
+
+
+def test_small_answers_stay_as_they_are(server: Server) -> None:
+    answer, content = sent(server, "/healthz", None, Accept_Encoding="gzip")
+    assert answer.getheader("content-encoding") is None
+    assert json.loads(content) == {"status": "alive"}
+
+
+def through(response: Response, header: str = "gzip") -> list[Message]:
+    """The messages of a response behind the middleware."""
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        await response(scope, receive, send)
+
+    messages: list[Message] = []
+
+    async def send(message: Message) -> None:
+        messages.append(message)
+
+    async def receive() -> Message:
+        return {"type": "http.disconnect"}
+
+    scope = {"type": "http", "method": "GET", "headers": [(b"accept-encoding", header.encode())]}
+    asyncio.run(Compression(app)(scope, receive, send))
+    return messages
+
+
+def headers_of(messages: list[Message]) -> dict[bytes, bytes]:
+    return dict(messages[0]["headers"])
+
+
+def test_streams_pass_piece_by_piece() -> None:
+    async def events() -> Any:
+        for k in range(3):
+            yield f"data: {k}\n\n" * 1000
+
+    for kind in ("text/event-stream", "application/x-ndjson", "text/csv"):
+        messages = through(StreamingResponse(events(), media_type=kind))
+        assert b"content-encoding" not in headers_of(messages)
+        assert [len(message["body"]) for message in messages[1:]] == [len("data: 0\n\n" * 1000)] * 3 + [0]
+
+
+def test_a_strong_etag_becomes_weak_and_a_packed_body_is_left_alone() -> None:
+    text = b"x" * 5000
+    messages = through(Response(text, media_type="text/plain", headers={"ETag": '"1"', "Vary": "Origin"}))
+    assert headers_of(messages)[b"etag"] == b'W/"1"'
+    assert headers_of(messages)[b"vary"].lower() == b"origin, accept-encoding"
+    packed = through(Response(text, media_type="text/plain", headers={"Content-Encoding": "br"}))
+    assert packed[1]["body"] == text and headers_of(packed)[b"content-encoding"] == b"br"
+    assert through(Response(text, media_type="image/png"))[1]["body"] == text
+
+
+@pytest.mark.parametrize(
+    ("coding", "pack"),
+    [
+        ("gzip", gzip.compress),
+        ("x-gzip", gzip.compress),
+        ("deflate", zlib.compress),
+        ("identity", bytes),
+        ("GZip", lambda body: gzip.compress(body[:7]) + gzip.compress(body[7:])),
+    ],
+)
+@pytest.mark.parametrize("path", ["/ik", "/evaluate"])
+def test_packed_bodies_are_taken(server: Server, coding: str, pack: Any, path: str) -> None:
+    body = POSE if path == "/ik" else {"configurations": [[0.0] * 6, [0.1] * 6], "time_per_segment": 1.0}
+    answer, content = sent(server, path, pack(json.dumps(body).encode()), Content_Encoding=coding)
+    assert answer.status == 200, content
+
+
+@pytest.mark.parametrize("coding", ["br", "zstd", "gzip, gzip", "compress", "x" * 100])
+def test_other_codings_are_told_so(server: Server, coding: str) -> None:
+    answer, content = sent(server, "/ik", b"{}", Content_Encoding=coding)
+    assert answer.status == 415
+    problems.UnsupportedCoding.model_validate_json(content)
+
+
+WHOLE = gzip.compress(json.dumps(POSE).encode(), mtime=0)
+
+
+@pytest.mark.parametrize(
+    "body", [WHOLE[:-1], WHOLE[:20], b"", b"{}", WHOLE + b"more", WHOLE[:-8] + b"\0" * 8], ids=range(6)
+)
+def test_damaged_bodies_are_told_so(server: Server, body: bytes) -> None:
+    answer, content = sent(server, "/ik", body, Content_Encoding="gzip")
+    assert answer.status == 422
+    assert problems.Validation.model_validate_json(content).errors[0].loc == ["body"]
+
+
+@pytest.mark.parametrize("path", ["/ik", "/evaluate", "/whatif"])
+def test_a_bomb_is_refused(server: Server, path: str) -> None:
+    # a hundred kilobytes that unpack to more than any path takes
+    bomb = gzip.compress(b" " * 80_000_000)
+    answer, content = sent(server, path, bomb, Content_Encoding="gzip")
+    assert answer.status == 413
+    problems.BodyTooLarge.model_validate_json(content)
+
+
+def test_a_bomb_is_never_whole_in_memory() -> None:
+    bomb = gzip.compress(b"\0" * 50_000_000)
+    pieces: list[int] = []
+
+    class Enough(Exception):
+        pass
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        while sum(pieces) < 1_000_000:
+            pieces.append(len((await receive())["body"]))
+        raise Enough
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": bomb, "more_body": False}
+
+    async def send(_: Message) -> None: ...
+
+    scope = {"type": "http", "headers": [(b"content-encoding", b"gzip"), (b"content-length", b"7")]}
+    with pytest.raises(Enough):
+        asyncio.run(ContentCoding(app)(scope, receive, send))
+    assert max(pieces) <= content_coding._PIECE
+
+
+def test_the_messages_of_an_unpacked_body_end() -> None:
+    """Routes wait for the end of the connection after the body: it must come through."""
+    arriving: list[Message] = [
+        {"type": "http.request", "body": WHOLE[k : k + 1], "more_body": True} for k in range(len(WHOLE))
+    ]
+    arriving += [{"type": "http.request", "body": b"", "more_body": False}, {"type": "http.disconnect"}]
+    seen: list[Message] = []
+
+    async def app(scope: Scope, receive: Receive, send: Send) -> None:
+        assert not any(name in (b"content-encoding", b"content-length") for name, _ in scope["headers"])
+        while not seen or seen[-1]["type"] != "http.disconnect":
+            seen.append(await receive())
+
+    async def receive() -> Message:
+        return arriving.pop(0)
+
+    async def send(_: Message) -> None: ...
+
+    asyncio.run(ContentCoding(app)({"type": "http", "headers": [(b"content-encoding", b"gzip")]}, receive, send))
+    body = b"".join(message["body"] for message in seen[:-1])
+    assert json.loads(body) == POSE
+    assert [message["more_body"] for message in seen[:-1]] == [True] * (len(seen) - 2) + [False]

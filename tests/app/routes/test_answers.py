@@ -1,0 +1,111 @@
+"""Answers of a sensible size: the candidates that are asked for, and every answer of /optimize again by its path."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.convert.candidates import MOST_IN_A_PROBLEM, most_telling
+from app.engine.result import TaskResult
+from app.schemas.cycle import CycleResponse
+from app.schemas.response import OptimizeResponse
+from app.settings import Settings
+from app.store.store import Store
+from app.store.store_answers import keep_answer
+from optimizer.solution import CandidateReport, CandidateStatus
+from tests.app.requests import EXAMPLES, HOME, NEAR, PATIENT, move
+from tests.app.store.test_store import with_store
+
+TWO_POSES = EXAMPLES["joint_to_pose"]
+
+
+@pytest.fixture(scope="module")
+def everything(client: TestClient) -> dict[str, Any]:
+    content: dict[str, Any] = client.post("/optimize", json=TWO_POSES | {"candidates": "all"}).json()
+    return content
+
+
+@pytest.mark.parametrize(
+    ("which", "kept"), [("computed", ("solved", "failed")), ("none", ()), (None, ("solved", "failed"))]
+)
+def test_candidates_as_asked(
+    client: TestClient, everything: dict[str, Any], which: str | None, kept: tuple[str, ...]
+) -> None:
+    answer = client.post("/optimize", json=TWO_POSES | ({} if which is None else {"candidates": which}))
+    OptimizeResponse.model_validate_json(answer.content)
+    content = answer.json()
+    assert content["candidates"] == [each for each in everything["candidates"] if each["status"] in kept]
+    counted = Counter(each["status"] for each in everything["candidates"])
+    assert {status: count for status, count in content["candidate_counts"].items() if count} == counted
+    assert content["energy"] == everything["energy"]
+    assert len(everything["candidates"]) == 256
+
+
+def test_every_answer_is_kept(client: TestClient) -> None:
+    answer = client.post("/optimize", json=move())
+    content = answer.json()
+    again = client.get(content["answer"])
+    assert again.json()["kind"] == "optimize"
+    assert again.json()["answer"] == content, "with the path that it came from"
+    assert client.post("/optimize", json=move()).json()["answer"] != content["answer"]
+
+
+def test_the_path_is_never_looked_for_in_the_callers_texts(client: TestClient) -> None:
+    name = '","answer":"/answers/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"}'
+    ball = {"name": name, "shape": "sphere", "radius": 0.01, "pose": {"position": [0.0, 0.0, 1.2], "rpy": [0, 0, 0]}}
+    content = client.post("/optimize", json=move(scene={"obstacles": [ball]})).json()
+    assert client.get(content["answer"]).json()["answer"] == content
+
+
+def test_a_result_that_is_not_kept_says_so() -> None:
+    result = TaskResult.of_kept_json({"name": '","answer":"x"}', "q": [1.5]})
+    assert result.document.endswith(f'"answer":"/answers/{result.kept_as}"}}'.encode())
+    without = result.without_path()
+    assert without.document == b'{"name":"\\",\\"answer\\":\\"x\\"}","q":[1.5],"answer":null}'
+    assert without.kept_as is None
+
+
+@pytest.mark.parametrize(("most", "kept"), [(0, False), (100, False), (1 << 20, True)])
+def test_an_answer_larger_than_all_that_may_be_kept_is_not(tmp_path: Any, most: int, kept: bool) -> None:
+    result = TaskResult.of_kept_json({"q": list(range(1000))})
+
+    async def test(store: Store) -> None:
+        answered = await keep_answer(store, Settings(answers_max_bytes=most), "optimize", result, None)
+        assert answered.document.endswith(b'"answer":null}') != kept
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_the_answers_of_a_front_and_a_round_have_their_paths_and_candidates(client: TestClient) -> None:
+    front = client.post("/pareto", json=move(points=2, candidates="none")).json()
+    for point in front["points"]:
+        kept = client.get(point["answer"]).json()["answer"]
+        assert (kept["answer"], kept["candidates"]) == (point["answer"], [])
+        assert sum(kept["candidate_counts"].values()) > 0
+    work = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none", **PATIENT}
+    answer = client.post("/cycle", json=work)
+    CycleResponse.model_validate_json(answer.content)
+    for leg in answer.json()["legs"]:
+        kept = client.get(leg["answer"]).json()["answer"]
+        assert (kept["answer"], kept["candidates"]) == (leg["answer"], [])
+
+
+def test_a_study_keeps_all_candidates_for_its_suggestions(client: TestClient) -> None:
+    study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
+    body = {"optimize": TWO_POSES | {"candidates": "none"}}
+    step = client.post(f"{study}/iterations", json=body).json()
+    assert step["request"] == {"optimize": {**body["optimize"], "objective": "electrical"}}
+    kept = client.get(f"/answers/{step['answer']}").json()["answer"]
+    assert len(kept["candidates"]) == 256
+    assert kept["answer"] == f"/answers/{step['answer']}"
+
+
+def test_a_problem_lists_the_most_telling_candidates() -> None:
+    statuses = [CandidateStatus.PRUNED] * 100 + [CandidateStatus.INFEASIBLE] * 30 + [CandidateStatus.FAILED] * 20
+    reports = [CandidateReport("a", "b", [0.0], [0.0], status, "", 1.0) for status in statuses]  # type: ignore[arg-type]
+    listed = Counter(each.status for each in most_telling(reports))
+    assert listed == {CandidateStatus.FAILED: 20, CandidateStatus.INFEASIBLE: 30, CandidateStatus.PRUNED: 14}
+    assert listed.total() == MOST_IN_A_PROBLEM

@@ -1,0 +1,114 @@
+"""Iterations of a study: the best so far and the first below the threshold are kept with each, whatever its length."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import event, text
+
+from app.access.client import OPERATOR
+from app.store import studies
+from app.store.database import create_database_engine, migrate
+from app.store.store import Store
+from app.store.studies import Step
+from app.store.tables import Iteration, Study
+from app.studies.answers import detail, entries
+from tests.app.store.test_store import with_store
+
+ENERGIES = [100.0, 80.0, 90.0, 60.0, 60.0, 70.0]
+THRESHOLD = 80.0
+BEST = [1, 2, 2, 4, 4, 4]
+MET_BY = [None, 2, 2, 2, 2, 2]
+
+
+def step(energy: float) -> Step:
+    return Step("optimize", {"energy": energy}, b"{}", duration=1.0, electrical=energy, mechanical=1000.0 - energy)
+
+
+async def begun(store: Store, objective: str = "electrical", count: int = len(ENERGIES)) -> Study:
+    study = studies.new_study("A study", "ur5e", objective, THRESHOLD, None, None)
+    await store.write(partial(studies.create, study=study))
+    for energy in ENERGIES[:count]:
+        await store.write(partial(studies.add, study_id=study.id, step=step(energy), key=None, client=OPERATOR))
+    return study
+
+
+def test_each_knows_the_best_so_far(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        study = await begun(store)
+        found = [
+            detail(await store.read(partial(studies.entry, study_id=study.id, number=number)))
+            for number in range(1, len(ENERGIES) + 1)
+        ]
+        assert [each.best.number for each in found] == BEST
+        assert [each.threshold_met_by for each in found] == MET_BY
+        assert [each.request["optimize"] for each in found] == [{"energy": energy} for energy in ENERGIES]
+        state = await store.read(partial(studies.state, study_id=study.id))
+        assert (state.best.number, state.last.number, state.last.met_by) == (4, 6, 2)  # type: ignore[union-attr]
+        # one at a time, or all at once: the same
+        history = entries(await store.read(partial(studies.history, study_id=study.id)))
+        assert [entry.items() <= each.model_dump().items() for entry, each in zip(history, found, strict=True)] == [
+            True
+        ] * len(ENERGIES)
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_the_objective_is_what_is_compared(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        study = await begun(store, "mechanical")
+        state = await store.read(partial(studies.state, study_id=study.id))
+        assert (state.best.number, state.last.met_by) == (1, None)  # type: ignore[union-attr]
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+@pytest.mark.parametrize("count", [3, 6])
+def test_to_add_one_reads_as_much_in_a_study_of_any_length(tmp_path: Path, count: int) -> None:
+    read: list[Iteration] = []
+
+    def note(iteration: Iteration, _: object) -> None:
+        read.append(iteration)
+
+    async def test(store: Store) -> None:
+        study = await begun(store, count=count)
+        event.listen(Iteration, "load", note)
+        try:
+            number, _ = await store.write(
+                partial(studies.add, study_id=study.id, step=step(50.0), key=None, client=OPERATOR)
+            )
+            assert len(read) == 2, "the last one and the best one"
+            await store.read(partial(studies.entry, study_id=study.id, number=number))
+            assert len(read) == 2 + 3, "it, the one before, and the best one before"
+        finally:
+            event.remove(Iteration, "load", note)
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_studies_of_earlier_releases_are_filled_in(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path}/joulepath.db"
+
+    async def test(store: Store) -> None:
+        await begun(store)
+        await begun(store, "mechanical")
+
+    with_store(url, test)
+    engine = create_database_engine(url)
+    read = text("SELECT study_id, number, best, met_by FROM iterations ORDER BY study_id, number")
+    with engine.connect() as connection:
+        before = connection.execute(read).all()
+    config = Config()
+    config.set_main_option("script_location", "app/store/migrations")
+    with engine.execution_options(writes=True).begin() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "v0004")
+    migrate(engine)
+    with engine.connect() as connection:
+        assert connection.execute(read).all() == before
+    engine.dispose()
+    assert {row.best for row in before} == {1, 2, 4}
