@@ -168,7 +168,7 @@ def test_logs_one_line_per_request(server: Server) -> None:
     "garbage",
     [
         b"\x16\x03\x01 hello\r\n\r\n",
-        b"GET /healthz\r\n\r\n",
+        b"GET /healthz HTTP/one\r\n\r\n",
         b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: two\r\n\r\n",
         b"POST /optimize HTTP/1.1\r\nHost: x\r\nContent-Length: 2\r\nContent-Length: 3\r\n\r\n{}",
         b"GET /healthz HTTP/1.1\r\nHo st: x\r\n\r\n",

@@ -117,7 +117,7 @@ def test_its_answer_is_a_motion_to_evaluate(client: TestClient) -> None:
         path([[0.4, 0.0, 0.3]], guess=HOME[:5]),
         path([[0.4, 0.0, 0.3]], tolerance=0),
         path([[0.4, 0.0, 0.3]] * 1001),
-        path([[0.4, 0.0, 0.3]], secret=1),
+        path([[0.4, 0.0, 0.3]], **{"a secret": 1}),
     ],
 )
 def test_refuses(request_: dict[str, Any], client: TestClient) -> None:
