@@ -3,6 +3,9 @@
 ServiceError
 ├── InvalidRequest      the request does not fit the schema
 ├── Busy                the queue is full
+│   ├── TooManyConnections, TooManyBytes          so is what the service holds in all
+│   └── TooManyRequests     the client has its share of the queue
+│       └── TooManyConnectionsOfClient, TooManyBytesOfClient
 ├── NotReady            no worker is warm
 ├── ShuttingDown        the service stops before the request is done
 ├── WorkerDied          the worker process ended during the task
@@ -22,6 +25,8 @@ ServiceError
 ├── AnswerInUse         the answer belongs to a study
 ├── CrossSite           a web page of another site sent the request
 ├── WrongHost           the request is for another host
+├── HeadTooLarge        line and headers of the request are larger than the limit
+├── RequestTimeout      the request did not arrive in time
 └── NotFound, MethodNotAllowed, BodyTooLarge, UnsupportedMediaType, UnsupportedCoding, NotAcceptable, MalformedHttp
 """
 
@@ -59,6 +64,45 @@ class Busy(ServiceError):
     """The queue is full."""
 
     MESSAGE = "All workers are busy and the queue is full: try again after a few seconds."
+
+
+class TooManyConnections(Busy):
+    """The service has as many connections as it may."""
+
+    MESSAGE = "The service has as many connections as it may: try again after a few seconds."
+
+
+class TooManyBytes(Busy):
+    """Bodies and answers in flight have as many bytes as the service may hold."""
+
+    MESSAGE = "The service holds as many bytes of requests and answers as it may: try again after a few seconds."
+
+
+class TooManyRequests(Busy):
+    """The client has its share of the queue."""
+
+    MESSAGE = (
+        "You have as many requests in flight as one client may: wait for their answers before you send more, or send "
+        "them one after another."
+    )
+
+
+class TooManyConnectionsOfClient(TooManyRequests):
+    """The client has as many connections, or requests ahead of their answers, as it may."""
+
+    MESSAGE = (
+        "You have as many connections, or as many requests ahead on one of them, as one client may: close those that "
+        "you do not need, and use one for several requests, one after another."
+    )
+
+
+class TooManyBytesOfClient(TooManyRequests):
+    """The client's bodies and answers in flight have as many bytes as one client may."""
+
+    MESSAGE = (
+        "The bodies and answers of your requests in flight have as many bytes as one client may: wait for their "
+        "answers, read them, and send fewer at a time."
+    )
 
 
 class NotReady(ServiceError):
@@ -224,6 +268,29 @@ class BodyTooLarge(ServiceError):
     """The body is larger than the limit."""
 
     MESSAGE = "The body is larger than the service accepts: send a smaller body."
+
+
+class HeadTooLarge(ServiceError):
+    """Line and headers of the request are larger than the limit [byte]."""
+
+    MESSAGE = "The line and the headers of the request are too large."
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self.args = (f"The line and the headers of the request have more than {most} bytes: send shorter ones.",)
+
+
+class RequestTimeout(ServiceError):
+    """The request did not arrive within the limit [s]."""
+
+    MESSAGE = "The request did not arrive in time."
+
+    def __init__(self, most: float) -> None:
+        super().__init__()
+        self.args = (
+            f"The request did not arrive whole within {most:g} s: send it again, over a faster connection or with a "
+            "smaller body.",
+        )
 
 
 class UnsupportedMediaType(ServiceError):

@@ -27,6 +27,7 @@ from app.http.metrics import Metrics, RouteNote
 from app.http.openapi import install_openapi
 from app.http.request_context import RequestContext
 from app.http.sites import known_host, same_site
+from app.http.transfers import Answers, Bodies, BytesInFlight
 from app.routes import (
     answers,
     compare,
@@ -121,7 +122,9 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }
     app.add_middleware(RouteNote)
-    # the inner one counts the body as it is unpacked
+    in_flight = BytesInFlight(settings.max_bytes_in_flight, settings.client_bytes_in_flight)
+    # the inner ones count the body as it is unpacked
+    app.add_middleware(Bodies, in_flight=in_flight, time=settings.body_timeout)
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
     app.add_middleware(ContentCoding)
     app.add_middleware(BodyLimit, most=settings.max_body_bytes, uploads=uploads)
@@ -140,6 +143,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
     app.add_middleware(Gate, check=same_site(settings.cors_origins))
     app.add_middleware(Gate, check=known_host(settings.allowed_hosts, settings.host))
     app.add_middleware(Compression)
+    app.add_middleware(Answers, in_flight=in_flight)
     app.add_middleware(
         RequestContext,
         sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import ctypes
+import gc
 import math
 import socket
 
@@ -11,7 +13,7 @@ from fastapi import FastAPI
 
 from app.access.start import log_access
 from app.engine.pool import Engine
-from app.http.malformed import TypedHttpProtocol
+from app.http.connection import Ceilings, Connection
 from app.main import create_app
 from app.settings import Settings
 
@@ -19,28 +21,60 @@ _REFUSING_TIME = 0.25
 """Time [s] in which new requests still get a response (`shutting-down`), until load balancers know of the shutdown."""
 _SETTLING_TIME = 0.05
 """Time [s] to read requests that have arrived on open connections, before idle connections are closed."""
+_M_MMAP_THRESHOLD = -3
+"""Parameter of glibc's `mallopt`: the size [byte] from which a block is mapped by itself."""
+_LARGE_BLOCK = 1 << 16
+_CHECK_PERIOD = 0.5
+"""Time [s] between two checks of the connections."""
 
 
 class _Server(uvicorn.Server):
-    """Drains the engine when a shutdown begins: the lifespan ends only after the last response."""
+    """Checks its connections. Drains the engine when a shutdown begins: the lifespan ends only after the last
+    response, or when the time for it is over."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
         super().__init__(config)
         self._app = app
 
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listens, and begins to check connections."""
+        await super().startup(sockets)
+        # what there is now stays: a garbage collection that looks through it would hold up every request for 0.1 s
+        gc.freeze()
+        self._checking = asyncio.create_task(self._check_connections())
+
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Lets the requests in flight finish; those that take too long are `shutting-down`."""
         engine: Engine = self._app.state.engine
+        settings: Settings = self._app.state.settings
         engine.drain()
+        # the engine has ended its tasks by then, and what still is open does not read
+        asyncio.get_running_loop().call_later(settings.shutdown_grace + _SETTLING_TIME, self._abort_connections)
         await asyncio.sleep(_REFUSING_TIME)
         for server in self.servers:
             server.close()
         await asyncio.sleep(_SETTLING_TIME)
         await super().shutdown(sockets)
+        self._checking.cancel()
+        gc.unfreeze()  # libraries look at the end whether all of theirs is gone
+
+    async def _check_connections(self) -> None:
+        while True:
+            await asyncio.sleep(_CHECK_PERIOD)
+            for connection in self._connections():
+                connection.check()
+
+    def _abort_connections(self) -> None:
+        for connection in self._connections():
+            connection.reset()
+
+    def _connections(self) -> list[Connection]:
+        return [each for each in self.server_state.connections if isinstance(each, Connection)]
 
 
 def serve(settings: Settings) -> None:
     """Serves in this process until a signal arrives."""
+    _give_memory_back()
     app = create_app(settings)
     log_access(settings)
     config = uvicorn.Config(
@@ -48,14 +82,43 @@ def serve(settings: Settings) -> None:
         host=settings.host,
         port=settings.port,
         loop="uvloop",
-        http=TypedHttpProtocol,
+        http=_protocol(settings),
         ws="none",
         log_config=None,
         access_log=False,
         server_header=False,
         # `app.http.client` reads their headers, from trusted proxies only
         proxy_headers=False,
-        # the engine ends the requests in flight before this
+        # the server ends the connections before this
         timeout_graceful_shutdown=math.ceil(settings.shutdown_grace) + 1,
     )
     _Server(config, app).run()
+
+
+def _give_memory_back() -> None:
+    """Has the C library return every large block to the system when it is freed.
+
+    Otherwise it keeps the more, the larger the blocks were that it saw: 300 bodies of 4 MiB would never be given back.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:  # glibc has it
+        mallopt(_M_MMAP_THRESHOLD, _LARGE_BLOCK)
+
+
+def _protocol(settings: Settings) -> type[Connection]:
+    """The protocol of a server: uvicorn makes one instance for each connection."""
+
+    class Limited(Connection):
+        """A connection within the ceilings of the settings."""
+
+        ceilings = Ceilings(
+            connections=settings.max_connections,
+            connections_of_client=settings.client_connections,
+            head_bytes=settings.max_head_bytes,
+            head_time=settings.head_timeout,
+            body_time=settings.body_timeout,
+            write_time=settings.write_timeout,
+            proxies=settings.trusted_proxies,
+        )
+
+    return Limited

@@ -72,7 +72,37 @@ class Settings(BaseSettings):
     )
     max_robots: int = Field(default=100, ge=0, description="Robots of users' own that the database holds at most.")
     queue_size: int = Field(
-        default=16, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
+        default=64, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
+    )
+    client_requests: int = Field(
+        default=16,
+        ge=1,
+        description="Requests of one client that may be in a worker or wait for one; further ones are "
+        "`too-many-requests`.",
+    )
+    max_connections: int = Field(default=512, ge=1, description="Connections that may be open.")
+    client_connections: int = Field(
+        default=128, ge=1, description="Connections of one address that may be open; of a trusted proxy, any number."
+    )
+    max_bytes_in_flight: int = Field(
+        default=1 << 28,
+        ge=1024,
+        description="Largest total size of the bodies and answers of all requests in flight [byte].",
+    )
+    client_bytes_in_flight: int = Field(
+        default=1 << 27, ge=1024, description="Largest total size of those of one client [byte]."
+    )
+    max_head_bytes: int = Field(
+        default=32_768, ge=1024, description="Largest size of the line and the headers of a request [byte]."
+    )
+    head_timeout: float = Field(
+        default=10.0, gt=0, description="Time in which the line and the headers of a request must arrive [s]."
+    )
+    body_timeout: float = Field(
+        default=60.0, gt=0, description="Time in which the body of a request must arrive, uploads included [s]."
+    )
+    write_timeout: float = Field(
+        default=20.0, gt=0, description="Time in which a client must read the next 64 KiB of its answer [s]."
     )
     max_body_bytes: int = Field(default=8_388_608, ge=1024, description="Largest request body [byte].")
     max_upload_bytes: int = Field(
@@ -90,9 +120,9 @@ class Settings(BaseSettings):
         default=5.0, gt=0, description="Time after the deadline [s] at which a worker that has not answered is killed."
     )
     shutdown_grace: float = Field(
-        default=8.0,
+        default=6.0,
         gt=0,
-        description="Time [s] for the requests in progress at a shutdown; container engines allow 10 s in total.",
+        description="Time [s] for the requests in progress at a shutdown; all ends within two seconds more.",
     )
     database_url: str = Field(
         default_factory=_default_database,

@@ -1,6 +1,6 @@
 """The service under steady load: each client sends its next request as soon as the last one is answered.
 
-Then a burst: more simultaneous requests than workers and queue can take. The service must refuse the excess with 503.
+Then a burst: more simultaneous requests than one client may have. The service must refuse the excess with 429.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def burst(service: Service, seed: int) -> dict[str, Any]:
     return {
         "sent": BURST,
         "statuses": {str(s): n for s, n in Counter(status for status, _ in answers).items()},
-        "refusals_have_retry_after": all(named for status, named in answers if status == 503),
+        "refusals_have_retry_after": all(named for status, named in answers if status == 429),
     }
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import os
+import random
 import signal
 import socket
 import subprocess
@@ -40,10 +42,10 @@ class Answer:
 
 
 class Client:
-    """One persistent connection; not thread-safe."""
+    """One persistent connection from a loopback address; not thread-safe."""
 
-    def __init__(self, port: int) -> None:
-        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120)
+    def __init__(self, port: int, address: str = "127.0.0.1") -> None:
+        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120, source_address=(address, 0))
 
     def get(self, path: str) -> Answer:
         """Raises OSError or http.client.HTTPException if there is no answer."""
@@ -52,6 +54,11 @@ class Client:
     def optimize(self, body: dict[str, Any]) -> Answer:
         """`POST /optimize`. Raises the same errors as `get`."""
         return self._exchange("POST", "/optimize", orjson.dumps(body))
+
+    def send_raw(self, content: bytes) -> None:
+        """Sends bytes as they are."""
+        self._connection.connect()
+        self._connection.sock.sendall(content)
 
     def _exchange(self, method: str, path: str, body: bytes | None) -> Answer:
         began = time.perf_counter()
@@ -112,9 +119,7 @@ class Service:
 @contextmanager
 def running(ready: bool = True, **environment: str) -> Iterator[Service]:
     """A service with default settings on a free port; it ends with the context. Waits for `/readyz` if `ready`."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = _free_port()
     # a SIGTERM to the benchmark then ends the service, too
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
@@ -134,6 +139,15 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+
+
+def _free_port() -> int:
+    """A port that no connection of a client gets by chance: Linux gives them ports from 32768 on."""
+    for port in random.sample(range(20_000, 32_000), 100):
+        with socket.socket() as free, contextlib.suppress(OSError):
+            free.bind(("127.0.0.1", port))
+            return port
+    raise RuntimeError("no free port: end other services")
 
 
 def resident(pid: int) -> float:

@@ -76,7 +76,7 @@ def _answer(file: str, kind: Kind, fields: dict[str, Any], wanted: Kind, deadlin
     query = {name: orjson.dumps(value).decode() for name, value in fields.items()}
     request_id = new_id()
     with terminal.progress(f"Evaluating for at most {deadline:g} s"):
-        return answered(EvaluateTask(file, kind, query, wanted, request_id), deadline, request_id)
+        return answered(EvaluateTask(file, kind, query, wanted, request_id, deadline), deadline, request_id)
 
 
 def _settings_in(file: Path) -> dict[str, Any]:

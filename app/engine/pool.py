@@ -1,4 +1,4 @@
-"""The engine: warm worker processes behind a bounded queue, each task with a deadline."""
+"""The engine: warm worker processes behind a bounded, fair queue, each task with a deadline."""
 
 from __future__ import annotations
 
@@ -8,13 +8,16 @@ import logging
 import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AsyncExitStack
+from dataclasses import dataclass
 
 from app.engine.census import Census
+from app.engine.fair_queue import FairQueue, Place
 from app.engine.forkserver import start_forkserver
 from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.engine.worker import Worker
-from app.exceptions import Busy, ShuttingDown, WorkerDied
+from app.exceptions import ShuttingDown, WorkerDied
 from app.settings import Settings
 from optimizer.exceptions import DeadlineExceeded
 
@@ -25,18 +28,22 @@ _LONGEST_RESTART_DELAY = 30.0
 
 
 class Engine:
-    """Runs tasks in `settings.workers` processes; `settings.queue_size` more may wait for one."""
+    """Runs tasks in `settings.workers` processes; `settings.queue_size` more may wait for one.
+
+    Of one client, `settings.client_requests` may run and wait.
+    """
 
     def __init__(self, settings: Settings, warm: Callable[[], None]) -> None:
         self.census = Census()
         self._settings = settings
         self._warm = warm
-        self._capacity = settings.workers + settings.queue_size
+        self._queue: FairQueue[Worker] = FairQueue(
+            capacity=settings.workers + settings.queue_size, share=settings.client_requests
+        )
         self._in_flight: set[asyncio.Timeout] = set()
         self._threads = ThreadPoolExecutor(2 * settings.workers, thread_name_prefix="worker-pipe")
         self._workers: set[Worker] = set()
         self._keepers: list[asyncio.Task[None]] = []
-        self._idle: asyncio.Queue[Worker] = asyncio.Queue()
         self._first_warm = asyncio.Event()
         self._was_ready = False
         self._draining = asyncio.Event()
@@ -84,43 +91,52 @@ class Engine:
         for limit in self._in_flight:
             limit.reschedule(min(limit.when() or self._latest_end, self._latest_end))
 
-    async def run(self, task: Task, deadline: float) -> TaskResult:
+    def of_client(self, client: str) -> ClientEngine:
+        """The engine for the requests of one client."""
+        return ClientEngine(self, client)
+
+    async def run(self, task: Task, deadline: float, client: str = "") -> TaskResult:
         """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the queue counts.
 
+        Clients have their turns, see `FairQueue`. A task whose worker another client needs begins again later.
         If cancelled, the task leaves the queue, or its worker is killed. Raises what the task raises (see `Task.run`),
-        Busy, ShuttingDown, DeadlineExceeded or WorkerDied.
+        Busy, TooManyRequests, ShuttingDown, DeadlineExceeded or WorkerDied.
         """
         if self._draining.is_set():
             raise ShuttingDown
-        if len(self._in_flight) >= self._capacity:
-            raise Busy
         end = asyncio.get_running_loop().time() + deadline
         try:
-            async with asyncio.timeout_at(end) as limit:
-                self._in_flight.add(limit)
-                try:
-                    return await self._run_in_worker(task, end, limit)
-                finally:
-                    self._in_flight.discard(limit)
+            with self._queue.place(client) as place:
+                async with asyncio.timeout_at(end) as limit:
+                    self._in_flight.add(limit)
+                    try:
+                        return await self._run_in_worker(task, end, limit, place)
+                    finally:
+                        self._in_flight.discard(limit)
         except TimeoutError:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
-    async def _run_in_worker(self, task: Task, end: float, limit: asyncio.Timeout) -> TaskResult:
-        with self.census.waits():
-            worker = await self._idle.get()
-            while not worker.alive:
-                worker = await self._idle.get()
-        # the optimiser watches the deadline and returns its best motion: the grace is for that
-        limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
-        try:
-            left = end - asyncio.get_running_loop().time()
-            if left <= 0:
-                raise DeadlineExceeded([])
-            with self.census.works():
-                return await worker.ask(task, left)
-        finally:
-            if worker.alive:
-                self._idle.put_nowait(worker)
+    async def _run_in_worker(self, task: Task, end: float, limit: asyncio.Timeout, place: Place[Worker]) -> TaskResult:
+        while True:
+            limit.reschedule(min(end, self._latest_end))
+            async with AsyncExitStack() as turn:
+                with self.census.waits():
+                    worker = await turn.enter_async_context(self._queue.worker(place))
+                turn.enter_context(self.census.works())
+                # the optimiser watches the deadline and returns its best motion: the grace is for that
+                limit.reschedule(min(end + self._settings.deadline_grace, self._latest_end))
+                left = end - asyncio.get_running_loop().time()
+                if left <= 0:
+                    raise DeadlineExceeded([])
+                asking = asyncio.ensure_future(worker.ask(task, left))
+                if not place.gave_back:  # nobody is stopped twice
+                    place.give_back = asking.cancel
+                try:
+                    return await asking
+                except asyncio.CancelledError:
+                    if place.counts or _is_cancelled():
+                        raise
+            logger.info("gave its worker back", extra={"request_id": task.request_id, "client": place.client})
 
     async def _keep(self, first: bool) -> None:
         """Keeps one worker alive: starts it, waits for its end, starts the next."""
@@ -145,7 +161,7 @@ class Engine:
 
     def _has_warmed(self, worker: Worker) -> None:
         self._workers.add(worker)
-        self._idle.put_nowait(worker)
+        self._queue.put(worker)
         self._first_warm.set()
         logger.info("worker warm", extra={"pid": worker.pid})
         if not self._was_ready and self.warm_workers == self._settings.workers:
@@ -155,3 +171,21 @@ class Engine:
     def _kill_all(self) -> None:
         for worker in self._workers:
             worker.kill()
+
+
+@dataclass(frozen=True)
+class ClientEngine:
+    """The engine for the requests of one client; `client` is its name."""
+
+    engine: Engine
+    client: str
+
+    async def run(self, task: Task, deadline: float) -> TaskResult:
+        """See `Engine.run`."""
+        return await self.engine.run(task, deadline, self.client)
+
+
+def _is_cancelled() -> bool:
+    """Whether the current task is being cancelled, and not only one that it waits for."""
+    current = asyncio.current_task()
+    return current is not None and current.cancelling() > 0

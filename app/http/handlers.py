@@ -49,9 +49,17 @@ async def problem_response(request: Request, error: Exception) -> Response:
     request.state.problem = problem.slug()
     if problem.retry_after is not None:
         headers["Retry-After"] = str(problem.retry_after)
-    # a problem can list thousands of candidates: a thread encodes it, so that the event loop serves others meanwhile
-    body = await asyncio.to_thread(lambda: json_document(problem_content(error, request.state.id)))
+    if hasattr(
+        error, "candidates"
+    ):  # thousands of them: a thread encodes it, and the event loop serves others meanwhile
+        body = await asyncio.to_thread(_encoded, error, request.state.id)
+    else:
+        body = _encoded(error, request.state.id)
     return Response(body, problem.model_fields["status"].default, headers, PROBLEM_MEDIA_TYPE)
+
+
+def _encoded(error: Exception, request_id: str) -> bytes:
+    return json_document(problem_content(error, request_id))
 
 
 def result_response(result: TaskResult) -> Response:

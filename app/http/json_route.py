@@ -13,13 +13,20 @@ from app.exceptions import InvalidRequest
 from app.http.refused_body import RefusedBody
 
 
-class _JsonRequest(Request):
+class JsonRequest(Request):
+    """A request that reads JSON strictly."""
+
     async def json(self) -> Any:
         """The body. Raises RefusedBody."""
         try:
             return parsed_json(await self.body())
         except InvalidRequest as error:
             raise RefusedBody(error) from None
+
+
+def strictly(request: Request) -> JsonRequest:
+    """The same request, read strictly. Its body must not have been read, unless it is one already."""
+    return request if isinstance(request, JsonRequest) else JsonRequest(request.scope, request.receive)
 
 
 class JsonRoute(APIRoute):
@@ -30,6 +37,7 @@ class JsonRoute(APIRoute):
         handler = super().get_route_handler()
 
         async def strict(request: Request) -> Response:
-            return await handler(_JsonRequest(request.scope, request.receive))
+            # one that has read its body may not be replaced
+            return await handler(strictly(request))
 
         return strict

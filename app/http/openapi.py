@@ -15,10 +15,12 @@ from app.http.authentication import SCHEME
 from app.http.sites import PROBES
 from app.schemas.errors import (
     PROBLEMS,
+    Busy,
     CrossSite,
     Internal,
     ProblemDetails,
     RoleTooLow,
+    TooManyRequests,
     Unauthenticated,
     WrongHost,
 )
@@ -31,10 +33,10 @@ _REF = "#/components/schemas/{model}"
 
 
 def problem_responses(*problems: type[ProblemDetails]) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route for its problems; `internal` (500) is always among them."""
+    """The `responses` of a route for its problems. `busy`, `too-many-requests` and `internal` are always among them."""
     by_status: defaultdict[int | str, list[type[ProblemDetails]]] = defaultdict(list)
-    every: tuple[type[ProblemDetails], ...] = (*problems, Internal)
-    for problem in every:
+    every: tuple[type[ProblemDetails], ...] = (*problems, Busy, TooManyRequests, Internal)
+    for problem in dict.fromkeys(every):
         by_status[problem.model_fields["status"].default].append(problem)
     return {status: _response(same) for status, same in by_status.items()}
 
@@ -150,6 +152,12 @@ def _deadlines(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
     for path in document["paths"].values():
         for operation in path.values():
             parameters = operation.get("parameters", ())
-            fields += [parameter["schema"] for parameter in parameters if parameter["name"] == "deadline"]
+            fields += [_schema_of(parameter) for parameter in parameters if parameter["name"] == "deadline"]
     for field in filter(None, fields):
         yield from (option for option in field.get("anyOf", [field]) if option.get("type") == "number")
+
+
+def _schema_of(parameter: dict[str, Any]) -> dict[str, Any]:
+    """The schema of a parameter, given as text or as JSON."""
+    schema: dict[str, Any] = parameter.get("schema") or parameter["content"]["application/json"]["schema"]
+    return schema

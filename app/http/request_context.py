@@ -9,7 +9,7 @@ import uuid
 from collections.abc import Callable
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.access.client import Client
@@ -56,13 +56,21 @@ class RequestContext:
                 MutableHeaders(scope=message)[REQUEST_ID_HEADER] = request_id
             await send(message)
 
+        left = False
+
+        async def receive_until_left() -> Message:
+            nonlocal left
+            message = await receive()
+            left = left or (message["type"] == "http.disconnect" and not status)
+            return message
+
         began = time.perf_counter()
         asked = {"request_id": request_id, "method": scope["method"], "path": scope["path"]}
         logger.debug("received", extra=asked)
         try:
-            await self._app(scope, receive, send_with_id)
-        except ClientDisconnected:
-            status = _CLIENT_CLOSED_REQUEST
+            await self._app(scope, receive_until_left, send_with_id)
+        except (ClientDisconnected, ClientDisconnect):  # the other one: while its body was read
+            left = True
         except Exception as error:
             logger.exception("unforeseen error", extra={"request_id": request_id})
             if status:
@@ -70,6 +78,8 @@ class RequestContext:
             response = await problem_response(Request(scope), error)
             await response(scope, receive, send_with_id)
         finally:
+            if left:
+                status = _CLIENT_CLOSED_REQUEST
             duration = time.perf_counter() - began
             problem = state.get("problem")
             self._metrics.observe(scope["method"], state.get("route"), status, problem, duration)

@@ -6,15 +6,15 @@ from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas.compare import CompareRequest, CompareResponse
 from app.tasks.compare import CompareTask
 
-router = APIRouter(route_class=JsonRoute, tags=["motion"])
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 
 @router.post(

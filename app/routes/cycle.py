@@ -6,16 +6,16 @@ from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import CYCLE_PROBLEMS
 from app.schemas.cycle import CycleRequest, CycleResponse
 from app.store.store_answers import store_answers
 from app.tasks.cycle import CycleTask
 
-router = APIRouter(route_class=JsonRoute, tags=["motion"])
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 
 @router.post(

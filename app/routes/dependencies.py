@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from app.access.client import Client
-from app.engine.pool import Engine
+from app.engine.pool import ClientEngine, Engine
 from app.http.client import client_of
 from app.http.metrics import Metrics
 from app.settings import Settings
@@ -25,6 +25,10 @@ async def _settings(request: Request) -> Settings:
 async def _engine(request: Request) -> Engine:
     engine: Engine = request.app.state.engine
     return engine
+
+
+async def _client_engine(request: Request) -> ClientEngine:
+    return (await _engine(request)).of_client(client_of(request).name)
 
 
 async def _store(request: Request) -> Store:
@@ -46,10 +50,12 @@ ServiceClient = Annotated[Client, Depends(_client)]
 ServiceSettings = Annotated[Settings, Depends(_settings)]
 ServiceMetrics = Annotated[Metrics, Depends(_metrics)]
 ServiceEngine = Annotated[Engine, Depends(_engine)]
+ServiceClientEngine = Annotated[ClientEngine, Depends(_client_engine)]
+"""The engine for the requests of the client that sent this one."""
 ServiceStore = Annotated[Store, Depends(_store)]
 
 
-async def _arm_engine(engine: ServiceEngine, store: ServiceStore) -> ArmEngine:
+async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEngine:
     return ArmEngine(engine, store)
 
 

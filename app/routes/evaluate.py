@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tempfile import NamedTemporaryFile
 from typing import IO, Any, Literal
 
 from fastapi import APIRouter, Request, Response
@@ -15,6 +14,7 @@ from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.parameters import WantedFormat
 from app.routes.problem_lists import WORKER_PROBLEMS
+from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
 from app.schemas.examples.evaluate import CSV_TABLE
@@ -82,10 +82,9 @@ async def evaluate(
     kind = _KINDS.get(declared)
     if kind is None and declared not in _ANY:
         raise UnsupportedMediaType
-    with NamedTemporaryFile(prefix="joulepath-") as file:
+    longest = settings.max_deadline
+    with upload() as (file, path):
         async for chunk in request.stream():
             file.write(chunk)
-        file.flush()
-        kind = kind or _kind_of(file)
-        task = EvaluateTask(file.name, kind, dict(request.query_params), wanted, request.state.id)
-        return result_response(await unless_disconnected(request, engine.run(task, settings.max_deadline)))
+        task = EvaluateTask(path, kind or _kind_of(file), dict(request.query_params), wanted, request.state.id, longest)
+        return result_response(await unless_disconnected(request, engine.run(task, longest)))

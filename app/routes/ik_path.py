@@ -6,15 +6,16 @@ from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from app.routes.large_bodies import LargeBodyRoute
+from app.routes.parameters import deadline_of
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.ik_path import IKPathRequest, IKPathResponse
 from app.tasks.ik_path import IKPathTask
 
-router = APIRouter(route_class=JsonRoute, tags=["motion"])
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 
 @router.post(
@@ -32,5 +33,5 @@ async def follow(
     """Follows positions or poses of the TCP from a guess, each from the configuration before (Levenberg-Marquardt).
     Points that are out of reach, nearly singular or beyond the range of a joint are listed, but left out of
     `trajectory`. `POST /evaluate` takes `trajectory` unchanged."""
-    work = engine.run(IKPathTask(body, request.state.id), settings.max_deadline)
+    work = engine.run(IKPathTask(body, request.state.id), deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

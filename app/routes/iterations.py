@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Coroutine
 from functools import partial
-from tempfile import NamedTemporaryFile
 from typing import Annotated, Any, TypeVar
 
 import orjson
@@ -19,6 +18,7 @@ from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
 from app.routes.problem_lists import MOTION_PROBLEMS
+from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.request import OptimizeRequest
@@ -106,10 +106,9 @@ async def _result(
         # all candidates: suggestions start from those that were ruled out, too
         asked = asked.model_copy(update={"candidates": "all"})
         return await engine.run(OptimizeTask(asked, request_id), deadline_of(asked, max_deadline))
-    with NamedTemporaryFile(prefix="joulepath-", suffix=".json") as file:
+    with upload() as (file, path):
         file.write(asked.model_dump_json(exclude_unset=True).encode())
-        file.flush()
-        return await engine.run(EvaluateTask(file.name, "json", {}, "json", request_id), max_deadline)
+        return await engine.run(EvaluateTask(path, "json", {}, "json", request_id, max_deadline), max_deadline)
 
 
 @router.get(

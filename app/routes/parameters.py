@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol
 
 from fastapi import Depends, Header, Path, Request, Response
 
 from app.exceptions import InvalidRequest
 from app.schemas.common import KEY_HEADER
-from app.schemas.cycle import CycleRequest
 from app.schemas.examples.values import STUDY_ID
-from app.schemas.request import MotionRequest
 from app.schemas.studies import IdempotencyKey
-from app.schemas.whatif import WhatifRequest
 
 
-def deadline_of(body: MotionRequest | WhatifRequest | CycleRequest, longest: float) -> float:
+class WithDeadline(Protocol):
+    """A request with a deadline [s] that has a default."""
+
+    @property
+    def deadline(self) -> float:
+        """Wall time from its arrival [s]."""
+
+    @property
+    def model_fields_set(self) -> set[str]:
+        """Fields that it gives."""
+
+
+def deadline_of(body: WithDeadline, longest: float) -> float:
     """The deadline of a request [s]. If it has none, the default, but at most `longest`. Raises InvalidRequest."""
     given = body.deadline if "deadline" in body.model_fields_set else None
     return allowed_deadline(given, body.deadline, longest)

@@ -6,9 +6,9 @@ from fastapi import APIRouter, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -16,7 +16,7 @@ from app.schemas.pareto import ParetoRequest, ParetoResponse
 from app.store.store_answers import store_answers
 from app.tasks.pareto import ParetoTask
 
-router = APIRouter(route_class=JsonRoute, tags=["motion"])
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
 
 @router.post(

@@ -8,7 +8,7 @@ WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Validation,
     problems.UnknownRobot,
     problems.BodyTooLarge,
-    problems.Busy,
+    problems.RequestTimeout,
     problems.ShuttingDown,
     problems.DeadlineExceeded,
     problems.StoreUnavailable,
@@ -18,8 +18,9 @@ WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
 ADDING_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Validation,
     problems.BodyTooLarge,
-    problems.Busy,
+    problems.RequestTimeout,
     problems.ShuttingDown,
+    problems.DeadlineExceeded,
     problems.TooManyRobots,
     problems.StoreUnavailable,
 )

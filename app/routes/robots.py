@@ -13,9 +13,9 @@ from sqlalchemy.exc import IntegrityError
 from app.access.client import Client
 from app.exceptions import RobotExists
 from app.http.disconnect import unless_disconnected
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceClient, ServiceEngine, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import LOCATION_HEADER
 from app.routes.problem_lists import ADDING_PROBLEMS
 from app.schemas import errors as problems
@@ -28,7 +28,7 @@ from models.registry import load_robot, robot_names
 from models.robot import FrictionLaw as Law
 from models.trust import TRUST, energy_trust
 
-router = APIRouter(route_class=JsonRoute, prefix="/robots", tags=["robots"])
+router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
 
 Name = Annotated[str, Path(description="Name of the robot, from `GET /robots`.", examples=["ur5e"])]
 NewName = Annotated[OwnName, Path(description="Name of the robot.", examples=["my_arm"])]
@@ -61,7 +61,7 @@ async def add(
     response: Response,
     body: NewRobot,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceClientEngine,
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
@@ -106,7 +106,7 @@ async def put(
     name: NewName,
     body: OwnArm,
     settings: ServiceSettings,
-    engine: ServiceEngine,
+    engine: ServiceClientEngine,
     store: ServiceStore,
     client: ServiceClient,
 ) -> RobotDetail:
@@ -139,7 +139,7 @@ async def delete(name: Name, store: ServiceStore, client: ServiceClient) -> None
 
 
 async def _computed(
-    request: Request, name: str, arm: OwnArm, engine: ServiceEngine, deadline: float, client: Client
+    request: Request, name: str, arm: OwnArm, engine: ServiceClientEngine, deadline: float, client: Client
 ) -> OwnRobot:
     """The row of a user's arm. Raises InvalidProblem."""
     task = OwnRobotTask(name, arm, request.state.id)

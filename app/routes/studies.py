@@ -9,9 +9,9 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, WantedFormat, set_location
 from app.schemas import errors as problems
 from app.schemas.examples.studies import STUDY_CSV
@@ -20,7 +20,7 @@ from app.store import studies
 from app.studies.answers import as_csv, full, summary
 from app.tasks.arm_engine import robot_in
 
-router = APIRouter(route_class=JsonRoute, prefix="/studies", tags=["studies"])
+router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRoute)
 
 
 @router.post(
@@ -35,6 +35,9 @@ router = APIRouter(route_class=JsonRoute, prefix="/studies", tags=["studies"])
             problems.KeyReused,
             problems.UnknownRobot,
             problems.BodyTooLarge,
+            problems.RequestTimeout,
+            problems.ShuttingDown,
+            problems.DeadlineExceeded,
             problems.StoreUnavailable,
         ),
     },

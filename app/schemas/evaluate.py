@@ -13,6 +13,7 @@ from app.schemas.examples.values import PAPER_HOME as _HOME
 from app.schemas.examples.values import PAPER_POSE as _THERE
 from app.schemas.request import Seconds
 from app.schemas.response import BODIES, WARNINGS, MotionEnergy, SampledMotion
+from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.replay.limit_report import LimitName
 from optimizer.replay.sampler import MOST_SAMPLES
 
@@ -93,6 +94,15 @@ class EvaluateSettings(ArmRequest):
         default=None,
         ge=1e-4,
         le=3600,
+    )
+    deadline: float | None = described(
+        "Wall time from the end of the upload, including the wait for a worker. Null: the longest that the service "
+        "allows.",
+        "s",
+        10.0,
+        default=None,
+        ge=1e-3,
+        le=LONGEST_DURATION,
     )
 
 

@@ -6,6 +6,7 @@ from app.schemas.common import Answer, Pose, Response, described, part
 from app.schemas.examples.values import BOX, HOME, LABEL
 from app.schemas.response import BODIES
 from app.schemas.scene import CarriedBody, CellRequest
+from optimizer.problem.problem import LONGEST_DURATION
 
 
 class IKRequest(CellRequest):
@@ -26,6 +27,14 @@ class IKRequest(CellRequest):
         None,
         {"shape": BOX},
         default=None,
+    )
+    deadline: float = described(
+        "Wall time from the arrival of the request, including the wait for a worker.",
+        "s",
+        10.0,
+        default=10.0,
+        ge=1e-3,
+        le=LONGEST_DURATION,
     )
 
 

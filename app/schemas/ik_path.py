@@ -20,6 +20,7 @@ from app.schemas.common import (
 )
 from app.schemas.examples.ik import ARC
 from app.schemas.examples.values import HOME
+from optimizer.problem.problem import LONGEST_DURATION
 
 MAXARC = 1000
 """Largest number of points of a path."""
@@ -56,6 +57,14 @@ class IKPathRequest(RobotWithTcp):
         default=0.01,
         ge=0,
         le=1,
+    )
+    deadline: float = described(
+        "Wall time from the arrival of the request, including the wait for a worker.",
+        "s",
+        10.0,
+        default=10.0,
+        ge=1e-3,
+        le=LONGEST_DURATION,
     )
 
     @model_validator(mode="after")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest
@@ -208,6 +209,7 @@ class MotionRequest(ArmRequest):
         default=0.008,
         ge=1e-4,
         le=1,
+        validate_default=True,
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it passes, the service "
@@ -219,16 +221,20 @@ class MotionRequest(ArmRequest):
         le=LONGEST_DURATION,
     )
 
-    @model_validator(mode="after")
-    def _few_enough_samples(self) -> Self:
-        longest = self.duration.max or self.duration.min if isinstance(self.duration, DurationRange) else self.duration
-        if longest is not None and longest > self.sample_period * MOST_SAMPLES:
+    @field_validator("sample_period")
+    @classmethod
+    def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
+        duration = info.data.get("duration")
+        longest = duration.max or duration.min if isinstance(duration, DurationRange) else duration
+        if longest is not None and longest > period * MOST_SAMPLES:
+            least = math.ceil(longest / MOST_SAMPLES * 1e4) / 1e4
             raise PydanticCustomError(
                 "too_many_samples",
-                "`duration` divided by `sample_period` must be at most {most}: lengthen `sample_period`",
-                {"most": MOST_SAMPLES},
+                "An answer has at most {most} samples: for a `duration` of up to {longest} s, `sample_period` must be "
+                "at least {least} s",
+                {"most": MOST_SAMPLES, "longest": longest, "least": least},
             )
-        return self
+        return period
 
 
 class OptimizeRequest(MotionRequest):

@@ -57,7 +57,10 @@ class WhatifRequest(Request):
         default=None,
     )
     evaluate: EvaluateRequest | None = described(
-        "The base, if a motion is given: a body of `POST /evaluate`.", None, EVALUATE, default=None
+        "The base, if a motion is given: a body of `POST /evaluate`. Its `deadline` applies to each run.",
+        None,
+        EVALUATE,
+        default=None,
     )
     changes: Annotated[list[Change], Field(min_length=1, max_length=MOST_CHANGES), AfterValidator(_different)] = (
         described(

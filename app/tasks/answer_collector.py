@@ -8,7 +8,7 @@ from typing import Any
 from app.engine.result import StoredAnswer, json_document
 from app.exceptions import InvalidRequest
 
-MOST_BYTES = 1 << 27
+MOST_BYTES = 1 << 26
 """Largest total size [byte], before compression, of the answers that one result refers to."""
 
 

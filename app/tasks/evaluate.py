@@ -18,7 +18,7 @@ from app.convert.motion_csv import MotionCsv
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.problem_details import invalid_request
-from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
+from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings
 from optimizer.deadline import Deadline
 from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
 from optimizer.replay.evaluate import Evaluation, evaluate
@@ -28,24 +28,30 @@ M = TypeVar("M", EvaluateRequest, EvaluateCsvSettings)
 
 @dataclass(frozen=True)
 class EvaluateTask:
-    """A received body in `file`, of the media type `kind`, and the query's parameters; the answer's is `wanted`."""
+    """A received body in `file`, of the media type `kind`, and the query's parameters; the answer's is `wanted`.
+
+    `longest`: most that the body may ask for as its deadline, and what it gets if it asks for none [s].
+    """
 
     file: str
     kind: Literal["json", "csv"]
     query: dict[str, str]
     wanted: Literal["json", "csv"]
     request_id: str
+    longest: float
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
-        end = Deadline.after(deadline)
-        robot, result = self._evaluate_csv(end) if self.kind == "csv" else self._evaluate_json(end)
+        # when the request began to wait for a worker
+        began = Deadline.after(deadline - self.longest)
+        robot, result = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
         if self.wanted == "csv":
             return TaskResult.of_csv(to_csv_table(result))
         return TaskResult.of_json(to_evaluate_response(self.request_id, robot, result))
 
-    def _evaluate_csv(self, end: Deadline) -> tuple[str, Evaluation]:
+    def _evaluate_csv(self, began: Deadline) -> tuple[str, Evaluation]:
         settings = csv_settings(self.query)
+        end = self._end(settings, began)
         try:
             arm = to_arm(settings)
             with Path(self.file).open("rb") as file:
@@ -57,13 +63,20 @@ class EvaluateTask:
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
         return settings.robot, result
 
-    def _evaluate_json(self, end: Deadline) -> tuple[str, Evaluation]:
+    def _evaluate_json(self, began: Deadline) -> tuple[str, Evaluation]:
         if self.query:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
+        end = self._end(request, began)
         return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
+
+    def _end(self, asked: EvaluateSettings, began: Deadline) -> Deadline:
+        """Raises InvalidProblem if the body asks for more than it may."""
+        if asked.deadline is not None and asked.deadline > self.longest:
+            raise InvalidProblem("deadline", f"deadline must be at most {self.longest:g} s.")
+        return began.earlier_by(-(asked.deadline or self.longest))
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import signal
 from importlib import import_module
 
-from app.tasks import compare, cycle, evaluate, ik_path, optimize, pareto, whatif
+from app.tasks import compare, cycle, evaluate, ik, ik_path, optimize, own_robot, pareto, read_body, whatif
 
-__all__ = ["compare", "cycle", "evaluate", "ik_path", "optimize", "pareto", "whatif"]
+__all__ = ["compare", "cycle", "evaluate", "ik", "ik_path", "optimize", "own_robot", "pareto", "read_body", "whatif"]
 
 # imported where it is called, because the process that answers HTTP does not need it
 import_module("toppra")
+# whose fields messages about large bodies name
+import_module("app.schemas.studies")
 
 # SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
 # end the workers, which must last until the requests in flight are answered.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -163,7 +164,8 @@ class _Evaluated(_Work):
         return _located(lambda: to_arm(_changed(asked, change)), f"changes.{k}.arm", change)
 
     def _evaluate(self, arm: Arm, asked: EvaluateRequest) -> Evaluation:
-        return evaluate(arm, to_motion(asked), asked.sample_period, self.shares.next())
+        deadline = min(asked.deadline or math.inf, self.shares.next())
+        return evaluate(arm, to_motion(asked), asked.sample_period, deadline)
 
     def _row(self, asked: EvaluateRequest, k: int, content: dict[str, Any], arm: Arm) -> dict[str, Any]:
         change = self.request.changes[k]

@@ -14,8 +14,8 @@ from optimizer.energy.plant import Plant
 from optimizer.exceptions import InvalidProblem
 from optimizer.replay.piecewise_motion import PiecewiseMotion
 
-MOST_SAMPLES = 100_000
-"""Most samples that are returned."""
+MOST_SAMPLES = 20_000
+"""Most samples that are returned: some 13 MB of JSON for six joints."""
 # a remainder of a period below this fraction of it is rounding, not a sample
 PERIOD_ROUNDING = 1e-6
 

@@ -27,12 +27,24 @@ class Validation(ProblemDetails):
 
 
 class Busy(ProblemDetails):
-    """All workers are taken and the queue is full. Try again after the time [s] in the header `Retry-After`."""
+    """All workers are taken and the queue is full, or the service has as many connections, or bytes of bodies and
+    answers in flight, as it may. Try again after the time [s] in the header `Retry-After`."""
 
     retry_after: ClassVar[int | None] = 2
     type: Literal["/problems/busy"] = fixed("type", "/problems/busy")
     title: Literal["Busy"] = fixed("title", "Busy")
     status: Literal[503] = fixed("status", 503)
+
+
+class TooManyRequests(ProblemDetails):
+    """You have your share of the service: of requests in flight and waiting, of connections, or of bytes of bodies and
+    answers in flight; `detail` says of which. Others are served meanwhile. Wait for your answers, read them, and send
+    fewer requests at a time. Try again after the time [s] in the header `Retry-After`."""
+
+    retry_after: ClassVar[int | None] = 2
+    type: Literal["/problems/too-many-requests"] = fixed("type", "/problems/too-many-requests")
+    title: Literal["Too many requests"] = fixed("title", "Too many requests")
+    status: Literal[429] = fixed("status", 429)
 
 
 class NotReady(ProblemDetails):
@@ -210,6 +222,24 @@ class BodyTooLarge(ProblemDetails):
     type: Literal["/problems/body-too-large"] = fixed("type", "/problems/body-too-large")
     title: Literal["Body too large"] = fixed("title", "Body too large")
     status: Literal[413] = fixed("status", 413)
+
+
+class HeadTooLarge(ProblemDetails):
+    """The request's line and headers exceed `JOULEPATH_MAX_HEAD_BYTES`. Requests to this service need few headers:
+    leave out cookies and headers that it does not use. The connection is closed."""
+
+    type: Literal["/problems/head-too-large"] = fixed("type", "/problems/head-too-large")
+    title: Literal["Request head too large"] = fixed("title", "Request head too large")
+    status: Literal[431] = fixed("status", 431)
+
+
+class RequestTimeout(ProblemDetails):
+    """The request did not arrive in time: its line and headers within `JOULEPATH_HEAD_TIMEOUT`, its body within
+    `JOULEPATH_BODY_TIMEOUT`. Send it again, over a faster connection or with a smaller body."""
+
+    type: Literal["/problems/request-timeout"] = fixed("type", "/problems/request-timeout")
+    title: Literal["Request not received in time"] = fixed("title", "Request not received in time")
+    status: Literal[408] = fixed("status", 408)
 
 
 class UnsupportedMediaType(ProblemDetails):

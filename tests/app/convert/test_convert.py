@@ -55,10 +55,10 @@ def test_quaternion_is_x_y_z_w_and_normalised() -> None:
 @pytest.mark.parametrize(
     ("fields", "expected"),
     [
-        ({}, (None, 600.0)),
-        ({"duration": None, "sample_period": 1e-4}, (None, 10.0)),
+        ({}, (None, 160.0)),
+        ({"duration": None, "sample_period": 1e-4}, (None, 2.0)),
         ({"duration": 2}, (2, 2)),
-        ({"duration": {"min": 2.0}}, (2.0, 600.0)),
+        ({"duration": {"min": 2.0}, "sample_period": 0.1}, (2.0, 600.0)),
         ({"duration": {"min": 1.0, "max": 2.0}}, (1.0, 2.0)),
         ({"duration": {"max": 2.0}, "objective": "mechanical"}, (None, 2.0)),
     ],

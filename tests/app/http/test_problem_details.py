@@ -57,6 +57,9 @@ SERVICE_ERRORS: list[ServiceError] = [
     service.NotOwner("press_shop"),
     service.NotOwner(None),
     *(kind() for kind in (service.UnsupportedCoding, service.NotAcceptable, service.MalformedHttp)),
+    *(kind() for kind in (service.TooManyRequests, service.TooManyConnections, service.TooManyConnectionsOfClient)),
+    *(kind() for kind in (service.TooManyBytes, service.TooManyBytesOfClient)),
+    *(service.HeadTooLarge(32_768), service.RequestTimeout(10.0)),
 ]
 
 

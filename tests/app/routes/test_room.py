@@ -7,7 +7,7 @@ from pathlib import Path
 
 from app import routes
 
-SHARED = {"dependencies", "parameters", "problem_lists"}
+SHARED = {"dependencies", "large_bodies", "parameters", "problem_lists", "uploads"}
 FILES = sorted(Path(routes.__path__[0]).glob("*.py"))
 
 

@@ -1,0 +1,74 @@
+"""Routes whose large JSON bodies are read in a worker."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Coroutine
+from functools import wraps
+from typing import Annotated, Any
+
+from fastapi import Depends, Request, Response
+from fastapi.routing import APIRoute
+from pydantic import BaseModel
+
+from app.http.disconnect import unless_disconnected
+from app.http.json_route import JsonRoute, strictly
+from app.routes.dependencies import ServiceClientEngine, ServiceSettings
+from app.tasks.read_body import HeldBody, ReadBodyTask, held
+
+LARGE = 1 << 16
+"""Size of a body [byte] above which a worker reads it. The largest that is read here takes a few milliseconds."""
+
+_NAME = "body"
+"""Name of the parameter of a route that gets the body."""
+
+
+class LargeBodyRoute(JsonRoute):
+    """A route that gets a `HeldBody` in place of its model if the body is large. Its model has one JSON body."""
+
+    def __init__(self, path: str, endpoint: Callable[..., Any], **options: Any) -> None:
+        signature = inspect.signature(endpoint, eval_str=True)
+        self._for_large: APIRoute | None = None
+        if _NAME in signature.parameters:
+            model = signature.parameters[_NAME].annotation
+            self._for_large = APIRoute(path, _taking_held(endpoint, signature, model), **options)
+        super().__init__(path, endpoint, **options)
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler of a request, which depends on the size of its body."""
+        handle = super().get_route_handler()
+        if self._for_large is None:
+            return handle
+        handle_large = self._for_large.get_route_handler()
+
+        async def handle_either(request: Request) -> Response:
+            request = strictly(request)
+            is_large = _is_json(request) and len(await request.body()) > LARGE
+            return await (handle_large if is_large else handle)(request)
+
+        return handle_either
+
+
+def _is_json(request: Request) -> bool:
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower() == "application/json"
+
+
+def _taking_held(
+    endpoint: Callable[..., Any], signature: inspect.Signature, model: type[BaseModel]
+) -> Callable[..., Any]:
+    """The endpoint, with its body from a worker."""
+
+    async def body(request: Request, settings: ServiceSettings, engine: ServiceClientEngine) -> HeldBody:
+        task = ReadBodyTask(model, await request.body(), request.state.id)
+        return held(await unless_disconnected(request, engine.run(task, settings.max_deadline)))
+
+    @wraps(endpoint)
+    async def taking_held(**arguments: Any) -> Any:
+        return await endpoint(**arguments)
+
+    parameters = [
+        each.replace(annotation=Annotated[Any, Depends(body)] if each.name == _NAME else each.annotation)
+        for each in signature.parameters.values()
+    ]
+    taking_held.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return taking_held

@@ -1,0 +1,35 @@
+"""POST /ik in a worker, because its meshes may take seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.convert.arm import robot_named
+from app.convert.ik import to_collision_arm, to_ik_response
+from app.convert.pose import to_matrix
+from app.engine.result import TaskResult
+from app.schemas.ik import IKRequest
+from optimizer.collision.model import collision_model
+from optimizer.kinematics.inverse import required_inverse_kinematics
+
+
+@dataclass(frozen=True)
+class IKTask:
+    """A validated request and its id."""
+
+    request: IKRequest
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of `POST /ik`. `deadline` is not watched: the engine ends what takes longer."""
+        request = self.request
+        robot = robot_named(request.robot)
+        kinematics = required_inverse_kinematics(robot, "pose")
+        solutions = kinematics.solve(
+            to_matrix(request.pose), to_matrix(request.tcp), robot.limits, request.windings, "goal"
+        )
+        model = collision_model(to_collision_arm(request, robot))
+        contacts = model.closest_pairs([solution.q for solution in solutions])
+        return TaskResult.of_json(
+            to_ik_response(request, self.request_id, robot, solutions, contacts, kinematics.complete)
+        )

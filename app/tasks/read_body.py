@@ -1,0 +1,61 @@
+"""Reads and validates a large JSON body in a worker: it would hold up every other request in the service's process."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from app.convert.json_text import parsed_json
+from app.engine.result import TaskResult
+from app.http.problem_details import invalid_request
+
+_SMALL = 1024
+"""Most bytes, pickled, of a field that the service's process gets to see."""
+
+
+class HeldBody:
+    """A validated body that stays pickled until it comes to a worker, as part of a task: there it is the model itself.
+
+    Small fields can be read here. Others are an ellipsis: one can only see that they are not None.
+    """
+
+    def __init__(self, pickled: bytes, fields: dict[str, Any], given: set[str]) -> None:
+        self._pickled = pickled
+        self._fields = fields
+        self.model_fields_set = given
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "_fields" or name not in self._fields:
+            raise AttributeError(name)
+        return self._fields[name]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return pickle.loads, (self._pickled,)
+
+
+@dataclass(frozen=True)
+class ReadBodyTask:
+    """A JSON body as received, its schema, and the request's id."""
+
+    model: type[BaseModel]
+    body: bytes
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The content of a HeldBody. `deadline` is not watched: it takes a second at most. Raises InvalidRequest."""
+        try:
+            read = self.model.model_validate(parsed_json(self.body), from_attributes=True)  # as FastAPI does
+        except ValidationError as error:
+            raise invalid_request(error, "body") from None
+        fields = {name: getattr(read, name) for name in type(read).model_fields}
+        seen = {name: value if len(pickle.dumps(value)) <= _SMALL else ... for name, value in fields.items()}
+        content = (pickle.dumps(read), seen, read.model_fields_set)
+        return TaskResult(pickle.dumps(content), "application/x-python-pickle")
+
+
+def held(result: TaskResult) -> HeldBody:
+    """The body that a ReadBodyTask has read."""
+    return HeldBody(*pickle.loads(result.document))

@@ -1,0 +1,121 @@
+"""What an attack does to a service: memory of its main process, times for `/healthz`, answers of an honest client."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import multiprocessing
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+from benchmarks.attack_bodies import move
+from benchmarks.service import Client, Service, resident
+
+HONEST, PROBE = "127.0.0.1", "127.0.0.2"
+PROBE_PERIOD = 0.025  # between two requests for /healthz [s]
+SETTLING = 3.0  # from the end of an attack to the last measurement of memory [s]
+
+Attack = Callable[[int], Awaitable[str]]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Memory of the main process [MiB], times for `/healthz` [ms], answers of the honest client, and what was seen."""
+
+    attack: str
+    before: float
+    peak: float
+    after: float
+    healthz_p99: float
+    healthz_most: float
+    answered: int
+    refused: int
+    honest_most: float
+    seen: str
+
+
+def probe(port: int, pipe: Connection) -> None:
+    """Times of `/healthz` [s], until the pipe is written to."""
+    walls: list[float] = []
+    client = Client(port, PROBE)
+    while not pipe.poll(PROBE_PERIOD):
+        began = time.perf_counter()
+        with contextlib.suppress(OSError, Exception):
+            client.get("/healthz")
+        walls.append(time.perf_counter() - began)
+    pipe.send(walls)
+
+
+def honest(port: int, pipe: Connection) -> None:
+    """Status and time [s] of each request of a client that waits for its answers, until the pipe is written to."""
+    answers: list[tuple[int, float]] = []
+    client = Client(port, HONEST)
+    while not pipe.poll(0.1):
+        began = time.perf_counter()
+        try:
+            status = client.optimize(move()).status
+        except Exception:  # any failure loses the answer
+            status = 0
+        answers.append((status, time.perf_counter() - began))
+    pipe.send(answers)
+
+
+@contextmanager
+def beside(target: Callable[[int, Connection], None], port: int) -> Iterator[Callable[[], list[Any]]]:
+    """Runs `target` in a process of its own, so that it does not wait for the attacker; gives what ends it."""
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=target, args=(port, theirs), daemon=True)
+    process.start()
+
+    def end() -> list[Any]:
+        ours.send(None)
+        result: list[Any] = ours.recv()
+        return result
+
+    try:
+        yield end
+    finally:
+        process.kill()
+
+
+def observed(name: str, attack: Attack, service: Service) -> Outcome:
+    """The attack's outcome."""
+    pid = service.process.pid
+    memory = [resident(pid)]
+
+    async def run() -> str:
+        async def measure() -> None:
+            while True:
+                memory.append(resident(pid))
+                await asyncio.sleep(0.05)
+
+        measuring = asyncio.create_task(measure())
+        try:
+            return await attack(service.port)
+        finally:
+            measuring.cancel()
+
+    with beside(probe, service.port) as end_probe, beside(honest, service.port) as end_honest:
+        time.sleep(2.0)
+        seen = asyncio.run(run())
+        walls, answers = end_probe(), end_honest()
+    time.sleep(SETTLING)
+    return Outcome(
+        name,
+        memory[0],
+        max(memory),
+        resident(pid),
+        float(np.percentile(walls, 99)) * 1e3,
+        max(walls) * 1e3,
+        sum(status == 200 for status, _ in answers),
+        sum(status != 200 for status, _ in answers),
+        max((wall for _, wall in answers), default=0.0),
+        seen,
+    )

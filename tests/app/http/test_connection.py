@@ -1,0 +1,167 @@
+"""Ceilings of connections over a real socket: heads, bodies, answers that nobody reads, and how many there may be."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from app.schemas.errors import Busy, HeadTooLarge, RequestTimeout, ShuttingDown, TooManyRequests
+from tests.app.live import ANSWER, EXIT, Server, serving
+from tests.app.raw import answer_on, connected, ends, is_reset, post
+
+MOST_HEAD = 4096
+MOST, MOST_OF_CLIENT = 12, 8
+OTHER, THIRD = "127.0.0.2", "127.0.0.3"
+SHORT = 0.5
+"""Times that clients have [s]. Whoever keeps them sends at once; no test waits for one to pass, but for its effect."""
+GET = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n"
+
+
+@pytest.fixture(scope="module")
+def strict() -> Iterator[Server]:
+    """A server with low ceilings. Its workers are not waited for."""
+    limits = {"max_head_bytes": MOST_HEAD, "max_connections": MOST, "client_connections": MOST_OF_CLIENT}
+    times = {"head_timeout": SHORT, "body_timeout": SHORT, "write_timeout": SHORT}
+    with serving(warm=False, workers=1, **limits, **times) as server:
+        server.wait_listening()
+        yield server
+
+
+@pytest.fixture(autouse=True)
+def _nobody_is_connected(strict: Server) -> None:
+    """Those of the test before are gone: as many as may be can connect."""
+
+    def all_fit() -> bool:
+        with ExitStack() as stack:
+            connections = [stack.enter_context(connected(strict)) for _ in range(MOST_OF_CLIENT)]
+            for connection in connections:
+                connection.sendall(GET)
+            return all(answer_on(connection).status == 200 for connection in connections)
+
+    until(all_fit)
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + ANSWER
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b"GET /healthz HTTP/1.1\r\nX: " + b"a" * (MOST_HEAD + 1),
+        b"GET /healthz HTTP/1.1\r\n" + b"X: y\r\n" * MOST_HEAD,
+        b"GET /healthz HTTP/1.1\r\nX: " + b"a" * MOST_HEAD + b"\r\n\r\n",
+        b"GET /" + b"a" * MOST_HEAD + b" HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"\r\n" * MOST_HEAD,
+        GET + b"GET /healthz HTTP/1.1\r\nX: " + b"a" * 300_000,
+    ],
+    ids=["one line", "many lines", "complete", "path", "empty lines", "after another request"],
+)
+def test_a_large_head_is_refused(strict: Server, head: bytes) -> None:
+    with connected(strict) as connection:
+        connection.sendall(head)
+        answer = answer_on(connection)
+        if head.startswith(GET) and answer.status == 200:
+            answer = answer_on(connection)
+        HeadTooLarge.model_validate(answer.problem)
+        assert str(MOST_HEAD) in answer.problem["detail"]
+        assert ends(connection)
+
+
+def test_large_trailers_are_refused(strict: Server) -> None:
+    head = b"POST /optimize HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n"
+    with connected(strict) as connection:
+        connection.sendall(head + b"1\r\n{\r\n0\r\n")
+        until(lambda: any(entry.get("path") == "/optimize" for entry in strict.logged()))
+        connection.sendall(b"X: " + b"a" * 2 * MOST_HEAD)
+        HeadTooLarge.model_validate(answer_on(connection).problem)
+
+
+def test_a_head_of_the_largest_size_is_taken(strict: Server) -> None:
+    with connected(strict) as connection:
+        value = b"a" * (MOST_HEAD - len("/healthz") - len("X: \r\n"))
+        connection.sendall(b"GET /healthz HTTP/1.1\r\nX: " + value + b"\r\n\r\n")
+        assert answer_on(connection).status == 200
+
+
+@pytest.mark.parametrize("sent", [b"", b"G", b"GET / HTTP/1.1\r\nX: y\r\n", b"\r\n", GET + b"GET /h"])
+def test_half_a_head_is_not_waited_for(strict: Server, sent: bytes) -> None:
+    with connected(strict) as connection:
+        connection.sendall(sent)
+        if sent.startswith(GET):
+            assert answer_on(connection).status == 200
+        RequestTimeout.model_validate(answer_on(connection).problem)
+        assert ends(connection)
+
+
+@pytest.mark.parametrize("path", ["/optimize", "/evaluate", "/robots"])
+def test_half_a_body_is_not_waited_for(strict: Server, path: str) -> None:
+    with connected(strict) as connection:
+        connection.sendall(post(path, b"{", declared=1000))
+        RequestTimeout.model_validate(answer_on(connection).problem)
+        assert ends(connection)
+    assert strict.request_logged(path)["status"] == 408
+
+
+def test_a_body_that_nobody_reads_is_not_waited_for(strict: Server) -> None:
+    with connected(strict) as connection:
+        connection.sendall(post("/nowhere", b"{", declared=1000))
+        assert answer_on(connection).status == 404
+        assert ends(connection)
+
+
+def test_an_answer_that_is_not_read_is_thrown_away(strict: Server) -> None:
+    with connected(strict, receive_buffer=4096) as connection:
+        # more than the buffers of both sockets hold
+        connection.sendall(b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 16)
+        assert is_reset(connection)
+
+
+def test_requests_far_ahead_of_their_answers_are_refused(strict: Server) -> None:
+    with connected(strict) as connection:
+        connection.sendall(GET * 1000)
+        assert ends(connection)
+    assert strict.get("/healthz").status_code == 200
+
+
+def test_one_client_has_its_share_of_connections(strict: Server) -> None:
+    with ExitStack() as stack:
+        own = [stack.enter_context(connected(strict)) for _ in range(MOST_OF_CLIENT)]
+        with connected(strict) as further:
+            answer = answer_on(further)
+            TooManyRequests.model_validate(answer.problem)
+            assert int(answer.headers["retry-after"]) > 0
+        others = [stack.enter_context(connected(strict, OTHER)) for _ in range(MOST - MOST_OF_CLIENT)]
+        for connection in (*own, *others):
+            connection.sendall(GET)
+            assert answer_on(connection).status == 200
+        with connected(strict, THIRD) as further:
+            Busy.model_validate(answer_on(further).problem)
+
+
+def test_sigterm_waits_for_no_client() -> None:
+    # the grace is longer than the test waits: what is open has to be ended before
+    with (
+        serving(workers=1, shutdown_grace=10 * EXIT, write_timeout=SHORT) as server,
+        connected(server) as half_a_head,
+        connected(server) as upload,
+        connected(server) as body,
+        connected(server, receive_buffer=4096) as unread,
+    ):
+        half_a_head.sendall(b"GET /heal")
+        upload.sendall(post("/evaluate", b"{", declared=1000))
+        body.sendall(post("/optimize", b"{", declared=1000))
+        unread.sendall(b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 16)
+        until(lambda: sum(entry["message"] == "received" for entry in server.logged() if "path" in entry) >= 3)
+        server.process.send_signal(signal.SIGTERM)
+        for connection in (upload, body):
+            ShuttingDown.model_validate(answer_on(connection).problem)
+        assert server.process.wait(EXIT) == 0
+        assert not [entry for entry in server.logged() if entry["level"] == "error"]

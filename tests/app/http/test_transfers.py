@@ -1,0 +1,116 @@
+"""Bytes in flight over a real socket: bodies and answers for which there is no room, and clients that leave."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.exceptions import TooManyBytes, TooManyBytesOfClient
+from app.http.transfers import BytesInFlight
+from app.schemas.errors import Busy, TooManyRequests
+from tests.app.live import ANSWER, Server, serving
+from tests.app.raw import RawAnswer, answer_on, connected, post
+
+BODY = 1 << 20
+OTHER, THIRD = "127.0.0.2", "127.0.0.3"
+
+
+@pytest.fixture(scope="module")
+def tight() -> Iterator[Server]:
+    """A server with room for three large bodies, two of them of one client. Its workers are not waited for."""
+    with serving(
+        warm=False, workers=1, max_bytes_in_flight=3 * BODY + 100_000, client_bytes_in_flight=2 * BODY + 100_000
+    ) as server:
+        server.wait_listening()
+        yield server
+
+
+def until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + ANSWER
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def begun(server: Server, stack: ExitStack, path: str, address: str) -> None:
+    """A body of which the service has received the first byte; it keeps its place until the stack ends."""
+    count = len(received(server, path))
+    stack.enter_context(connected(server, address)).sendall(post(path, b"{", declared=BODY))
+    until(lambda: len(received(server, path)) > count)
+
+
+def received(server: Server, path: str) -> list[dict[str, Any]]:
+    return [entry for entry in server.logged() if entry["message"] == "received" and entry["path"] == path]
+
+
+def left(server: Server, path: str) -> list[dict[str, Any]]:
+    """Lines of the log about requests whose clients left."""
+    return [entry for entry in server.logged() if entry.get("status") == 499 and entry["path"] == path]
+
+
+def asked(server: Server, address: str, request: bytes) -> RawAnswer:
+    with connected(server, address) as connection:
+        connection.sendall(request)
+        return answer_on(connection)
+
+
+@pytest.mark.parametrize("path", ["/optimize", "/evaluate", "/robots"])
+def test_bodies_count_against_a_share_and_a_total(tight: Server, path: str) -> None:
+    gone = len(left(tight, path))
+    with ExitStack() as stack:
+        for _ in range(2):
+            begun(tight, stack, path, "127.0.0.1")
+        refused = asked(tight, "127.0.0.1", post(path, b"{", declared=BODY))
+        TooManyRequests.model_validate(refused.problem)
+        assert int(refused.headers["retry-after"]) > 0
+        begun(tight, stack, path, OTHER)
+        Busy.model_validate(asked(tight, THIRD, post(path, b"{", declared=BODY)).problem)
+        # small ones still fit
+        assert asked(tight, THIRD, post("/optimize", b"{}")).status == 422
+        assert asked(tight, THIRD, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").status == 200
+        # and an answer, too, needs room
+        large = b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n"
+        TooManyRequests.model_validate(asked(tight, "127.0.0.1", large).problem)
+        Busy.model_validate(asked(tight, THIRD, large).problem)
+    until(lambda: len(left(tight, path)) == gone + 3)
+    assert asked(tight, "127.0.0.1", large).status == 200, "whoever leaves gives its bytes back"
+
+
+@pytest.mark.parametrize("path", ["/optimize", "/evaluate", "/studies/x/iterations"])
+def test_leaving_during_an_upload_is_one_line_in_the_log(tight: Server, path: str) -> None:
+    before = len(tight.logged())
+    gone = len(left(tight, path))
+    with ExitStack() as stack:
+        begun(tight, stack, path, OTHER)
+    until(lambda: len(left(tight, path)) > gone)
+    lines = [entry for entry in tight.logged()[before:] if entry["level"] != "debug" and "worker" not in str(entry)]
+    (line,) = [entry for entry in lines if entry["logger"].startswith(("app.request", "uvicorn"))]
+    assert (line["level"], line["status"]) == ("info", 499)
+
+
+def test_a_killed_service_leaves_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with serving(warm=False, workers=1) as server, ExitStack() as stack:
+        server.wait_listening()
+        begun(server, stack, "/evaluate", OTHER)
+        server.process.kill()
+        server.process.wait()
+        assert not [path for path in tmp_path.rglob("*") if path.is_file() and path.name.startswith("joulepath-")]
+
+
+def test_what_is_released_can_be_held_again() -> None:
+    in_flight = BytesInFlight(most=100, most_of_client=60)
+    in_flight.add("a", 60)
+    with pytest.raises(TooManyBytesOfClient):
+        in_flight.add("a", 1)
+    with pytest.raises(TooManyBytes):
+        in_flight.add("b", 41)
+    in_flight.add("b", 40)
+    in_flight.release("a", 60)
+    in_flight.add("b", 20)
+    in_flight.add("a", 40)

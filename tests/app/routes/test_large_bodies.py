@@ -1,0 +1,97 @@
+"""A body that a worker reads gets the same answer as one that the service reads itself."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.routes.large_bodies import LARGE
+from app.schemas.examples import BODY_EXAMPLES
+from app.schemas.request import OptimizeRequest
+from app.tasks.read_body import HeldBody, ReadBodyTask, held
+from tests.app.requests import AMPLE, HOME, move
+
+POSE = {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}
+SCAN = {"name": "scan", "shape": "points", "points": [[1.5, 0.001 * k, 0.5] for k in range(5000)], "radius": 0.01}
+SCENE = {"obstacles": [SCAN]}
+CHANGE = {"name": "light", "arm": {"link_mass_scale": 0.5}}
+ANSWERED: dict[str, list[dict[str, Any]]] = {
+    "/optimize": [move(), move(scene=SCENE)],
+    "/ik": [{"pose": POSE}, {"pose": POSE, "scene": SCENE}],
+    "/ik/path": [BODY_EXAMPLES["/ik/path"]["application/json"]["positions"]["value"]],
+    "/compare": [move(methods=["bspline", "time_scaling"])],
+    "/pareto": [move(points=3)],
+    "/cycle": [BODY_EXAMPLES["/cycle"]["application/json"]["pick_and_place"]["value"] | {"deadline": AMPLE}],
+    "/whatif": [
+        {
+            "optimize": move(scene=SCENE),
+            "changes": [{"name": "light", "arm": {"link_mass_scale": 0.5}}],
+            "deadline": AMPLE,
+        }
+    ],
+    "/studies": [{"name": "large", "objective": "electrical", "threshold": 1.0}],
+}
+REFUSED: list[tuple[str, Any]] = [
+    ("/optimize", {}),
+    ("/optimize", []),
+    ("/optimize", move(goall=1)),
+    ("/optimize", move(deadline=599)),
+    ("/optimize", move(robot="r2d2")),
+    ("/optimize", move(start={"q": [9.0, *HOME[1:]]})),
+    ("/ik", {"pose": POSE | {"position": [9.0, 0.0, 0.0]}}),
+    ("/robots", {"name": "UR5e"}),
+    ("/robots", {"name": "ur5e"}),
+    ("/studies", {"name": ""}),
+    ("/cycle", {"start": {"q": HOME}, "stops": [{"target": {"q": [9.0, *HOME[1:]]}}]}),
+]
+
+
+def sent(client: TestClient, path: str, body: bytes) -> tuple[int, Any]:
+    """Status and content of the answer, without what differs from one request to the next."""
+    answer = client.post(path, content=body, headers={"content-type": "application/json"})
+    content = answer.json()
+    return answer.status_code, {name: value for name, value in content.items() if name not in ("id", "instance")}
+
+
+def padded(body: bytes) -> bytes:
+    """The same JSON, but large."""
+    return b" " * LARGE + body
+
+
+@pytest.mark.parametrize(
+    ("path", "body"), [(path, body) for path, bodies in ANSWERED.items() for body in bodies], ids=lambda x: str(x)[:30]
+)
+def test_is_answered(client: TestClient, path: str, body: dict[str, Any]) -> None:
+    small = json.dumps(body).encode()
+    status, content = sent(client, path, padded(small))
+    assert status in (200, 201), content
+    if len(small) < LARGE and path in ("/ik", "/ik/path"):  # these are the same every time
+        assert (status, content) == sent(client, path, small)
+
+
+@pytest.mark.parametrize(("path", "body"), REFUSED)
+def test_is_refused_as_a_small_one(client: TestClient, path: str, body: Any) -> None:
+    small = json.dumps(body).encode()
+    assert sent(client, path, padded(small)) == sent(client, path, small)
+
+
+@pytest.mark.parametrize("body", [b"{", b"\xff", b"[" * LARGE, b"9" * LARGE])
+def test_survives_what_is_no_json(client: TestClient, body: bytes) -> None:
+    status, content = sent(client, "/optimize", padded(body))
+    assert (status, content["type"]) == (422, "/problems/validation")
+    assert content["errors"]
+
+
+def test_large_fields_stay_pickled() -> None:
+    body = move(scene=SCENE)
+    request = held(ReadBodyTask(OptimizeRequest, json.dumps(body).encode(), "the-id").run(AMPLE))
+    assert isinstance(request, HeldBody)
+    assert (request.robot, request.deadline, request.scene) == ("ur5e", AMPLE, Ellipsis)
+    assert request.model_fields_set == set(body)
+    with pytest.raises(AttributeError):
+        _ = request.no_field
+    assert pickle.loads(pickle.dumps(request)) == OptimizeRequest.model_validate(body)
