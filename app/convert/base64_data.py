@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 
 from optimizer.exceptions import InvalidProblem
 
@@ -12,5 +11,7 @@ def decoded(data: str, field: str) -> bytes:
     """The bytes of a field in base64. Raises InvalidProblem at that field."""
     try:
         return base64.b64decode(data, validate=True)
-    except binascii.Error:
-        raise InvalidProblem(field, f"{field} is not valid base64: fill it to a multiple of 4 characters.") from None
+    except ValueError:
+        raise InvalidProblem(
+            field, f"{field} is not valid base64: use its alphabet only, and fill it to a multiple of 4 characters."
+        ) from None

@@ -17,6 +17,7 @@ from app.schemas.errors import (
     PROBLEMS,
     Busy,
     CrossSite,
+    HeadTooLarge,
     Internal,
     ProblemDetails,
     RoleTooLow,
@@ -33,9 +34,9 @@ _REF = "#/components/schemas/{model}"
 
 
 def problem_responses(*problems: type[ProblemDetails]) -> dict[int | str, dict[str, Any]]:
-    """The `responses` of a route for its problems. `busy`, `too-many-requests` and `internal` are always among them."""
+    """The `responses` of a route for its problems. Those of every request are always among them."""
     by_status: defaultdict[int | str, list[type[ProblemDetails]]] = defaultdict(list)
-    every: tuple[type[ProblemDetails], ...] = (*problems, Busy, TooManyRequests, Internal)
+    every: tuple[type[ProblemDetails], ...] = (*problems, HeadTooLarge, Busy, TooManyRequests, Internal)
     for problem in dict.fromkeys(every):
         by_status[problem.model_fields["status"].default].append(problem)
     return {status: _response(same) for status, same in by_status.items()}

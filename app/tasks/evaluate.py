@@ -51,7 +51,7 @@ class EvaluateTask:
 
     def _evaluate_csv(self, began: Deadline) -> tuple[str, Evaluation]:
         settings = csv_settings(self.query)
-        end = self._end(settings, began)
+        end = self._end(settings, began, "query")
         try:
             arm = to_arm(settings)
             with Path(self.file).open("rb") as file:
@@ -69,13 +69,14 @@ class EvaluateTask:
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
-        end = self._end(request, began)
+        end = self._end(request, began, "body")
         return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
 
-    def _end(self, asked: EvaluateSettings, began: Deadline) -> Deadline:
-        """Raises InvalidProblem if the body asks for more than it may."""
+    def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
+        """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it may."""
         if asked.deadline is not None and asked.deadline > self.longest:
-            raise InvalidProblem("deadline", f"deadline must be at most {self.longest:g} s.")
+            msg = f"deadline must be at most {self.longest:g} s: the operator of the service has set this."
+            raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
         return began.earlier_by(-(asked.deadline or self.longest))
 
 

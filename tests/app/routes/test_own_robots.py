@@ -130,6 +130,12 @@ def test_what_makes_no_robot(client: TestClient, changes: dict[str, Any], place:
     refused(client.get("/robots/wrong"), problems.UnknownRobot)
 
 
+def test_meshes_that_are_no_base64_are_named(client: TestClient) -> None:
+    for text in ("é", "a", "a b="):
+        answer = client.put("/robots/meshed", json=ARM | {"meshes": text})
+        assert answer.status_code == 422 and "meshes is not valid base64" in answer.text
+
+
 def test_meshes_come_as_a_zip_in_base64(client: TestClient) -> None:
     urdf = ARM["urdf"].replace('<cylinder radius="0.05" length="0.3"/>', '<mesh filename="package://cell/arm.obj"/>')
     corners = [(x, y, z) for x in (-0.04, 0.04) for y in (-0.04, 0.04) for z in (-0.15, 0.15)]
