@@ -4,6 +4,7 @@ ServiceError
 ├── InvalidRequest      the request does not fit the schema
 ├── Busy                the queue is full
 │   ├── TooManyConnections, TooManyBytes          so is what the service holds in all
+│   ├── TooManyWaiting                            too many requests of jobs wait
 │   └── TooManyRequests     the client has its share of the queue
 │       └── TooManyConnectionsOfClient, TooManyBytesOfClient
 ├── NotReady            no worker is warm
@@ -14,6 +15,9 @@ ServiceError
 ├── UnknownAnswer       no stored answer has that id
 ├── UnknownStudy        no study has that id
 │   └── UnknownIteration
+├── UnknownJob          no job has that id
+├── JobNotCancellable   the job has ended
+├── TooManyDeaths       the request ended its worker process again and again
 ├── EmptyStudy          the study has no iteration yet
 ├── RobotExists         the name of a robot is taken
 ├── TooManyRobots       the service holds as many robots of users as it may
@@ -105,6 +109,12 @@ class TooManyBytesOfClient(TooManyRequests):
     )
 
 
+class TooManyWaiting(Busy):
+    """Too many requests of jobs wait."""
+
+    MESSAGE = "Too many requests of jobs wait: send this job again when others have ended, or send a smaller one."
+
+
 class NotReady(ServiceError):
     """No worker is warm."""
 
@@ -168,6 +178,27 @@ class UnknownIteration(UnknownStudy):
     """The study has no iteration of that number."""
 
     MESSAGE = "The study has no iteration of this number: GET /studies/{id} lists its iterations."
+
+
+class UnknownJob(ServiceError):
+    """No job has that id."""
+
+    MESSAGE = "No job has this id: GET /jobs lists all jobs."
+
+
+class JobNotCancellable(ServiceError):
+    """The job has ended."""
+
+    MESSAGE = "The job has ended: there is nothing left to cancel. DELETE /jobs/{id} deletes it with its answers."
+
+
+class TooManyDeaths(ServiceError):
+    """The request ended its worker process again and again."""
+
+    MESSAGE = (
+        "Each process that worked on this request died: make the request smaller, or report it with the id in "
+        "`instance`."
+    )
 
 
 class EmptyStudy(ServiceError):
@@ -325,3 +356,7 @@ class NotAcceptable(ServiceError):
 
 class ClientDisconnected(Exception):
     """The client closed the connection: nobody is left to answer."""
+
+
+class Preempted(Exception):
+    """Work that can wait had to give its worker to a caller that waits: it is to be run again."""

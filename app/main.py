@@ -28,6 +28,9 @@ from app.http.openapi import install_openapi
 from app.http.request_context import RequestContext
 from app.http.sites import known_host, same_site
 from app.http.transfers import Answers, Bodies, BytesInFlight
+from app.jobs.dispatcher import Dispatcher
+from app.jobs.executor import LocalExecutor
+from app.jobs.jobs import Jobs
 from app.routes import (
     answers,
     compare,
@@ -38,6 +41,7 @@ from app.routes import (
     ik,
     ik_path,
     iterations,
+    jobs,
     metrics,
     optimize,
     pareto,
@@ -59,6 +63,7 @@ ROUTES = (
     evaluate,
     ik,
     ik_path,
+    jobs,
     studies,
     iterations,
     suggest,
@@ -106,10 +111,14 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
     app.state.engine = engine = Engine(settings, partial(warm, settings.robots))
     app.state.store = store = Store(settings.database_url)
+    dispatcher = Dispatcher(store, LocalExecutor(engine, store), settings)
+    app.state.jobs = Jobs(store, dispatcher, settings)
     engine.start()
+    dispatcher.start()
     # in the background: requests that need no database do not wait for it
     opening = asyncio.create_task(store.open())
     yield
+    await dispatcher.stop()
     await engine.stop()
     await opening
     await store.close()
@@ -119,6 +128,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
     """Adds the middleware, the innermost first."""
     uploads = {
         "/evaluate|/robots|/robots/[^/]+": settings.max_upload_bytes,
+        "/jobs": settings.max_job_bytes,
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }
     app.add_middleware(RouteNote)

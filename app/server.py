@@ -14,6 +14,7 @@ from fastapi import FastAPI
 from app.access.start import log_access
 from app.engine.pool import Engine
 from app.http.connection import Ceilings, Connection
+from app.jobs.jobs import Jobs
 from app.main import create_app
 from app.settings import Settings
 
@@ -50,6 +51,8 @@ class _Server(uvicorn.Server):
         engine.drain()
         # the engine has ended its tasks by then, and what still is open does not read
         asyncio.get_running_loop().call_later(settings.shutdown_grace + _SETTLING_TIME, self._abort_connections)
+        jobs: Jobs = self._app.state.jobs
+        jobs.dispatcher.drain()
         await asyncio.sleep(_REFUSING_TIME)
         for server in self.servers:
             server.close()

@@ -13,6 +13,8 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 _HOST_NAME = re.compile(r"[A-Za-z0-9._-]+")
 _ORIGIN = re.compile(r"https?://([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:[0-9]{1,5})?")
+LONGEST_DEADLINE = 3600.0
+"""Longest deadline [s] that any setting allows."""
 
 
 def _default_database() -> str:
@@ -113,6 +115,21 @@ class Settings(BaseSettings):
         ge=1024,
         description="Largest body of `POST /studies/{id}/iterations` and of `POST /whatif` [byte].",
     )
+    max_job_bytes: int = Field(default=67_108_864, ge=1024, description="Largest body of `POST /jobs` [byte].")
+    job_workers: int | None = Field(
+        default=None,
+        ge=1,
+        description="Workers that jobs may use at the same time. Default: one less than there are, at least 1.",
+    )
+    max_waiting: int = Field(
+        default=100_000, ge=1, description="Requests of jobs that may wait in the database; further jobs are `busy`."
+    )
+    max_job_deadline: float = Field(
+        default=LONGEST_DEADLINE,
+        gt=0,
+        le=LONGEST_DEADLINE,
+        description="Longest deadline that a request of a job may have [s].",
+    )
     max_deadline: float = Field(
         default=120.0, gt=0, le=600, description="Longest deadline that a request may have [s]."
     )
@@ -139,6 +156,11 @@ class Settings(BaseSettings):
     answers_max_age: float = Field(
         default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."
     )
+
+    @property
+    def workers_for_jobs(self) -> int:
+        """Workers that jobs may use at the same time."""
+        return min(self.job_workers or max(1, self.workers - 1), self.workers)
 
     @field_validator("robots", "trusted_proxies", "allowed_hosts", "cors_origins", mode="before")
     @classmethod

@@ -60,6 +60,14 @@ class Client:
         self._connection.connect()
         self._connection.sock.sendall(content)
 
+    def post(self, path: str, body: Any) -> Answer:
+        """A POST with a JSON body. Raises the same errors as `get`."""
+        return self._exchange("POST", path, orjson.dumps(body))
+
+    def close(self) -> None:
+        """Closes the connection."""
+        self._connection.close()
+
     def _exchange(self, method: str, path: str, body: bytes | None) -> Answer:
         began = time.perf_counter()
         try:
@@ -124,7 +132,7 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
     given = os.environ | {"JOULEPATH_HOST": "127.0.0.1", "PORT": str(port)} | environment
     with tempfile.TemporaryFile() as log, tempfile.TemporaryDirectory() as folder:
-        given["JOULEPATH_DATABASE_URL"] = f"sqlite:///{folder}/joulepath.db"
+        given = {"JOULEPATH_DATABASE_URL": f"sqlite:///{folder}/joulepath.db"} | given
         began = time.perf_counter()
         process = subprocess.Popen([sys.executable, "-m", "app"], cwd=ROOT, env=given, stdout=log, stderr=log)
         service = Service(process, port, began, log)

@@ -52,6 +52,7 @@ class FairQueue(Generic[W]):
         self._started: list[Place[W]] = []
         self._waiting: dict[str, deque[Place[W]]] = {}
         self._idle: deque[W] = deque()
+        self._changed = asyncio.Event()
 
     @contextmanager
     def place(self, client: str) -> Iterator[Place[W]]:
@@ -85,6 +86,14 @@ class FairQueue(Generic[W]):
             self._idle.append(worker)
         self._serve()
 
+    async def spare(self) -> W:
+        """A worker that nobody waits for, as soon as there is one. It is to be given back by `put`."""
+        while True:
+            if self._next() is None and (worker := self._idle_worker()):
+                return worker
+            self._changed.clear()
+            await self._changed.wait()
+
     async def _turn(self, place: Place[W]) -> W:
         loop = asyncio.get_running_loop()
         place.granted = loop.create_future()
@@ -112,6 +121,7 @@ class FairQueue(Generic[W]):
             self._working[place.client] += 1
             assert place.granted is not None
             place.granted.set_result(worker)
+        self._changed.set()
 
     def _idle_worker(self) -> W | None:
         while self._idle:
@@ -132,6 +142,7 @@ class FairQueue(Generic[W]):
         line.remove(place)
         if line:
             self._waiting[place.client] = line
+        self._changed.set()
 
     def _claim(self, place: Place[W]) -> None:
         """Lets the client with the most workers give one back, if it has several and the place's client has none."""

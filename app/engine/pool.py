@@ -15,6 +15,7 @@ from app.engine.census import Census
 from app.engine.fair_queue import FairQueue, Place
 from app.engine.forkserver import start_forkserver
 from app.engine.result import TaskResult
+from app.engine.spare import SpareWorkers
 from app.engine.task import Task
 from app.engine.worker import Worker
 from app.exceptions import ShuttingDown, WorkerDied
@@ -44,6 +45,7 @@ class Engine:
         self._threads = ThreadPoolExecutor(2 * settings.workers, thread_name_prefix="worker-pipe")
         self._workers: set[Worker] = set()
         self._keepers: list[asyncio.Task[None]] = []
+        self.spare = SpareWorkers(self._queue, self._workers, self.census, settings.deadline_grace)
         self._first_warm = asyncio.Event()
         self._was_ready = False
         self._draining = asyncio.Event()
@@ -120,7 +122,7 @@ class Engine:
         while True:
             limit.reschedule(min(end, self._latest_end))
             async with AsyncExitStack() as turn:
-                with self.census.waits():
+                with self.census.waits(), self.spare.someone_waits():
                     worker = await turn.enter_async_context(self._queue.worker(place))
                 turn.enter_context(self.census.works())
                 # the optimiser watches the deadline and returns its best motion: the grace is for that

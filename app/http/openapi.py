@@ -27,6 +27,7 @@ from app.schemas.errors import (
 )
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from app.schemas.examples import BODY_EXAMPLES
+from app.schemas.jobs import NewJob
 from app.settings import Settings
 
 _SECURITY = "apiKey"
@@ -94,8 +95,8 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     schemas = document["components"]["schemas"]
     _, others = models_json_schema(
         [(problem, "serialization") for problem in PROBLEMS]
-        # the route reads this body itself, so that FastAPI does not know its schemas
-        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings)],
+        # the routes read these bodies themselves, so that FastAPI does not know their schemas
+        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings, NewJob)],
         ref_template=_REF,
     )
     schemas.update(others["$defs"])

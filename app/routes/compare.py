@@ -9,8 +9,10 @@ from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.large_bodies import LargeBodyRoute
+from app.routes.later import ACCEPTED, ServiceLater
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
+from app.schemas import errors as problems
 from app.schemas.compare import CompareRequest, CompareResponse
 from app.tasks.compare import CompareTask
 
@@ -21,16 +23,19 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/compare",
     summary="The same motion by several methods",
     response_model=CompareResponse,
-    responses=problem_responses(*MOTION_PROBLEMS),
+    responses={**ACCEPTED, **problem_responses(*MOTION_PROBLEMS, problems.KeyReused)},
 )
 async def compare(
     request: Request,
     body: CompareRequest,
     settings: ServiceSettings,
     engine: ServiceArmEngine,
+    later: ServiceLater,
 ) -> Response:
     """Solves one request with several methods, one after another. The answer is a table of their energies, durations
     and solve times; each motion is certified. A method that finds no motion has its problem in its row. If no method
     finds a motion, the answer is the problem of the first method in the request."""
+    if later.wanted:
+        return await later.respond("compare", body)
     work = engine.run(CompareTask(body, request.state.id), deadline_of(body, settings.max_deadline))
     return result_response(await unless_disconnected(request, work))

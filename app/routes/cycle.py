@@ -9,8 +9,10 @@ from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
+from app.routes.later import ACCEPTED, ServiceLater
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import CYCLE_PROBLEMS
+from app.schemas import errors as problems
 from app.schemas.cycle import CycleRequest, CycleResponse
 from app.store.store_answers import store_answers
 from app.tasks.cycle import CycleTask
@@ -24,7 +26,8 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     response_model=CycleResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}}}},
-        **problem_responses(*CYCLE_PROBLEMS),
+        **ACCEPTED,
+        **problem_responses(*CYCLE_PROBLEMS, problems.KeyReused),
     },
 )
 async def cycle(
@@ -35,10 +38,13 @@ async def cycle(
     engine: ServiceArmEngine,
     store: ServiceStore,
     client: ServiceClient,
+    later: ServiceLater,
 ) -> Response:
     """Finds the arm configuration at every stop of a round, and the motions between them, that need the least
     electrical energy together. The configuration at one stop decides what the moves from there cost, so that all are
     chosen at once. Each move refers to its complete answer. `Accept: text/csv` returns the samples of the round."""
+    if later.wanted:
+        return await later.respond("cycle", body)
     task = CycleTask(body, request.state.id, wanted)
     result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
     return result_response(await store_answers(store, settings, "optimize", result, client.owner))

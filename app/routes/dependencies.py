@@ -10,6 +10,7 @@ from app.access.client import Client
 from app.engine.pool import ClientEngine, Engine
 from app.http.client import client_of
 from app.http.metrics import Metrics
+from app.jobs.jobs import Jobs
 from app.settings import Settings
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
@@ -47,6 +48,14 @@ async def _client(request: Request) -> Client:
 
 ServiceClient = Annotated[Client, Depends(_client)]
 """Who sent the request."""
+
+
+async def _jobs(request: Request) -> Jobs:
+    jobs: Jobs = request.app.state.jobs
+    return jobs
+
+
+ServiceJobs = Annotated[Jobs, Depends(_jobs)]
 ServiceSettings = Annotated[Settings, Depends(_settings)]
 ServiceMetrics = Annotated[Metrics, Depends(_metrics)]
 ServiceEngine = Annotated[Engine, Depends(_engine)]

@@ -12,6 +12,7 @@ from app.http.handlers import result_response
 from app.http.json_body import FORM, TEXT
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from app.routes.later import ACCEPTED, ServiceLater, deadlines
 from app.routes.parameters import WantedFormat
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.routes.uploads import upload
@@ -19,6 +20,7 @@ from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
 from app.schemas.examples.evaluate import CSV_TABLE
 from app.tasks.evaluate import EvaluateTask
+from app.tasks.job_body import JobBodyTask
 
 router = APIRouter(tags=["motion"])
 
@@ -68,12 +70,17 @@ def _kind_of(file: IO[bytes]) -> _Kind:
     response_model=EvaluateResponse,
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": CSV_TABLE}}},
-        **problem_responses(*WORKER_PROBLEMS, problems.InvalidTable, problems.UnsupportedMediaType),
+        **ACCEPTED,
+        **problem_responses(*WORKER_PROBLEMS, problems.InvalidTable, problems.UnsupportedMediaType, problems.KeyReused),
     },
     openapi_extra=_openapi(),
 )
 async def evaluate(
-    request: Request, wanted: WantedFormat, settings: ServiceSettings, engine: ServiceArmEngine
+    request: Request,
+    wanted: WantedFormat,
+    settings: ServiceSettings,
+    engine: ServiceArmEngine,
+    later: ServiceLater,
 ) -> Response:
     """The energy of a given motion, per segment and in total, and the limits that it violates. The motion is a list of
     configurations with the times between them, or a log. It is sent as JSON, or as CSV with the settings as query
@@ -86,5 +93,9 @@ async def evaluate(
     with upload() as (file, path):
         async for chunk in request.stream():
             file.write(chunk)
-        task = EvaluateTask(path, kind or _kind_of(file), dict(request.query_params), wanted, request.state.id, longest)
+        kind = kind or _kind_of(file)
+        if later.wanted and kind == "json":
+            body = JobBodyTask(path, deadlines(settings), request.state.id, evaluate=True)
+            return await later.respond_with(await later.validated(body))
+        task = EvaluateTask(path, kind, dict(request.query_params), wanted, request.state.id, longest)
         return result_response(await unless_disconnected(request, engine.run(task, longest)))

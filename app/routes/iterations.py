@@ -81,7 +81,7 @@ async def add(
         number, again = await store.write(partial(studies.add, study_id=id, step=step, key=key, client=client))
     else:
         number, again = known, True
-    set_location(request, response, f"{id}/iterations/{number}", again)
+    set_location(request, response, f"/studies/{id}/iterations/{number}", again)
     return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
 
 

@@ -71,6 +71,6 @@ CREATED_HEADERS = {
 
 def set_location(request: Request, response: Response, path: str, again: bool) -> None:
     """Sets the headers of a response about a created resource; `again`: an earlier request with this key created it."""
-    response.headers["Location"] = f"{request.scope.get('root_path', '')}/studies/{path}"
+    response.headers["Location"] = f"{request.scope.get('root_path', '')}{path}"
     if again:
         response.headers[REPLAYED] = "true"

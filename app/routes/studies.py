@@ -57,7 +57,7 @@ async def create(
         made, again = await store.write(partial(studies.create, study=study))
     except IntegrityError:  # another process has just created the study of this key
         made, again = await store.write(partial(studies.create, study=study))
-    set_location(request, response, made.id, again)
+    set_location(request, response, f"/studies/{made.id}", again)
     return StudySummary(**summary(await store.read(partial(studies.state, study_id=made.id))))
 
 

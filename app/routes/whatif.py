@@ -9,6 +9,7 @@ from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
+from app.routes.later import ACCEPTED, ServiceLater
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.schemas import errors as problems
@@ -23,9 +24,16 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/whatif",
     summary="The energy of a motion on a changed arm",
     response_model=WhatifResponse,
-    responses=problem_responses(
-        *MOTION_PROBLEMS, problems.PathInfeasible, problems.InvalidTable, problems.StoreUnavailable
-    ),
+    responses={
+        **ACCEPTED,
+        **problem_responses(
+            *MOTION_PROBLEMS,
+            problems.PathInfeasible,
+            problems.InvalidTable,
+            problems.StoreUnavailable,
+            problems.KeyReused,
+        ),
+    },
 )
 async def whatif(
     request: Request,
@@ -34,10 +42,13 @@ async def whatif(
     engine: ServiceArmEngine,
     store: ServiceStore,
     client: ServiceClient,
+    later: ServiceLater,
 ) -> Response:
     """Compares one motion on the arm as it is with the same task on changed arms: lighter links, another payload, other
     drives or limits. Each change has two results, as differences from the base: the base's motion on the changed arm,
     and the best motion of the changed arm. A given motion (`evaluate`) is evaluated only."""
+    if later.wanted:
+        return await later.respond("whatif", body)
     task = WhatifTask(body, request.state.id)
     result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
     kind = "evaluate" if body.optimize is None else "optimize"

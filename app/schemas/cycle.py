@@ -21,6 +21,7 @@ from app.schemas.request import (
     which_candidates,
 )
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
+from app.settings import LONGEST_DEADLINE
 from optimizer.problem.free_order import MOST_FREE_STOPS
 from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
@@ -195,7 +196,7 @@ class CycleRequest(ArmRequest):
         60.0,
         default=60.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=LONGEST_DEADLINE,
     )
 
     @model_validator(mode="after")

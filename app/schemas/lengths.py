@@ -12,3 +12,5 @@ OWNER_LENGTH = 64
 """Of the name of an API key."""
 ROBOT_LENGTH = 64
 """Of a robot's name."""
+HOLDER_LENGTH = 128
+"""Of the name of a process that works on jobs."""

@@ -10,7 +10,8 @@ from app.schemas.common import Answer, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH, LABEL
 from app.schemas.request import DurationRange, OptimizeRequest
 from app.schemas.response import OBJECTIVE
-from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from app.settings import LONGEST_DEADLINE
+from optimizer.problem.problem import MethodName
 from optimizer.solution import Objective
 
 
@@ -32,7 +33,7 @@ class ParetoRequest(OptimizeRequest):
         30.0,
         default=30.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=LONGEST_DEADLINE,
     )
 
 

@@ -12,6 +12,7 @@ from app.schemas.arm import ArmRequest
 from app.schemas.common import JointPositions, Request, by_field, described
 from app.schemas.orientation import TargetPose
 from app.schemas.path import Path
+from app.settings import LONGEST_DEADLINE
 from optimizer.problem.problem import LONGEST_DURATION, BoundEffort, MethodName
 from optimizer.replay.sampler import MOST_SAMPLES
 from optimizer.solution import Objective
@@ -218,7 +219,7 @@ class MotionRequest(ArmRequest):
         10.0,
         default=10.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=LONGEST_DEADLINE,
     )
 
     @field_validator("sample_period")

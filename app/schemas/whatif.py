@@ -14,8 +14,8 @@ from app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
 from app.schemas.request import OptimizeRequest
 from app.schemas.response import OBJECTIVE, Certificate, ElectricalEnergy
 from app.schemas.studies import Name
+from app.settings import LONGEST_DEADLINE
 from optimizer.problem.names import first_repeated
-from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.solution import Objective
 
 MOST_CHANGES = 16
@@ -76,7 +76,7 @@ class WhatifRequest(Request):
         30.0,
         default=30.0,
         ge=1e-3,
-        le=LONGEST_DURATION,
+        le=LONGEST_DEADLINE,
     )
 
     @model_validator(mode="after")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 from sqlalchemy import and_, or_, select
@@ -14,10 +13,9 @@ from app.access.client import Client
 from app.access.rules import check_owner
 from app.exceptions import KeyReused, UnknownIteration, UnknownStudy
 from app.store import answers
+from app.store.paging import position_after, position_of
 from app.store.tables import Iteration, Study, is_id, new_id, now
 
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_MICROSECOND = timedelta(microseconds=1)
 _LIGHT = defer(Iteration.request, raiseload=True)
 """Leaves out the request of an iteration."""
 
@@ -103,14 +101,11 @@ def page(session: Session, limit: int, after: str | None) -> tuple[list[State], 
     """Up to `limit` studies, newest first, and the `after` of the next page; None on the last page."""
     query = select(Study).order_by(Study.created.desc(), Study.id.desc()).limit(limit + 1)
     if after is not None:
-        microseconds, study_id = after.split("_")
-        created = _EPOCH + int(microseconds) * _MICROSECOND
+        created, study_id = position_after(after)
         query = query.where(or_(Study.created < created, and_(Study.created == created, Study.id < study_id)))
     studies = list(session.scalars(query))
     more, studies = len(studies) > limit, studies[:limit]
-    last = studies[-1] if more else None
-    following = None if last is None else f"{(last.created - _EPOCH) // _MICROSECOND}_{last.id}"
-    return [_state(session, study) for study in studies], following
+    return [_state(session, study) for study in studies], position_of(studies[-1]) if more else None
 
 
 def delete(session: Session, study_id: str, client: Client) -> None:

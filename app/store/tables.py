@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import JSON, DateTime, Dialect, ForeignKey, Index, LargeBinary, MetaData, String, TypeDecorator
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from app.schemas.lengths import ID_LENGTH, KEY_LENGTH, NAME_LENGTH, OWNER_LENGTH, ROBOT_LENGTH
+from app.schemas.lengths import HOLDER_LENGTH, ID_LENGTH, KEY_LENGTH, NAME_LENGTH, OWNER_LENGTH, ROBOT_LENGTH
 
 # SQLite can alter a constraint only if it has a name
 _NAMES = {
@@ -86,18 +86,20 @@ class OwnRobot(Table):
 
 
 class Answer(Table):
-    """A complete answer of an endpoint: JSON, compressed. An answer of a study is deleted with its study, any other by
+    """A complete answer of an endpoint: JSON, compressed. An answer of a study or job is deleted with it, any other by
     age and total size."""
 
     __tablename__ = "answers"
     # for the sum of sizes from the newest on, without reading the bodies
-    __table_args__ = (Index(None, "created", "size"), Index(None, "study_id"))
+    __table_args__ = (Index(None, "created", "size"), Index(None, "study_id"), Index(None, "job_id"))
 
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
     kind: Mapped[str] = mapped_column(String(32))
     created: Mapped[datetime] = mapped_column(Instant)
     owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
+    job_id: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    """Whoever deletes a job deletes its answers: SQLite adds no foreign key to a table that exists."""
     size: Mapped[int]
     """Size of the compressed body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
@@ -125,3 +127,78 @@ class Iteration(Table):
     met_by: Mapped[int | None]
     """Number of the first iteration up to this one with an energy of at most the threshold."""
     idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH))
+
+
+class Job(Table):
+    """Requests that are computed one by one while their client does not wait.
+
+    `state` is `waiting`, `running`, `done` (every request has ended), `cancelling` or `cancelled`.
+    """
+
+    __tablename__ = "jobs"
+    __table_args__ = (Index(None, "created", "id"), Index(None, "ended"))
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    name: Mapped[str | None] = mapped_column(String(NAME_LENGTH))
+    state: Mapped[str] = mapped_column(String(16))
+    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    keep_going: Mapped[bool]
+    """Whether the other requests go on after one has failed."""
+    created: Mapped[datetime] = mapped_column(Instant)
+    started: Mapped[datetime | None] = mapped_column(Instant)
+    ended: Mapped[datetime | None] = mapped_column(Instant)
+    total: Mapped[int]
+    """Number of requests."""
+    ended_before: Mapped[int]
+    """Number of requests that had ended when it started, or started again."""
+    events: Mapped[int]
+    """Number of its last event."""
+    progressed: Mapped[datetime | None] = mapped_column(Instant)
+    """Time of its last event `progress`."""
+    idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
+    fingerprint: Mapped[str] = mapped_column(String(64))
+    """SHA-256 of what was sent."""
+
+
+class JobRequest(Table):
+    """One request of a job. `state` is `waiting`, `running`, `done`, `failed` or `cancelled`."""
+
+    __tablename__ = "job_requests"
+    # what waits, the lowest numbers first: a job that has just begun goes before the rest of a long one
+    __table_args__ = (Index(None, "state", "number", "job_id"), Index(None, "job_id", "state"))
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    """Index in the job, from 0."""
+    kind: Mapped[str] = mapped_column(String(32))
+    """Endpoint of the request."""
+    deadline: Mapped[float]
+    """Time [s] from the begin of the work."""
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+    """The request: JSON, compressed."""
+    state: Mapped[str] = mapped_column(String(16))
+    attempt: Mapped[int]
+    """How often it was handed out, apart from the times that another request took its worker."""
+    deaths: Mapped[int]
+    """How many workers died of it."""
+    preempted: Mapped[int]
+    """How often another request took its worker."""
+    leased_by: Mapped[str | None] = mapped_column(String(HOLDER_LENGTH))
+    leased_until: Mapped[datetime | None] = mapped_column(Instant)
+    wall_time: Mapped[float | None]
+    energy: Mapped[float | None]
+    duration: Mapped[float | None]
+    status: Mapped[str | None] = mapped_column(String(16))
+    answer_id: Mapped[str | None] = mapped_column(ForeignKey("answers.id"), unique=True)
+    problem: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+
+
+class JobEvent(Table):
+    """Something that happened to a job, by its number in the job: 1, 2, 3, … without gaps."""
+
+    __tablename__ = "job_events"
+
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True)
+    number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False)
+    name: Mapped[str] = mapped_column(String(16))
+    data: Mapped[dict[str, Any]] = mapped_column(JSON)

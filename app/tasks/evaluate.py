@@ -69,8 +69,7 @@ class EvaluateTask:
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
-        end = self._end(request, began, "body")
-        return request.robot, evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
+        return request.robot, evaluated(request, self._end(request, began, "body"))
 
     def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
         """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it may."""
@@ -78,6 +77,11 @@ class EvaluateTask:
             msg = f"deadline must be at most {self.longest:g} s: the operator of the service has set this."
             raise InvalidRequest([{"loc": [where, "deadline"], "msg": msg}])
         return began.earlier_by(-(asked.deadline or self.longest))
+
+
+def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluation:
+    """The evaluation of the motion in a request, until about `end`."""
+    return evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:

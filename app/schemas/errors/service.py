@@ -27,8 +27,9 @@ class Validation(ProblemDetails):
 
 
 class Busy(ProblemDetails):
-    """All workers are taken and the queue is full, or the service has as many connections, or bytes of bodies and
-    answers in flight, as it may. Try again after the time [s] in the header `Retry-After`."""
+    """All workers are taken and the queue is full, too many requests of jobs wait, or the service has as many
+    connections, or bytes of bodies and answers in flight, as it may. Try again after the time [s] in the header
+    `Retry-After`."""
 
     retry_after: ClassVar[int | None] = 2
     type: Literal["/problems/busy"] = fixed("type", "/problems/busy")
@@ -101,6 +102,34 @@ class UnknownStudy(ProblemDetails):
     type: Literal["/problems/unknown-study"] = fixed("type", "/problems/unknown-study")
     title: Literal["Unknown study"] = fixed("title", "Unknown study")
     status: Literal[404] = fixed("status", 404)
+
+
+class UnknownJob(ProblemDetails):
+    """No job has this id. It never existed, it was deleted, or it ended longer ago than jobs are kept. `GET /jobs`
+    lists all jobs."""
+
+    type: Literal["/problems/unknown-job"] = fixed("type", "/problems/unknown-job")
+    title: Literal["Unknown job"] = fixed("title", "Unknown job")
+    status: Literal[404] = fixed("status", 404)
+
+
+class JobNotCancellable(ProblemDetails):
+    """The job has ended, so that there is nothing left to cancel. Its answers stay until it is deleted with
+    `DELETE /jobs/{id}`."""
+
+    type: Literal["/problems/job-not-cancellable"] = fixed("type", "/problems/job-not-cancellable")
+    title: Literal["Job not cancellable"] = fixed("title", "Job not cancellable")
+    status: Literal[409] = fixed("status", 409)
+
+
+class WorkerDied(ProblemDetails):
+    """Each of the three processes that worked on this request of a job died, for example because it ran out of memory.
+    The service does not try it again by itself. Make the request smaller, and send it again; if that does not help,
+    please report it with the value of `instance`."""
+
+    type: Literal["/problems/worker-died"] = fixed("type", "/problems/worker-died")
+    title: Literal["Worker died"] = fixed("title", "Worker died")
+    status: Literal[500] = fixed("status", 500)
 
 
 class EmptyStudy(ProblemDetails):

@@ -8,6 +8,7 @@ from app.schemas.examples.compare import COMPARE_EXAMPLES
 from app.schemas.examples.cycle import CYCLE_EXAMPLES
 from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
+from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
 from app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from app.schemas.examples.pareto import PARETO_EXAMPLES
@@ -26,6 +27,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
+    "/jobs": {JSON: NEW_JOB_EXAMPLES},
     "/studies": {JSON: STUDY_EXAMPLES},
     "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},
 }

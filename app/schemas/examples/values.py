@@ -15,6 +15,7 @@ LABEL = "left/up/no_flip"
 REQUEST_ID = "0b0f3b0e-4c4f-4a43-9d6b-1f6f2f1f6a55"
 ANSWER_ID = "7b5f3a52-3a26-4a3e-8f0e-3c1d0e6f5a11"
 ANSWER_PATH = f"/answers/{ANSWER_ID}"
+JOB_ID = "9a1c2f04-6f0f-4d55-8d7e-3f2b8f7c1e60"
 STUDY_ID = "5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
 CREATED = "2025-03-14T09:26:53.589793Z"
 STANDING_STILL = [0.0] * 6

@@ -197,6 +197,20 @@ def test_a_robot_is_its_owners(guarded: Guarded) -> None:
     assert guarded.send("press", "DELETE", robot).status_code == 204
 
 
+def test_a_job_is_its_owners(guarded: Guarded) -> None:
+    sent = guarded.send("press", "POST", "/jobs", {"requests": [STEP]})
+    job = sent.headers["location"]
+    assert (sent.status_code, sent.json()["owner"]) == (202, "press")
+    for method, path in (("POST", f"{job}/cancel"), ("POST", f"{job}/retry"), ("DELETE", job)):
+        assert refused(guarded.send("cell", method, path), problems.NotOwner)["owner"] == "press"
+        refused(guarded.send("viewer", method, path), problems.RoleTooLow)
+    assert guarded.send("press", "POST", f"{job}/retry").status_code == 202
+    later = guarded.send("press", "POST", "/evaluate", STEP["evaluate"], Prefer="respond-async")
+    assert (later.status_code, later.json()["owner"]) == (202, "press")
+    assert guarded.send("press", "DELETE", job).status_code == 204
+    assert guarded.send("boss", "DELETE", later.headers["location"]).status_code == 204
+
+
 def test_an_answer_is_its_owners(guarded: Guarded) -> None:
     ids: list[str] = []
 

@@ -109,12 +109,13 @@ def test_version_is_the_projects(document: dict[str, Any]) -> None:
 
 # short deadlines: generated requests are valid, and some are hard
 MAX_DEADLINE = 0.1
-schema = schemathesis.openapi.from_dict(create_app(Settings(max_deadline=MAX_DEADLINE)).openapi())
+SHORT = {"max_deadline": MAX_DEADLINE, "max_job_deadline": MAX_DEADLINE}
+schema = schemathesis.openapi.from_dict(create_app(Settings(**SHORT)).openapi())
 
 
 @pytest.fixture(scope="module")
 def fuzzed() -> Iterator[Server]:
-    with serving(workers=2, queue_size=16, max_deadline=MAX_DEADLINE, deadline_grace=GRACE) as server:
+    with serving(workers=2, queue_size=16, deadline_grace=GRACE, **SHORT) as server:
         yield server
 
 

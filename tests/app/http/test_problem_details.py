@@ -60,6 +60,8 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.TooManyRequests, service.TooManyConnections, service.TooManyConnectionsOfClient)),
     *(kind() for kind in (service.TooManyBytes, service.TooManyBytesOfClient)),
     *(service.HeadTooLarge(32_768), service.RequestTimeout(10.0)),
+    *(kind() for kind in (service.TooManyWaiting, service.UnknownJob)),
+    *(kind() for kind in (service.JobNotCancellable, service.TooManyDeaths)),
 ]
 
 

@@ -1,0 +1,45 @@
+"""Wakes those who wait for something to happen to a job in this process."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import defaultdict
+from collections.abc import Iterable
+
+
+class Changes:
+    """Bells, one for each job that somebody waits for."""
+
+    def __init__(self) -> None:
+        self._waiting: defaultdict[str, set[asyncio.Event]] = defaultdict(set)
+
+    def ring(self, job_ids: Iterable[str]) -> None:
+        """Something has happened to these jobs."""
+        for job_id in job_ids:
+            for bell in self._waiting.get(job_id, ()):
+                bell.set()
+
+    def ring_all(self) -> None:
+        """Wakes everybody."""
+        self.ring(list(self._waiting))
+
+    async def wait(self, bell: asyncio.Event, longest: float) -> None:
+        """Waits until the bell rings, at most for a time [s], and silences it."""
+        try:
+            async with asyncio.timeout(longest):
+                await bell.wait()
+        except TimeoutError:
+            pass
+        bell.clear()
+
+    def listen(self, job_id: str) -> asyncio.Event:
+        """A bell for a job, to be given back with `leave`."""
+        bell = asyncio.Event()
+        self._waiting[job_id].add(bell)
+        return bell
+
+    def leave(self, job_id: str, bell: asyncio.Event) -> None:
+        """Gives a bell back."""
+        self._waiting[job_id].discard(bell)
+        if not self._waiting[job_id]:
+            del self._waiting[job_id]

@@ -1,0 +1,237 @@
+"""The dispatcher: leases requests of jobs from the database, has them run, and stores their outcomes."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from functools import partial
+
+from app.exceptions import StoreUnavailable
+from app.jobs.changes import Changes
+from app.jobs.executor import Executor
+from app.jobs.holder import is_gone, new_holder
+from app.jobs.work import defect, outcome_of
+from app.settings import Settings
+from app.store import jobs, leases
+from app.store.leases import Key, Lease, Outcome
+from app.store.store import Store
+from app.store.tables import now as present_time
+
+logger = logging.getLogger(__name__)
+
+LEASE = timedelta(seconds=30)
+"""Time for which a request is leased; leases are renewed after a third of it."""
+LOOK = 0.5
+"""Time [s] between two looks into the database: for new requests, and for those that were cancelled elsewhere."""
+AHEAD = 0.25
+"""Work [s] for each worker that is leased ahead of time, so that small requests share the cost of a transaction."""
+MOST_AHEAD = 32
+"""Requests for each worker that are leased ahead of time at most."""
+GATHER = 0.05
+"""Time [s] in which outcomes are gathered, to be stored together, while the workers have more to do."""
+PRUNING = timedelta(hours=1)
+"""Time between two deletions of old jobs."""
+_STOP = 3.0
+"""Longest time [s] that the last exchange with the database may take when the service stops."""
+_LONGEST_PAUSE = 30.0
+"""Longest time [s] until an unreachable database is tried again."""
+
+
+@dataclass(eq=False)
+class _Held:
+    """A lease and the work on it. `dropped`: nobody wants it any more."""
+
+    lease: Lease
+    work: asyncio.Task[Outcome] | None = None
+    dropped: bool = False
+
+
+@dataclass
+class _Times:
+    """When regular work was done last."""
+
+    renewed: datetime
+    pruned: datetime | None = None
+    looked: float = field(default=0.0)
+
+
+class Dispatcher:
+    """Works on jobs with up to `settings.workers_for_jobs` requests at a time.
+
+    It leases some requests ahead of time, so that no worker waits for the database. Its loop alone reads and writes the
+    queue. `now` is the clock of the leases.
+    """
+
+    def __init__(
+        self, store: Store, executor: Executor, settings: Settings, now: Callable[[], datetime] = present_time
+    ) -> None:
+        self.changes = Changes()
+        self.holder = new_holder()
+        self._store, self._executor, self._settings, self._now = store, executor, settings, now
+        self._held: dict[Key, _Held] = {}
+        self._ready: asyncio.Queue[_Held] = asyncio.Queue()
+        self._outcomes: list[Outcome] = []
+        self._bell = asyncio.Event()
+        self._times = _Times(now())
+        self._mean_work = AHEAD
+        self._more = True
+        self._draining = False
+        self._tasks: list[asyncio.Task[None]] = []
+
+    @property
+    def draining(self) -> bool:
+        """Whether the service is stopping."""
+        return self._draining
+
+    def start(self) -> None:
+        """Begins to work in the background."""
+        runners = [self._run() for _ in range(self._settings.workers_for_jobs)]
+        self._tasks = [asyncio.create_task(each) for each in (self._dispatch(), *runners)]
+
+    def drain(self) -> None:
+        """Stops all work. What was begun waits again."""
+        self._draining = True
+        for held in self._held.values():
+            self._stop_work(held)
+        self.changes.ring_all()
+        self._bell.set()
+
+    async def stop(self) -> None:
+        """Gives all leases back and ends."""
+        self.drain()
+        if self._tasks:
+            # what it has just leased is given back, too
+            await asyncio.wait(self._tasks[:1], timeout=_STOP)
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._outcomes += [Outcome(held.lease, "waiting") for held in self._held.values()]
+        if self._outcomes:
+            try:
+                await self._settle(self._outcomes)
+            except StoreUnavailable:
+                logger.warning("leases could not be given back: they run out by themselves")
+
+    def wake(self) -> None:
+        """There is something to do."""
+        self._bell.set()
+
+    def stop_job(self, job_id: str) -> None:
+        """Stops the work on a job at once."""
+        for held in self._held.values():
+            if held.lease.job_id == job_id:
+                self._stop_work(held)
+
+    def _stop_work(self, held: _Held) -> None:
+        held.dropped = True
+        if held.work is not None:
+            held.work.cancel()
+
+    async def _run(self) -> None:
+        """Runs one leased request after another."""
+        while True:
+            held = await self._ready.get()
+            # a request whose work is stopped waits again, unless its job was cancelled: `settle` knows
+            outcome = Outcome(held.lease, "waiting")
+            if not held.dropped:
+                held.work = asyncio.create_task(outcome_of(held.lease, self._executor))
+                try:
+                    await asyncio.wait({held.work})
+                finally:
+                    held.work.cancel()
+                if not held.work.cancelled():
+                    outcome = held.work.result()
+                    taken = outcome.figures.wall_time
+                    self._mean_work += 0.2 * ((AHEAD if taken is None else taken) - self._mean_work)
+            self._outcomes.append(outcome)
+            if self._held.get(held.lease.key) is held:
+                del self._held[held.lease.key]
+            self._bell.set()
+
+    async def _dispatch(self) -> None:
+        """Exchanges leases and outcomes with the database."""
+        fresh, pause = True, LOOK
+        while not self._draining:
+            try:
+                if fresh:
+                    await self._store.write(partial(leases.take_back_from, is_gone=is_gone))
+                    fresh = False
+                await self._exchange()
+                pause = LOOK
+            except Exception as error:
+                if not isinstance(error, StoreUnavailable):
+                    logger.exception("unforeseen error")
+                pause = min(2 * pause, _LONGEST_PAUSE)
+            await self._rung(pause)
+            if self._ready.qsize() >= self._settings.workers_for_jobs and not self._draining:
+                await asyncio.sleep(GATHER)
+
+    async def _rung(self, longest: float) -> None:
+        """Waits until there is something to do, at most for a time [s]."""
+        try:
+            async with asyncio.timeout(longest):
+                await self._bell.wait()
+        except TimeoutError:
+            pass
+        self._bell.clear()
+
+    async def _exchange(self) -> None:
+        await self._store_outcomes()
+        await self._watch()
+        want = self._most_held - len(self._held)
+        if want <= 0 or self._draining:
+            return
+        now = self._now()
+        if self._more or await self._store.read(partial(leases.is_due, now=now)):
+            lease = partial(leases.lease, holder=self.holder, count=want, now=now, until=now + LEASE)
+            leased, changed = await self._store.write(lease)
+            self._more = len(leased) == want
+            for each in leased:
+                self._held[each.key] = held = _Held(each, dropped=self._draining)
+                self._ready.put_nowait(held)
+            self.changes.ring(changed)
+
+    @property
+    def _most_held(self) -> int:
+        """Requests that it may have leased: one for each worker, and some ahead."""
+        ahead = max(1, round(AHEAD / max(self._mean_work, AHEAD / MOST_AHEAD)))
+        return self._settings.workers_for_jobs * (1 + ahead)
+
+    async def _store_outcomes(self) -> None:
+        outcomes, self._outcomes = self._outcomes, []
+        if not outcomes:
+            return
+        try:
+            changed = await self._settle(outcomes)
+        except StoreUnavailable:
+            self._outcomes = outcomes + self._outcomes
+            raise
+        except Exception:
+            # nobody waits for these answers for ever
+            self._outcomes = [defect(each.lease) for each in outcomes] + self._outcomes
+            raise
+        self.changes.ring(changed)
+
+    async def _watch(self) -> None:
+        """Renews leases, stops what was cancelled elsewhere, and deletes old jobs."""
+        now, clock = self._now(), asyncio.get_running_loop().time()
+        if self._held and now - self._times.renewed >= LEASE / 3:
+            await self._store.write(partial(leases.renew, holder=self.holder, until=now + LEASE))
+            self._times.renewed = now
+        if self._held and clock - self._times.looked >= LOOK:
+            held = list(self._held.values())
+            kept = await self._store.read(partial(leases.kept, holder=self.holder))
+            self._times.looked = clock
+            for each in held:
+                if (each.lease.key, each.lease.attempt) not in kept:
+                    self._stop_work(each)
+        if self._times.pruned is None or now - self._times.pruned >= PRUNING:
+            await self._store.write(partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age)))
+            self._times.pruned = now
+
+    async def _settle(self, outcomes: list[Outcome]) -> set[str]:
+        settle = partial(leases.settle, holder=self.holder, outcomes=outcomes, now=self._now())
+        return await self._store.write(settle)

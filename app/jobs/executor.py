@@ -1,0 +1,45 @@
+"""What runs the requests of jobs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from app.engine.pool import Engine
+from app.engine.result import TaskResult
+from app.engine.task import Task
+from app.store.store import Store
+from app.tasks.arm_engine import ArmEngine
+
+
+class Executor(Protocol):
+    """Runs one task at a time for each of its callers."""
+
+    async def run(self, task: Task, deadline: float, stoppable: bool) -> TaskResult:
+        """The task's result, for which `deadline` [s] is left once work on it begins.
+
+        If cancelled, the work is stopped at once. Raises what the task raises, DeadlineExceeded, WorkerDied,
+        ShuttingDown, or, if it is `stoppable`, Preempted.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class LocalExecutor:
+    """Runs tasks in workers of this service that no caller waits for. Users' own robots come from the database."""
+
+    engine: Engine
+    store: Store
+
+    async def run(self, task: Task, deadline: float, stoppable: bool) -> TaskResult:
+        """See `Executor`."""
+        return await ArmEngine(_Spare(self.engine, stoppable), self.store).run(task, deadline)
+
+
+@dataclass(frozen=True)
+class _Spare:
+    engine: Engine
+    stoppable: bool
+
+    async def run(self, task: Task, deadline: float) -> TaskResult:
+        return await self.engine.spare.run(task, deadline, self.stoppable)

@@ -1,0 +1,80 @@
+"""What clients do with jobs: create, cancel, retry and delete them, and wait for one."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from functools import partial
+
+from sqlalchemy.exc import IntegrityError
+
+from app.access.client import Client
+from app.jobs.dispatcher import Dispatcher
+from app.settings import Settings
+from app.store import jobs
+from app.store.jobs import JobView, NewJob
+from app.store.store import Store
+
+LOOK = 1.0
+"""Time [s] after which work of other services is looked for."""
+
+
+@dataclass(frozen=True)
+class Jobs:
+    """The jobs in the database, and the dispatcher of this service."""
+
+    store: Store
+    dispatcher: Dispatcher
+    settings: Settings
+
+    async def create(self, new: NewJob, key: str | None, owner: str | None) -> tuple[str, bool]:
+        """See `app.store.jobs.create`. Raises KeyReused, TooManyWaiting or StoreUnavailable."""
+        write = partial(jobs.create, new=new, key=key, most_waiting=self.settings.max_waiting, owner=owner)
+        try:
+            made = await self.store.write(write)
+        except IntegrityError:  # another request has just created the job of this key
+            made = await self.store.write(write)
+        self.dispatcher.wake()
+        return made
+
+    async def view(self, job_id: str) -> JobView:
+        """A job and its counts. Raises UnknownJob or StoreUnavailable."""
+        return await self.store.read(partial(jobs.view, job_id=job_id))
+
+    async def cancel(self, job_id: str, client: Client) -> None:
+        """Cancels a job. Raises UnknownJob, NotOwner, JobNotCancellable or StoreUnavailable."""
+        await self.store.write(partial(jobs.cancel, job_id=job_id, client=client))
+        self._has_changed(job_id, stop=True)
+
+    async def retry(self, job_id: str, client: Client) -> None:
+        """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner, TooManyWaiting or
+        StoreUnavailable."""
+        write = partial(jobs.retry, job_id=job_id, client=client, most_waiting=self.settings.max_waiting)
+        await self.store.write(write)
+        self._has_changed(job_id)
+
+    async def delete(self, job_id: str, client: Client) -> None:
+        """Deletes a job with its answers; what runs is stopped. Raises UnknownJob, NotOwner or StoreUnavailable."""
+        await self.store.write(partial(jobs.delete, job_id=job_id, client=client))
+        self._has_changed(job_id, stop=True)
+
+    async def ended(self, job_id: str, longest: float) -> JobView:
+        """A job after its end, or as it is after a time [s]. Raises UnknownJob or StoreUnavailable."""
+        clock = asyncio.get_running_loop().time
+        end, changes = clock() + longest, self.dispatcher.changes
+        bell = changes.listen(job_id)
+        try:
+            while True:
+                view = await self.view(job_id)
+                left = end - clock()
+                if view.job.ended is not None or left <= 0 or self.dispatcher.draining:
+                    return view
+                await changes.wait(bell, min(left, LOOK))
+        finally:
+            changes.leave(job_id, bell)
+
+    def _has_changed(self, job_id: str, stop: bool = False) -> None:
+        if stop:
+            self.dispatcher.stop_job(job_id)
+        self.dispatcher.changes.ring([job_id])
+        self.dispatcher.wake()

@@ -1,0 +1,200 @@
+"""POST and GET /jobs, GET and DELETE /jobs/{id}, and what is done with a job."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from functools import partial
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Header, Path, Query, Request, Response
+from fastapi.responses import StreamingResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from app.exceptions import UnsupportedMediaType
+from app.http.disconnect import unless_disconnected
+from app.http.openapi import problem_responses
+from app.jobs.answers import as_csv, as_lines, detail, summary
+from app.jobs.events import events_after
+from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings, ServiceStore
+from app.routes.later import deadlines
+from app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, set_location
+from app.routes.uploads import upload
+from app.schemas import errors as problems
+from app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
+from app.schemas.examples.values import JOB_ID
+from app.schemas.jobs import Job, JobDetail, JobList, JobPage, NewJob, RequestPage
+from app.store import jobs as stored_jobs
+from app.tasks.job_body import JobBodyTask, Validated
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+JobId = Annotated[str, Path(description="The job's id.", examples=[JOB_ID])]
+LastEventId = Annotated[
+    str | None,
+    Header(
+        alias="Last-Event-ID",
+        description="Number of the last event that was received. A text that is no number has no effect.",
+        examples=["17"],
+    ),
+]
+_OF_ONE = (problems.UnknownJob, problems.StoreUnavailable)
+
+
+@router.post(
+    "",
+    summary="Send a job",
+    status_code=202,
+    response_model=Job,
+    responses={
+        202: {"headers": CREATED_HEADERS},
+        **problem_responses(
+            problems.Validation,
+            problems.KeyReused,
+            problems.BodyTooLarge,
+            problems.RequestTimeout,
+            problems.UnsupportedMediaType,
+            problems.Busy,
+            problems.ShuttingDown,
+            problems.DeadlineExceeded,
+            problems.StoreUnavailable,
+        ),
+    },
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"application/json": {"schema": {"$ref": f"#/components/schemas/{NewJob.__name__}"}}},
+        }
+    },
+)
+async def create(
+    request: Request,
+    response: Response,
+    settings: ServiceSettings,
+    engine: ServiceClientEngine,
+    jobs: ServiceJobs,
+    client: ServiceClient,
+    key: Key = None,
+) -> Job:
+    """Takes up to 10,000 requests, and computes them while the client does not wait. Every request is validated now: a
+    malformed one refuses the whole job. The job survives a restart of the service. Requests that somebody waits for
+    come first."""
+    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
+        raise UnsupportedMediaType
+    with upload() as (file, path):
+        async for chunk in request.stream():
+            file.write(chunk)
+        task = JobBodyTask(path, deadlines(settings), request.state.id)
+        result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+    assert isinstance(result, Validated)
+    job_id, again = await jobs.create(result.job, key, client.owner)
+    set_location(request, response, f"/jobs/{job_id}", again)
+    return Job(**summary(await jobs.view(job_id)))
+
+
+@router.get(
+    "",
+    summary="List jobs",
+    response_model=JobList,
+    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+)
+async def list_jobs(page: Annotated[JobPage, Query()], store: ServiceStore) -> JobList:
+    """All jobs with their progress, newest first, page by page."""
+    read = partial(stored_jobs.page, limit=page.limit, after=page.after, state=page.state)
+    found, following = await store.read(read)
+    return JobList(jobs=[Job(**summary(view)) for view in found], next=following)
+
+
+@router.get(
+    "/{id}",
+    summary="A job and its requests",
+    response_model=JobDetail,
+    responses=problem_responses(problems.Validation, *_OF_ONE),
+)
+async def show(id: JobId, page: Annotated[RequestPage, Query()], jobs: ServiceJobs, store: ServiceStore) -> JobDetail:
+    """The job with its progress and a page of its requests. Each request that is done refers to its answer, which is
+    kept as long as the job; each that failed has its problem."""
+    view = await jobs.view(id)
+    read = partial(stored_jobs.requests, job_id=id, limit=page.limit + 1, after=page.after)
+    return JobDetail(**detail(view, await store.read(read), page.limit))
+
+
+@router.delete(
+    "/{id}", summary="Delete a job", status_code=204, responses=problem_responses(*_OF_ONE, problems.NotOwner)
+)
+async def delete(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> None:
+    """Deletes the job with its answers. What runs is stopped."""
+    await jobs.delete(id, client)
+
+
+@router.post(
+    "/{id}/cancel",
+    summary="Cancel a job",
+    status_code=202,
+    response_model=Job,
+    responses=problem_responses(*_OF_ONE, problems.NotOwner, problems.JobNotCancellable),
+)
+async def cancel(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
+    """Cancels what waits, and stops what runs within a second. Answers that are there stay. A job that is cancelled
+    already stays as it is."""
+    await jobs.cancel(id, client)
+    return Job(**summary(await jobs.view(id)))
+
+
+@router.post(
+    "/{id}/retry",
+    summary="Retry a job",
+    status_code=202,
+    response_model=Job,
+    responses=problem_responses(*_OF_ONE, problems.NotOwner, problems.Busy),
+)
+async def retry(id: JobId, jobs: ServiceJobs, client: ServiceClient) -> Job:
+    """Lets the requests wait again that failed or were cancelled. Those that are done stay as they are."""
+    await jobs.retry(id, client)
+    return Job(**summary(await jobs.view(id)))
+
+
+async def _known(id: JobId, jobs: ServiceJobs) -> str:
+    # before the stream begins: a stream cannot become a problem
+    return (await jobs.view(id)).job.id
+
+
+KnownJob = Annotated[str, Depends(_known)]
+
+
+@router.get(
+    "/{id}/events",
+    summary="Events of a job",
+    response_class=EventSourceResponse,
+    responses=problem_responses(*_OF_ONE),
+)
+async def events(
+    job_id: KnownJob, jobs: ServiceJobs, store: ServiceStore, last: LastEventId = None
+) -> AsyncIterator[ServerSentEvent]:
+    """Server-sent events: `state` (of the job), `request` (one has ended), `progress` (at most two in a second) and
+    `end`. They are numbered in the job from 1. `Last-Event-ID` continues after a number, also after a restart of the
+    service. The stream closes when the job has ended."""
+    number = int(last) if last is not None and last.isdecimal() and len(last) < 10 else 0
+    async for event in events_after(store, jobs.dispatcher, job_id, number):
+        yield event
+
+
+@router.get(
+    "/{id}/results",
+    summary="Results of a job",
+    response_class=StreamingResponse,
+    responses={
+        200: {
+            "content": {
+                "application/x-ndjson": {"schema": {"type": "string"}, "example": RESULTS_LINES},
+                "text/csv": {"schema": {"type": "string"}, "example": RESULTS_CSV},
+            }
+        },
+        **problem_responses(*_OF_ONE),
+    },
+)
+async def results(job_id: KnownJob, store: ServiceStore, wanted: WantedFormat) -> Response:
+    """The requests that have ended, in order of their index: a line of JSON each, with the complete answer under
+    `result`. `Accept: text/csv` returns a table of their figures without the answers."""
+    if wanted == "csv":
+        return StreamingResponse(as_csv(store, job_id), media_type="text/csv")
+    return StreamingResponse(as_lines(store, job_id), media_type="application/x-ndjson")

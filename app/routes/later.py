@@ -1,0 +1,121 @@
+"""`Prefer: respond-async` (RFC 7240): the request becomes a job, and its answer is fetched later."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import orjson
+from fastapi import Depends, Header, Request, Response
+
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import PROBLEM_MEDIA_TYPE
+from app.jobs.answers import summary
+from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
+from app.routes.parameters import CREATED_HEADERS, Key, set_location
+from app.schemas.common import Request as RequestModel
+from app.schemas.jobs import Job
+from app.store import jobs as stored_jobs
+from app.store.jobs import NewJob
+from app.tasks.job_body import Deadlines, JobBodyTask, JobOfOneTask, Validated, job_of_one
+from app.tasks.read_body import HeldBody
+
+ACCEPTED: dict[int | str, dict[str, Any]] = {
+    202: {
+        "model": Job,
+        "description": "With `Prefer: respond-async`: the request is a job, at the path in `Location`.",
+        "headers": {
+            **CREATED_HEADERS,
+            "Preference-Applied": {"description": "`respond-async`.", "schema": {"type": "string"}},
+        },
+    }
+}
+"""The response of an endpoint to a request that becomes a job."""
+
+_PREFER = Header(
+    alias="Prefer",
+    description="`respond-async`: the request becomes a job, see `POST /jobs`, and the status is 202. With "
+    "`respond-async, wait=5`, the answer comes with 200 if it is there within 5 s. Anything else has no effect.",
+    examples=["respond-async"],
+)
+
+
+@dataclass(frozen=True)
+class Later:
+    """How the client wants a request to be answered. `wait` is the time [s] that it waits for the answer."""
+
+    wanted: bool
+    wait: int
+    jobs: ServiceJobs
+    engine: ServiceClientEngine
+    client: ServiceClient
+    key: str | None
+    request: Request
+
+    async def respond(self, kind: str, asked: RequestModel | HeldBody) -> Response:
+        """The response to a validated request to the endpoint `kind`. Raises InvalidRequest, KeyReused,
+        TooManyWaiting or StoreUnavailable."""
+        longest = deadlines(self.jobs.settings)
+        if isinstance(asked, HeldBody):
+            new = await self.validated(JobOfOneTask(kind, asked, longest, self.request.state.id))
+        else:
+            new = job_of_one(kind, asked, longest)
+        return await self.respond_with(new)
+
+    async def validated(self, task: JobBodyTask | JobOfOneTask) -> NewJob:
+        """The job that a worker makes of a body. Raises InvalidRequest, and what `Engine.run` raises."""
+        result = await unless_disconnected(self.request, self.engine.run(task, self.jobs.settings.max_deadline))
+        assert isinstance(result, Validated)
+        return result.job
+
+    async def respond_with(self, new: NewJob) -> Response:
+        """The response to a request that has become this job."""
+        job_id, again = await self.jobs.create(new, self.key, self.client.owner)
+        view = await self.jobs.ended(job_id, self.wait)
+        if self.wait and view.job.ended is not None:
+            response = await self._ended(job_id)
+            applied = f"wait={self.wait}"
+        else:
+            content = Job(**summary(view)).model_dump_json()
+            response = Response(content, 202, media_type="application/json")
+            applied = "respond-async" + (f", wait={self.wait}" if self.wait else "")
+        response.headers["Preference-Applied"] = applied
+        set_location(self.request, response, f"/jobs/{job_id}", again)
+        return response
+
+    async def _ended(self, job_id: str) -> Response:
+        """The answer or the problem of a job of one request that has ended."""
+        request, body = await self.jobs.store.read(lambda session: stored_jobs.outcome(session, job_id, 0))
+        if body is not None:
+            return Response(zlib.decompress(body), media_type="application/json")
+        if request.problem is None:  # somebody cancelled it meanwhile
+            view = await self.jobs.view(job_id)
+            return Response(Job(**summary(view)).model_dump_json(), 202, media_type="application/json")
+        content = orjson.dumps(request.problem | {"instance": self.request.state.id})
+        return Response(content, request.problem["status"], media_type=PROBLEM_MEDIA_TYPE)
+
+
+def deadlines(settings: ServiceSettings) -> Deadlines:
+    """Deadlines of the requests of jobs."""
+    return Deadlines(settings.max_job_deadline, min(settings.max_deadline, settings.max_job_deadline))
+
+
+async def _later(
+    request: Request,
+    jobs: ServiceJobs,
+    engine: ServiceClientEngine,
+    client: ServiceClient,
+    prefer: Annotated[str | None, _PREFER] = None,
+    key: Key = None,
+) -> Later:
+    given = ", ".join(request.headers.getlist("prefer")) if prefer is not None else ""
+    preferences = {text.partition(";")[0].replace(" ", "").lower() for text in given.split(",")}
+    waits = [int(text[5:]) for text in preferences if re.fullmatch(r"wait=[0-9]{1,9}", text)]
+    longest = int(jobs.settings.max_deadline)
+    wanted = "respond-async" in preferences
+    return Later(wanted, min(*waits, longest) if waits else 0, jobs, engine, client, key, request)
+
+
+ServiceLater = Annotated[Later, Depends(_later)]

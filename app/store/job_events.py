@@ -1,0 +1,93 @@
+"""Events of a job, numbered in the job: whoever missed some can ask for those after a number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.store.tables import Job, JobEvent, JobRequest
+
+PROGRESS_PERIOD = timedelta(seconds=0.5)
+"""Least time between two events `progress`."""
+STATES = ("waiting", "running", "done", "failed", "cancelled")
+"""States of a request, in the order in which counts have them."""
+ENDED = ("done", "failed", "cancelled")
+
+Counts = dict[str, int]
+
+
+def counts_of(session: Session, job_ids: list[str]) -> dict[str, Counts]:
+    """Number of requests in each state, by job."""
+    counts = {job_id: dict.fromkeys(STATES, 0) for job_id in job_ids}
+    query = select(JobRequest.job_id, JobRequest.state, func.count()).where(JobRequest.job_id.in_(job_ids))
+    for job_id, state, count in session.execute(query.group_by(JobRequest.job_id, JobRequest.state)):
+        counts[job_id][state] = count
+    return counts
+
+
+def record(session: Session, job: Job, name: str, data: Mapping[str, Any]) -> None:
+    """Adds the next event of a job, whose row must be locked."""
+    job.events += 1
+    session.add(JobEvent(job_id=job.id, number=job.events, name=name, data=dict(data)))
+
+
+def set_state(session: Session, job: Job, state: str) -> None:
+    """Changes the state of a job, whose row must be locked."""
+    if job.state != state:
+        job.state = state
+        record(session, job, "state", {"state": state})
+
+
+def request_ended(session: Session, job: Job, request: JobRequest) -> None:
+    """Records that a request of the job has ended."""
+    record(session, job, "request", {"index": request.number, "state": request.state, "energy": request.energy})
+
+
+def conclude(session: Session, job: Job, now: datetime) -> None:
+    """Records progress, and the end of the job if no request waits or runs. The job's row must be locked."""
+    if job.ended is not None:
+        return
+    session.flush()
+    open_requests = select(JobRequest.number).where(
+        JobRequest.job_id == job.id, JobRequest.state.in_(("waiting", "running"))
+    )
+    over = session.scalar(open_requests.limit(1)) is None
+    if not over and job.progressed is not None and now - job.progressed < PROGRESS_PERIOD:
+        return
+    counts = counts_of(session, [job.id])[job.id]
+    job.progressed = now
+    record(
+        session, job, "progress", {"counts": counts, "progress": progress(job, counts), "eta": eta(job, counts, now)}
+    )
+    if over:
+        job.ended = now
+        set_state(session, job, "cancelled" if job.state == "cancelling" else "done")
+        record(session, job, "end", {"state": job.state, "counts": counts})
+
+
+def progress(job: Job, counts: Counts) -> float:
+    """Share of the requests that have ended."""
+    return sum(counts[state] for state in ENDED) / job.total
+
+
+def eta(job: Job, counts: Counts, now: datetime) -> float | None:
+    """Time [s] until the job ends at its present speed; None before 5 % of its work is done."""
+    ended = sum(counts[state] for state in ENDED)
+    done, work = ended - job.ended_before, job.total - job.ended_before
+    if job.ended is not None or job.started is None or done <= 0 or done < 0.05 * work:
+        return None
+    return (now - job.started).total_seconds() * (job.total - ended) / done
+
+
+def after(session: Session, job_id: str, number: int, limit: int) -> tuple[list[JobEvent], bool]:
+    """Up to `limit` events after that of `number`, and whether nothing can follow them until the job is retried."""
+    # the job first: events that are recorded in between only make the second value False
+    job = session.get(Job, job_id)
+    query = select(JobEvent).where(JobEvent.job_id == job_id, JobEvent.number > number)
+    found = list(session.scalars(query.order_by(JobEvent.number).limit(limit)))
+    last = found[-1].number if found else number
+    return found, job is None or (job.ended is not None and last >= job.events)

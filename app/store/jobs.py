@@ -1,0 +1,204 @@
+"""Jobs as clients see them. Each function works on a session: `await store.write(partial(create, …))`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from sqlalchemy import ColumnElement, and_, func, insert, or_, select
+from sqlalchemy import delete as delete_from
+from sqlalchemy.orm import Session, defer
+
+from app.access.client import Client
+from app.access.rules import check_owner
+from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownJob
+from app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
+from app.store.paging import position_after, position_of
+from app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
+
+
+@dataclass(frozen=True)
+class NewRequest:
+    """A validated request to the endpoint `kind`: its `body`, compressed JSON, and its deadline [s]."""
+
+    kind: str
+    body: bytes
+    deadline: float
+
+
+@dataclass(frozen=True)
+class NewJob:
+    """A job to create; `fingerprint` tells it from any other that may come with the same key."""
+
+    requests: Sequence[NewRequest]
+    fingerprint: str
+    name: str | None = None
+    keep_going: bool = True
+
+
+@dataclass(frozen=True)
+class JobView:
+    """A job and the number of its requests in each state."""
+
+    job: Job
+    counts: Counts
+
+
+def create(
+    session: Session, new: NewJob, key: str | None, most_waiting: int, owner: str | None = None
+) -> tuple[str, bool]:
+    """Adds a job and returns its id with False; if its key is known, the id of that job with True.
+
+    Raises KeyReused if that job differs, or TooManyWaiting if more than `most_waiting` requests would wait.
+    """
+    if key is not None:
+        known = session.scalar(select(Job).where(Job.idempotency_key == key))
+        if known is not None:
+            if (known.fingerprint, known.owner) != (new.fingerprint, owner):
+                raise KeyReused
+            return known.id, True
+    _check_room(session, len(new.requests), most_waiting)
+    job = Job(
+        id=new_id(),
+        name=new.name,
+        state="waiting",
+        owner=owner,
+        keep_going=new.keep_going,
+        created=now(),
+        total=len(new.requests),
+        ended_before=0,
+        events=0,
+        idempotency_key=key,
+        fingerprint=new.fingerprint,
+    )
+    session.add(job)
+    record(session, job, "state", {"state": "waiting"})
+    session.flush()
+    fresh = {"state": "waiting", "attempt": 0, "deaths": 0, "preempted": 0}
+    rows = [{"job_id": job.id, "number": number, **vars(each), **fresh} for number, each in enumerate(new.requests)]
+    session.execute(insert(JobRequest), rows)
+    return job.id, False
+
+
+def view(session: Session, job_id: str) -> JobView:
+    """A job and its counts. Raises UnknownJob."""
+    job = _job(session, job_id)
+    return JobView(job, counts_of(session, [job.id])[job.id])
+
+
+def page(session: Session, limit: int, after: str | None, state: str | None) -> tuple[list[JobView], str | None]:
+    """Up to `limit` jobs, newest first, and the `after` of the next page; None on the last page."""
+    query = select(Job).order_by(Job.created.desc(), Job.id.desc()).limit(limit + 1)
+    if state is not None:
+        query = query.where(Job.state == state)
+    if after is not None:
+        created, job_id = position_after(after)
+        query = query.where(or_(Job.created < created, and_(Job.created == created, Job.id < job_id)))
+    jobs = list(session.scalars(query))
+    more, jobs = len(jobs) > limit, jobs[:limit]
+    counts = counts_of(session, [job.id for job in jobs])
+    return [JobView(job, counts[job.id]) for job in jobs], position_of(jobs[-1]) if more else None
+
+
+def requests(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
+    """Up to `limit` requests of a job with an index above `after`, in order, without their bodies."""
+    return _page(session, job_id, limit, after)
+
+
+def ended(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:
+    """As `requests`, of those that have ended."""
+    return _page(session, job_id, limit, after, JobRequest.state.in_(ENDED))
+
+
+def results(session: Session, job_id: str, limit: int, after: int) -> list[tuple[JobRequest, bytes | None]]:
+    """As `ended`, each with the compressed body of its answer; None if it has none."""
+    found = ended(session, job_id, limit, after)
+    query = select(Answer.id, Answer.body).where(Answer.id.in_([request.answer_id for request in found]))
+    bodies: dict[str, bytes] = dict(session.execute(query).all())
+    return [(request, bodies.get(request.answer_id or "")) for request in found]
+
+
+def cancel(session: Session, job_id: str, client: Client) -> None:
+    """Cancels what waits, and asks for the end of what runs. Raises UnknownJob, NotOwner or JobNotCancellable."""
+    job = _job(session, job_id, lock=True)
+    check_owner(client, job.owner)
+    if job.state == "done":
+        raise JobNotCancellable
+    if job.state != "cancelled":
+        stop(session, job, now())
+
+
+def stop(session: Session, job: Job, at: datetime) -> None:
+    """Cancels what waits of a job, whose row must be locked. What runs is for those who run it to stop."""
+    set_state(session, job, "cancelling")
+    # a row that is locked is about to be leased: whoever leases it sees the state of the job
+    query = select(JobRequest).where(JobRequest.job_id == job.id, JobRequest.state == "waiting")
+    for request in session.scalars(query.options(defer(JobRequest.body)).with_for_update(skip_locked=True)):
+        request.state = "cancelled"
+        request_ended(session, job, request)
+    conclude(session, job, at)
+
+
+def retry(session: Session, job_id: str, client: Client, most_waiting: int) -> None:
+    """Lets failed and cancelled requests wait again. Raises UnknownJob, NotOwner or TooManyWaiting."""
+    job = _job(session, job_id, lock=True)
+    check_owner(client, job.owner)
+    again = select(JobRequest).where(JobRequest.job_id == job.id, JobRequest.state.in_(("failed", "cancelled")))
+    found = list(session.scalars(again.options(defer(JobRequest.body))))
+    if not found:
+        return
+    _check_room(session, len(found), most_waiting)
+    for request in found:
+        request.state, request.problem, request.deaths, request.preempted = "waiting", None, 0, 0
+    session.flush()
+    counts = counts_of(session, [job.id])[job.id]
+    job.started, job.ended, job.ended_before = now(), None, sum(counts[state] for state in ENDED)
+    set_state(session, job, "running" if counts["running"] else "waiting")
+
+
+def delete(session: Session, job_id: str, client: Client) -> None:
+    """Deletes a job, its requests, their answers and its events. Raises UnknownJob or NotOwner."""
+    job = _job(session, job_id)
+    check_owner(client, job.owner)
+    # in the order in which those who work on the job lock its rows
+    session.execute(select(JobRequest.number).where(JobRequest.job_id == job.id).with_for_update()).all()
+    _delete(session, [job.id])
+
+
+def prune(session: Session, max_age: timedelta) -> None:
+    """Deletes jobs that ended longer ago than `max_age`, with their answers."""
+    _delete(session, list(session.scalars(select(Job.id).where(Job.ended < now() - max_age))))
+
+
+def outcome(session: Session, job_id: str, number: int) -> tuple[JobRequest, bytes | None]:
+    """A request of a job and the compressed body of its answer; None if it has none. Raises UnknownJob."""
+    request = session.get(JobRequest, (job_id, number), options=[defer(JobRequest.body)])
+    if request is None:
+        raise UnknownJob
+    return request, session.scalar(select(Answer.body).where(Answer.id == request.answer_id))
+
+
+def _delete(session: Session, job_ids: list[str]) -> None:
+    # requests and events go with their job; requests refer to answers, and so go first
+    session.execute(delete_from(Job).where(Job.id.in_(job_ids)))
+    session.execute(delete_from(Answer).where(Answer.job_id.in_(job_ids)))
+
+
+def _page(session: Session, job_id: str, limit: int, after: int, *which: ColumnElement[bool]) -> list[JobRequest]:
+    query = select(JobRequest).where(JobRequest.job_id == job_id, JobRequest.number > after, *which)
+    query = query.order_by(JobRequest.number).limit(limit).options(defer(JobRequest.body, raiseload=True))
+    return list(session.scalars(query))
+
+
+def _job(session: Session, job_id: str, lock: bool = False) -> Job:
+    job = session.get(Job, job_id, with_for_update={"key_share": True} if lock else None) if is_id(job_id) else None
+    if job is None:
+        raise UnknownJob
+    return job
+
+
+def _check_room(session: Session, more: int, most_waiting: int) -> None:
+    waiting = session.scalar(select(func.count()).select_from(JobRequest).where(JobRequest.state == "waiting")) or 0
+    if waiting + more > most_waiting:
+        raise TooManyWaiting

@@ -1,0 +1,193 @@
+"""The queue of jobs as those see it who work on it. A lease that ran out is leased again; a late result is dropped.
+
+A transaction that holds rows of `job_requests` may wait for rows of `jobs`, in order of their ids. One that holds a row
+of `jobs` never waits for rows of `job_requests`. So no two transactions wait for each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any, Literal
+
+from sqlalchemy import select, tuple_, update
+from sqlalchemy.orm import Session, defer
+
+from app.store import answers, jobs
+from app.store.job_events import conclude, request_ended, set_state
+from app.store.tables import Job, JobRequest, new_id
+
+Key = tuple[str, int]
+"""A request: the id of its job and its index."""
+
+
+@dataclass(frozen=True)
+class Lease:
+    """A request that is to be worked on: compressed JSON `body` of the endpoint `kind`, with a deadline [s]."""
+
+    job_id: str
+    number: int
+    attempt: int
+    kind: str
+    body: bytes
+    deadline: float
+    deaths: int
+    preempted: int
+
+    @property
+    def key(self) -> Key:
+        """The request."""
+        return self.job_id, self.number
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What lists show of an answer: wall time [s], energy [J], duration [s] and status; None if it has none."""
+
+    wall_time: float | None = None
+    energy: float | None = None
+    duration: float | None = None
+    status: str | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the work on a lease ended. `waiting`: it is to be done again.
+
+    `answer` is the compressed document, and `answer_id` its id, if it says so itself. `parts` are the answers that it
+    refers to: id, endpoint and compressed document.
+    """
+
+    lease: Lease
+    state: Literal["waiting", "done", "failed", "cancelled"]
+    figures: Figures = field(default_factory=Figures)
+    answer: bytes | None = None
+    parts: Sequence[tuple[str, str, bytes]] = ()
+    problem: dict[str, Any] | None = None
+    died: bool = False
+    preempted: bool = False
+    answer_id: str | None = None
+
+
+def lease(session: Session, holder: str, count: int, now: datetime, until: datetime) -> tuple[list[Lease], set[str]]:
+    """Up to `count` requests that wait, leased by `holder` until a time; and the jobs that changed."""
+    _take_back(session, JobRequest.leased_until < now)
+    waiting = select(JobRequest).where(JobRequest.state == "waiting").order_by(JobRequest.number, JobRequest.job_id)
+    found = list(session.scalars(waiting.limit(count).with_for_update(skip_locked=True)))
+    locked = _locked(session, (request.job_id for request in found))
+    leased, changed = [], set()
+    for request in found:
+        job = locked.get(request.job_id)
+        if job is None:
+            continue  # it has just been deleted
+        if job.state == "cancelling":
+            request.state = "cancelled"
+            request_ended(session, job, request)
+            changed.add(job.id)
+            continue
+        if job.state == "waiting":
+            job.started = job.started or now
+            set_state(session, job, "running")
+            changed.add(job.id)
+        request.state, request.attempt = "running", request.attempt + 1
+        request.leased_by, request.leased_until = holder, until
+        names = ("job_id", "number", "attempt", "kind", "body", "deadline", "deaths", "preempted")
+        leased.append(Lease(**{name: getattr(request, name) for name in names}))
+    for job_id in changed:
+        if locked[job_id].state == "cancelling":
+            conclude(session, locked[job_id], now)
+    return leased, changed
+
+
+def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: datetime) -> set[str]:
+    """Stores outcomes of the leases that `holder` still has, and drops the others; returns the jobs that changed."""
+    found = _held(session, holder, outcomes)
+    held = [(outcome, found.pop((outcome.lease.key, outcome.lease.attempt), None)) for outcome in outcomes]
+    locked = _locked(session, (outcome.lease.job_id for outcome, request in held if request is not None))
+    stopped = []
+    for outcome, request in held:
+        if request is not None:
+            job = locked[request.job_id]
+            _store(session, job, request, outcome)
+            if request.state == "failed" and not job.keep_going:
+                stopped.append(job)
+    for job in stopped:
+        if job.state == "running":
+            jobs.stop(session, job, now)
+    for job in locked.values():
+        conclude(session, job, now)
+    return set(locked)
+
+
+def renew(session: Session, holder: str, until: datetime) -> None:
+    """Extends all leases of `holder`."""
+    mine = (JobRequest.state == "running", JobRequest.leased_by == holder)
+    session.execute(update(JobRequest).where(*mine).values(leased_until=until))
+
+
+def kept(session: Session, holder: str) -> set[tuple[Key, int]]:
+    """Requests and attempts that `holder` has leased and nobody has cancelled."""
+    query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt).join(Job, Job.id == JobRequest.job_id)
+    query = query.where(JobRequest.state == "running", JobRequest.leased_by == holder, Job.state != "cancelling")
+    return {((job_id, number), attempt) for job_id, number, attempt in session.execute(query)}
+
+
+def is_due(session: Session, now: datetime) -> bool:
+    """Whether a request waits, or a lease ran out."""
+    waits = select(JobRequest.number).where(JobRequest.state == "waiting").limit(1)
+    ran_out = select(JobRequest.number).where(JobRequest.state == "running", JobRequest.leased_until < now).limit(1)
+    return session.scalar(waits) is not None or session.scalar(ran_out) is not None
+
+
+def take_back_from(session: Session, is_gone: Callable[[str], bool]) -> None:
+    """Ends the leases of holders that are known to have ended."""
+    holders = session.scalars(select(JobRequest.leased_by).where(JobRequest.state == "running").distinct())
+    gone = [holder for holder in holders if holder is not None and is_gone(holder)]
+    if gone:
+        _take_back(session, JobRequest.leased_by.in_(gone))
+
+
+def _take_back(session: Session, which: Any) -> None:
+    query = select(JobRequest).where(JobRequest.state == "running", which).options(defer(JobRequest.body))
+    for request in session.scalars(query.with_for_update(skip_locked=True)):
+        request.state, request.leased_by, request.leased_until = "waiting", None, None
+    session.flush()
+
+
+def _held(session: Session, holder: str, outcomes: Iterable[Outcome]) -> dict[tuple[Key, int], JobRequest]:
+    """The rows of the leases that `holder` still has, by request and attempt."""
+    query = select(JobRequest).where(
+        tuple_(JobRequest.job_id, JobRequest.number).in_([outcome.lease.key for outcome in outcomes]),
+        JobRequest.state == "running",
+        JobRequest.leased_by == holder,
+    )
+    # in one order for everybody
+    query = query.order_by(JobRequest.job_id, JobRequest.number).options(defer(JobRequest.body)).with_for_update()
+    return {((request.job_id, request.number), request.attempt): request for request in session.scalars(query)}
+
+
+def _locked(session: Session, job_ids: Iterable[str]) -> dict[str, Job]:
+    query = select(Job).where(Job.id.in_(set(job_ids))).order_by(Job.id).with_for_update(key_share=True)
+    return {job.id: job for job in session.scalars(query.execution_options(populate_existing=True))}
+
+
+def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome) -> None:
+    request.leased_by = request.leased_until = None
+    request.state = outcome.state
+    if outcome.state == "waiting":
+        request.deaths += outcome.died
+        request.preempted += outcome.preempted
+        request.attempt -= outcome.preempted
+        if job.state == "cancelling":
+            request.state = "cancelled"
+    for name, value in vars(outcome.figures).items():
+        setattr(request, name, value)
+    request.problem = outcome.problem
+    for answer_id, kind, document in outcome.parts:
+        answers.put_of_job(session, kind, document, job.id, answer_id, job.owner)
+    if outcome.answer is not None:
+        request.answer_id = outcome.answer_id or new_id()
+        answers.put_of_job(session, outcome.lease.kind, outcome.answer, job.id, request.answer_id, job.owner)
+    if request.state != "waiting":
+        request_ended(session, job, request)

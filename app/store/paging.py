@@ -1,0 +1,27 @@
+"""Positions in a list that is shown newest first, page by page."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Protocol
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_MICROSECOND = timedelta(microseconds=1)
+
+
+class Listed(Protocol):
+    """A row that a list shows."""
+
+    created: datetime
+    id: str
+
+
+def position_of(row: Listed) -> str:
+    """The `after` of the page that follows this row."""
+    return f"{(row.created - _EPOCH) // _MICROSECOND}_{row.id}"
+
+
+def position_after(text: str) -> tuple[datetime, str]:
+    """Time and id of the row of a position."""
+    microseconds, row_id = text.split("_")
+    return _EPOCH + int(microseconds) * _MICROSECOND, row_id

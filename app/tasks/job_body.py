@@ -1,0 +1,119 @@
+"""Validation of the body of a job, in a worker: it may have ten thousand requests."""
+
+from __future__ import annotations
+
+import hashlib
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from app.convert.json_text import parsed_json
+from app.engine.result import TaskResult
+from app.exceptions import InvalidRequest
+from app.http.problem_details import MOST_ERRORS, invalid_request
+from app.schemas.common import Request
+from app.schemas.evaluate import EvaluateRequest
+from app.schemas.jobs import NewJob as JobModel
+from app.store.jobs import NewJob, NewRequest
+from app.tasks.read_body import HeldBody
+
+
+@dataclass(frozen=True)
+class Deadlines:
+    """Longest deadline [s] of a request that has one, and the deadline of one that has none."""
+
+    longest: float
+    without: float
+
+
+@dataclass(frozen=True)
+class Validated(TaskResult):
+    """A job that may be stored. Its document is empty."""
+
+    job: NewJob = field(kw_only=True)
+
+    @classmethod
+    def of(cls, job: NewJob) -> Validated:
+        """The result with this job."""
+        return cls(b"", "application/json", job=job)
+
+
+@dataclass(frozen=True)
+class JobBodyTask:
+    """The JSON body of `POST /jobs` in `file`; with `evaluate`, the body of `POST /evaluate` as a job of its own."""
+
+    file: str
+    deadlines: Deadlines
+    request_id: str
+    evaluate: bool = False
+
+    def run(self, deadline: float) -> TaskResult:
+        """The job. Raises InvalidRequest."""
+        content = parsed_json(Path(self.file).read_bytes())
+        try:
+            if self.evaluate:
+                return Validated.of(job_of_one("evaluate", EvaluateRequest.model_validate(content), self.deadlines))
+            asked = JobModel.model_validate(content)
+        except ValidationError as error:
+            raise invalid_request(error, "body") from None
+        return Validated.of(_job(asked, self.deadlines))
+
+
+@dataclass(frozen=True)
+class JobOfOneTask:
+    """A validated request to the endpoint `kind`, which is too large to be looked at in the service's process."""
+
+    kind: str
+    asked: Request | HeldBody
+    deadlines: Deadlines
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The job. Raises InvalidRequest."""
+        assert not isinstance(self.asked, HeldBody), "in a worker it is the model itself"
+        return Validated.of(job_of_one(self.kind, self.asked, self.deadlines))
+
+
+def job_of_one(kind: str, asked: Request, deadlines: Deadlines) -> NewJob:
+    """A validated request as a job. Raises InvalidRequest if its deadline is too long."""
+    too_long = _too_long(asked, deadlines)
+    if too_long is not None:
+        raise InvalidRequest([{"loc": ["body", "deadline"], "msg": too_long}])
+    requests = [_new_request(kind, asked, deadlines)]
+    return NewJob(requests, _fingerprint(requests, "one"))
+
+
+def _job(asked: JobModel, deadlines: Deadlines) -> NewJob:
+    wrong, requests = [], []
+    for index, each in enumerate(asked.requests):
+        ((kind, request),) = ((name, getattr(each, name)) for name in type(each).model_fields)
+        too_long = _too_long(request, deadlines)
+        if too_long is not None:
+            wrong.append({"loc": ["body", "requests", index, kind, "deadline"], "msg": too_long})
+        else:
+            requests.append(_new_request(kind, request, deadlines))
+    if wrong:
+        raise InvalidRequest(wrong[:MOST_ERRORS])
+    told_apart_by = f"{asked.keep_going} {asked.name}"
+    return NewJob(requests, _fingerprint(requests, told_apart_by), asked.name, asked.keep_going)
+
+
+def _too_long(asked: Request, deadlines: Deadlines) -> str | None:
+    given = getattr(asked, "deadline", 0.0) if "deadline" in asked.model_fields_set else 0.0
+    return f"deadline must be at most {deadlines.longest:g} s." if given > deadlines.longest else None
+
+
+def _new_request(kind: str, asked: Request, deadlines: Deadlines) -> NewRequest:
+    deadline = min(getattr(asked, "deadline", deadlines.without), deadlines.longest)
+    body = asked.model_dump_json(exclude_unset=True).encode()
+    return NewRequest(kind, zlib.compress(body), deadline)
+
+
+def _fingerprint(requests: Iterable[NewRequest], rest: str) -> str:
+    digest = hashlib.sha256(rest.encode())
+    for each in requests:
+        digest.update(f"\0{each.kind}\0{len(each.body)}\0".encode() + each.body)
+    return digest.hexdigest()

@@ -1,0 +1,100 @@
+"""One request of a job in a worker: the task of its endpoint, and what lists show of its answer."""
+
+from __future__ import annotations
+
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import orjson
+
+from app.convert.evaluation import to_evaluate_response
+from app.engine.result import StoredAnswer, TaskResult
+from app.schemas.compare import CompareRequest
+from app.schemas.cycle import CycleRequest
+from app.schemas.evaluate import EvaluateRequest
+from app.schemas.pareto import ParetoRequest
+from app.schemas.request import OptimizeRequest
+from app.schemas.whatif import WhatifRequest
+from app.store.leases import Figures
+from app.tasks.compare import CompareTask
+from app.tasks.cycle import CycleTask
+from app.tasks.evaluate import evaluated
+from app.tasks.optimize import OptimizeTask
+from app.tasks.pareto import ParetoTask
+from app.tasks.whatif import WhatifTask
+from optimizer.deadline import Deadline
+
+
+@dataclass(frozen=True)
+class JobResult(TaskResult):
+    """An answer with its figures. Its documents are compressed; `parts` is the endpoint of those in `stored`."""
+
+    figures: Figures = field(kw_only=True)
+    parts: str = field(kw_only=True)
+
+
+@dataclass(frozen=True)
+class JobRequestTask:
+    """A validated request to the endpoint `kind`: its compressed JSON, and its id."""
+
+    kind: str
+    body: bytes
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The answer of the endpoint, within about `deadline` seconds."""
+        began = time.perf_counter()
+        result = _RUN[self.kind](zlib.decompress(self.body), self.request_id, deadline)
+        answer = orjson.loads(result.document)
+        # here and not in the service, which has more to do; nobody waits, so that size counts more than time
+        return JobResult(
+            zlib.compress(result.document),
+            result.media_type,
+            tuple(StoredAnswer(part.id, zlib.compress(part.body)) for part in result.stored),
+            result.kept_as,
+            figures=Figures(
+                time.perf_counter() - began, *_ENERGY_AND_DURATION[self.kind](answer), answer.get("status")
+            ),
+            parts="evaluate" if self.kind == "whatif" and answer["objective"] is None else "optimize",
+        )
+
+
+def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
+    request = EvaluateRequest.model_validate_json(body)
+    evaluation = evaluated(request, Deadline.after(deadline))
+    return TaskResult.of_json(to_evaluate_response(request_id, request.robot, evaluation))
+
+
+_RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {
+    "optimize": lambda body, own, left: OptimizeTask(OptimizeRequest.model_validate_json(body), own).run(left),
+    "cycle": lambda body, own, left: CycleTask(CycleRequest.model_validate_json(body), own).run(left),
+    "pareto": lambda body, own, left: ParetoTask(ParetoRequest.model_validate_json(body), own, "json").run(left),
+    "compare": lambda body, own, left: CompareTask(CompareRequest.model_validate_json(body), own).run(left),
+    "whatif": lambda body, own, left: WhatifTask(WhatifRequest.model_validate_json(body), own).run(left),
+    "evaluate": _evaluate,
+}
+
+
+def _of_motion(answer: dict[str, Any]) -> tuple[float | None, float | None]:
+    return answer["energy"][answer.get("objective", "electrical")]["total"], answer["duration"]
+
+
+def _of_given_motion(answer: dict[str, Any]) -> tuple[float | None, float | None]:
+    return answer["total"]["energy"]["electrical"]["total"], answer["duration"]
+
+
+def _of_several(_: dict[str, Any]) -> tuple[float | None, float | None]:
+    return None, None
+
+
+_ENERGY_AND_DURATION = {
+    "optimize": _of_motion,
+    "cycle": _of_motion,
+    "pareto": _of_several,
+    "compare": _of_several,
+    "whatif": _of_several,
+    "evaluate": _of_given_motion,
+}

@@ -1,0 +1,118 @@
+"""Work that can wait: it comes after callers, and gives its worker to one that waits. The tests move the clock."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.engine.spare import PATIENCE
+from app.exceptions import Preempted, WorkerDied
+from optimizer.exceptions import DeadlineExceeded
+from tests.app.engine.simple_tasks import Die, Hold, ProcessId
+from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, Bench, until, with_engine
+
+
+async def spare(bench: Bench, folder: Path, **options: Any) -> tuple[asyncio.Task[Any], Path]:
+    """Work that can wait and runs in a worker; touch the path to let it end."""
+    folder.mkdir()
+    running = asyncio.create_task(bench.engine.spare.run(Hold(folder), LONG, **options))
+    await until((folder / "started").exists)
+    return running, folder / "released"
+
+
+def test_it_waits_while_a_caller_waits(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        first, release = await bench.held()
+        later = asyncio.create_task(bench.engine.spare.run(ProcessId(), LONG))
+        second = await bench.queued(ProcessId())
+        order: list[str] = []
+        later.add_done_callback(lambda _: order.append("later"))
+        second.add_done_callback(lambda _: order.append("second"))
+        release.touch()
+        await asyncio.gather(first, second, later)
+        assert order == ["second", "later"], "it came first and yet was run last"
+
+    with_engine(tmp_path, test, queue_size=2)
+
+
+def test_a_caller_that_waits_takes_its_worker(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        running, _ = await spare(bench, tmp_path / "spare")
+        (pid,) = bench.engine.worker_pids
+        caller = await bench.queued(ProcessId())
+        await asyncio.sleep(0.05)
+        assert not running.done(), "it has some time"
+        bench.move_clock(PATIENCE)
+        with pytest.raises(Preempted):
+            await running
+        assert int((await caller).document) != pid
+
+    with_engine(tmp_path, test)
+
+
+def test_what_is_not_stoppable_is_left_to_end(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        running, release = await spare(bench, tmp_path / "spare", stoppable=False)
+        caller = await bench.queued(ProcessId())
+        bench.move_clock(10 * PATIENCE)
+        await asyncio.sleep(0.05)
+        assert not running.done()
+        release.touch()
+        assert (await running).document == (await caller).document
+
+    with_engine(tmp_path, test)
+
+
+def test_a_caller_that_waits_for_callers_takes_nothing(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        running, release = await spare(bench, tmp_path / "spare")
+        held, release_held = await bench.held()
+        caller = await bench.queued(ProcessId())
+        bench.move_clock(10 * PATIENCE)
+        await asyncio.sleep(0.05)
+        assert not running.done(), "work that can wait has one of two workers only"
+        release.touch()
+        release_held.touch()
+        await asyncio.gather(running, held, caller)
+
+    with_engine(tmp_path, test, workers=2)
+
+
+def test_cancelling_kills_its_worker(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        running, _ = await spare(bench, tmp_path / "spare")
+        (pid,) = bench.engine.worker_pids
+        running.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await running
+        assert await bench.pid() != pid
+
+    with_engine(tmp_path, test)
+
+
+def test_its_deadline_counts_from_its_start(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        first, release = await bench.held()
+        later = asyncio.create_task(bench.engine.spare.run(ProcessId(), deadline=1.0))
+        await asyncio.sleep(0)
+        bench.move_clock(LONG / 2)
+        release.touch()
+        assert (await later).document == (await first).document
+        running, _ = await spare(bench, tmp_path / "spare")
+        bench.move_clock(LONG + DEADLINE_GRACE)
+        with pytest.raises(DeadlineExceeded):
+            await running
+
+    with_engine(tmp_path, test)
+
+
+def test_a_crash_is_told(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        with pytest.raises(WorkerDied):
+            await bench.engine.spare.run(Die(), LONG)
+        await bench.engine.spare.run(ProcessId(), LONG)
+
+    with_engine(tmp_path, test)

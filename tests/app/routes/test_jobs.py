@@ -1,0 +1,275 @@
+"""Jobs over HTTP: their life, their results, what is refused, `Prefer: respond-async`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.main import create_app
+from app.schemas import errors as problems
+from app.schemas.jobs import Job, JobList
+from app.schemas.response import OptimizeResponse
+from app.settings import Settings
+from tests.app.job_clients import ended, evaluation, optimization, parsed, sent, shown
+from tests.app.live import LOCAL
+from tests.app.requests import HOME, NEAR, move
+from tests.app.routes.test_problems import refused
+
+ABSENT = "/jobs/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"
+TOO_SHORT = {"optimize": move(duration=0.01)}
+LATER = {"Prefer": "respond-async"}
+
+
+@pytest.fixture(scope="module")
+def mixed(client: TestClient) -> tuple[str, dict[str, Any]]:
+    """A job of every kind, after its end."""
+    start, goal = {"q": HOME}, {"q": NEAR}
+    requests = [
+        optimization(),
+        TOO_SHORT,
+        evaluation(),
+        {"pareto": move(points=2, method="time_scaling")},
+        {"compare": move(methods=["time_scaling", "uniform_scaling"])},
+        {"whatif": {"evaluate": evaluation()["evaluate"], "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}]}},
+        {"cycle": {"start": start, "stops": [{"target": goal}], "windings": False, "deadline": 100.0}},
+    ]
+    path = sent(client, requests, name="Every kind ✓")
+    return path, ended(client, path)
+
+
+def test_every_kind_is_answered_as_by_its_endpoint(client: TestClient, mixed: Any) -> None:
+    _, job = mixed
+    assert (job["name"], job["state"], job["progress"], job["eta"]) == ("Every kind ✓", "done", 1.0, None)
+    assert job["counts"] == {"waiting": 0, "running": 0, "done": 6, "failed": 1, "cancelled": 0}
+    assert [each["index"] for each in job["requests"]] == list(range(7))
+    kinds = ["optimize", "optimize", "evaluate", "pareto", "compare", "whatif", "cycle"]
+    assert [each["kind"] for each in job["requests"]] == kinds
+    for each in job["requests"]:
+        assert (each["state"] == "failed") == (each["index"] == 1) == (each["answer"] is None)
+        if each["answer"] is not None:
+            kept = client.get(each["answer"]).json()
+            assert kept["kind"] == each["kind"]
+            assert kept["answer"]["id"] == f"{job['id']}.{each['index']}"
+    alone = client.post("/optimize", json=optimization()["optimize"]).json()
+    answer = client.get(job["requests"][0]["answer"]).json()["answer"]
+    OptimizeResponse.model_validate(answer)
+    assert answer["trajectory"] == alone["trajectory"]
+    assert job["requests"][0]["energy"] == alone["energy"]["electrical"]["total"]
+    assert (job["requests"][0]["duration"], job["requests"][0]["status"]) == (alone["duration"], alone["status"])
+    assert job["requests"][2]["energy"] > 0 and job["requests"][6]["energy"] > 0
+    assert job["requests"][3]["energy"] is None, "a front has several"
+
+
+def test_a_failed_request_has_the_problem_of_its_endpoint(client: TestClient, mixed: Any) -> None:
+    _, job = mixed
+    problem = job["requests"][1]["problem"]
+    problems.DurationTooShort.model_validate(problem)
+    alone = client.post("/optimize", json=TOO_SHORT["optimize"]).json()
+    assert problem | {"instance": ""} == alone | {"instance": ""}
+
+
+def test_answers_within_answers_are_kept(client: TestClient, mixed: Any) -> None:
+    _, job = mixed
+    front = client.get(job["requests"][3]["answer"]).json()["answer"]
+    for point in front["points"]:
+        assert client.get(point["answer"]).json()["kind"] == "optimize"
+    changed = client.get(job["requests"][5]["answer"]).json()["answer"]
+    assert client.get(changed["base"]["answer"]).json()["kind"] == "evaluate"
+
+
+def test_requests_come_page_by_page(client: TestClient, mixed: Any) -> None:
+    path, job = mixed
+    after, found = -1, []
+    while after is not None:
+        page = client.get(f"{path}?limit=3&after={after}").json()
+        found += page["requests"]
+        after = page["next"]
+    assert found == job["requests"]
+
+
+def test_results_as_lines(client: TestClient, mixed: Any) -> None:
+    path, job = mixed
+    answer = client.get(f"{path}/results")
+    assert answer.headers["content-type"].startswith("application/x-ndjson")
+    lines = [json.loads(line) for line in answer.text.splitlines()]
+    for line, each in zip(lines, job["requests"], strict=True):
+        result = line.pop("result")
+        assert line == each
+        assert result == (None if each["answer"] is None else client.get(each["answer"]).json()["answer"])
+
+
+def test_results_as_a_table(client: TestClient, mixed: Any) -> None:
+    path, job = mixed
+    answer = client.get(f"{path}/results", headers={"Accept": "text/csv"})
+    assert answer.headers["content-type"].startswith("text/csv")
+    rows = list(csv.DictReader(io.StringIO(answer.text)))
+    assert [int(row["index"]) for row in rows] == list(range(7))
+    assert [row["problem"] for row in rows] == ["", "duration-too-short", "", "", "", "", ""]
+    assert float(rows[0]["energy_J"]) == job["requests"][0]["energy"]
+    assert [row["answer"] or None for row in rows] == [each["answer"] for each in job["requests"]]
+
+
+def test_events_tell_the_whole_story_and_resume(client: TestClient, mixed: Any) -> None:
+    path, _ = mixed
+    found = list(parsed(iter(client.get(f"{path}/events").text.splitlines())))
+    assert [event.number for event in found] == list(range(1, len(found) + 1))
+    assert [event.data["state"] for event in found if event.name == "state"] == ["waiting", "running", "done"]
+    assert sorted(event.data["index"] for event in found if event.name == "request") == list(range(7))
+    assert found[-1].name == "end"
+    for after in (0, 3, len(found) - 1, len(found), 10**8):
+        rest = client.get(f"{path}/events", headers={"Last-Event-ID": str(after)}).text.splitlines()
+        assert list(parsed(iter(rest))) == found[after:]
+    everything = client.get(f"{path}/events", headers={"Last-Event-ID": "no number"}).text.splitlines()
+    assert list(parsed(iter(everything))) == found
+
+
+def test_jobs_are_listed(client: TestClient) -> None:
+    paths = [sent(client, [evaluation()]) for _ in range(3)]
+    for path in paths:
+        ended(client, path)
+    found, after = [], ""
+    while True:
+        answer = client.get(f"/jobs?state=done&limit=2{after}")
+        page = JobList.model_validate_json(answer.content)
+        found += [f"/jobs/{job.id}" for job in page.jobs]
+        if page.next is None:
+            break
+        after = f"&after={page.next}"
+    assert found[:3] == paths[::-1]
+    assert len(set(found)) == len(found)
+    assert client.get("/jobs?state=cancelling").json() == {"jobs": [], "next": None}
+
+
+def test_a_malformed_request_refuses_the_whole_job(client: TestClient) -> None:
+    before = client.get("/jobs?limit=1").json()
+    wrong: list[tuple[Any, list[Any]]] = [
+        ({"requests": []}, ["requests"]),
+        ({"requests": [evaluation()] * 10_001}, ["requests"]),
+        ({"requests": [evaluation(), {}]}, ["requests", 1]),
+        ({"requests": [evaluation(), evaluation() | optimization()]}, ["requests", 1]),
+        ({"requests": [evaluation(), {"ik": {}}]}, ["requests", 1]),
+        ({"requests": [evaluation(), evaluation(), evaluation(-1.0)]}, ["requests", 2, "evaluate", "time_per_segment"]),
+        ({"requests": [evaluation(), optimization(deadline=3601.0)]}, ["requests", 1, "optimize", "deadline"]),
+        ({"requests": [evaluation()], "keep_going": "no"}, ["keep_going"]),
+        ({"requests": [evaluation()], "name": "\n"}, ["name"]),
+    ]
+    for body, expected in wrong:
+        content = refused(client.post("/jobs", json=body), problems.Validation)
+        loc = content["errors"][0]["loc"]
+        assert loc[: 1 + len(expected)] == ["body", *expected], content
+    for text in (b"", b"{", b"\xff", b"[" * 100_000):
+        answer = client.post("/jobs", content=text, headers={"Content-Type": "application/json"})
+        refused(answer, problems.Validation)
+    refused(client.post("/jobs", content=b"{}", headers={"Content-Type": "text/plain"}), problems.Validation)
+    assert client.get("/jobs?limit=1").json() == before, "nothing was stored"
+
+
+def test_a_key_makes_one_job(client: TestClient) -> None:
+    body = {"requests": [evaluation()], "name": "once"}
+    first, again = (client.post("/jobs", json=body, headers={"Idempotency-Key": "jobs-1"}) for _ in range(2))
+    assert (first.status_code, again.status_code) == (202, 202)
+    assert first.json()["id"] == again.json()["id"]
+    assert "idempotency-replayed" not in first.headers
+    assert again.headers["idempotency-replayed"] == "true"
+    for other in ({"requests": [evaluation(2.0)], "name": "once"}, {"requests": [evaluation()]}):
+        refused(client.post("/jobs", json=other, headers={"Idempotency-Key": "jobs-1"}), problems.KeyReused)
+    refused(client.post("/optimize", json=move(), headers=LATER | {"Idempotency-Key": "jobs-1"}), problems.KeyReused)
+
+
+def test_unknown_jobs(client: TestClient) -> None:
+    for path in (ABSENT, "/jobs/no%00such", "/jobs/x"):
+        answers = [client.get(path), client.get(f"{path}/events"), client.get(f"{path}/results"), client.delete(path)]
+        answers += [client.post(f"{path}/{word}") for word in ("cancel", "retry")]
+        for answer in answers:
+            refused(answer, problems.UnknownJob)
+
+
+def test_an_ended_job_is_retried_or_deleted_but_not_cancelled(client: TestClient) -> None:
+    path = sent(client, [evaluation(), TOO_SHORT])
+    before = ended(client, path)
+    refused(client.post(f"{path}/cancel"), problems.JobNotCancellable)
+    answer = client.post(f"{path}/retry")
+    assert answer.status_code == 202
+    after = ended(client, path)
+    assert after["requests"][0] == before["requests"][0], "what was done is untouched"
+    assert (after["requests"][1]["attempt"], after["requests"][1]["state"]) == (2, "failed")
+    names = [event.name for event in parsed(iter(client.get(f"{path}/events").text.splitlines()))]
+    assert names.count("end") == 2, "and the stream goes on after the first"
+    assert client.delete(path).status_code == 204
+    refused(client.get(path), problems.UnknownJob)
+    refused(client.get(before["requests"][0]["answer"]), problems.UnknownAnswer)
+
+
+POSTS: dict[str, Any] = {
+    "/optimize": move(),
+    "/compare": move(methods=["time_scaling"]),
+    "/pareto": move(points=2, method="time_scaling"),
+    "/cycle": {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "windings": False},
+    "/whatif": {"evaluate": evaluation()["evaluate"], "changes": [{"name": "x", "arm": {"link_mass_scale": 0.5}}]},
+    "/evaluate": evaluation()["evaluate"],
+}
+
+
+@pytest.mark.parametrize("path", POSTS)
+def test_any_request_may_become_a_job(path: str, client: TestClient) -> None:
+    answer = client.post(path, json=POSTS[path], headers=LATER)
+    assert answer.status_code == 202, answer.text
+    Job.model_validate_json(answer.content)
+    assert answer.headers["preference-applied"] == "respond-async"
+    (only,) = ended(client, answer.headers["location"])["requests"]
+    assert (only["kind"], only["state"]) == (path[1:], "done")
+
+
+def test_a_client_may_wait_for_the_answer_of_its_job(client: TestClient) -> None:
+    waiting = {"Prefer": 'foo; bar="x", Respond-Async, wait=100'}
+    answer = client.post("/optimize", json=move(), headers=waiting)
+    assert (answer.status_code, answer.headers["preference-applied"]) == (200, "wait=100")
+    OptimizeResponse.model_validate_json(answer.content)
+    job = shown(client, answer.headers["location"])
+    assert client.get(job["requests"][0]["answer"]).json()["answer"] == answer.json()
+    answer = client.post("/optimize", json=TOO_SHORT["optimize"], headers=waiting)
+    refused(answer, problems.DurationTooShort)
+    assert answer.headers["preference-applied"] == "wait=100"
+
+
+@pytest.mark.parametrize("prefer", ["wait=5", "respond-asynchronously", "", "respond-async=1"])
+def test_other_preferences_have_no_effect(prefer: str, client: TestClient) -> None:
+    answer = client.post("/evaluate", json=evaluation()["evaluate"], headers={"Prefer": prefer})
+    assert answer.status_code == 200
+    assert "preference-applied" not in answer.headers
+
+
+def test_a_table_is_evaluated_at_once(client: TestClient) -> None:
+    table = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
+    headers = LATER | {"Content-Type": "text/csv"}
+    answer = client.post("/evaluate", params={"time_per_segment": "1.5"}, content=table, headers=headers)
+    assert (answer.status_code, "preference-applied" in answer.headers) == (200, False)
+
+
+def test_a_job_may_have_a_longer_deadline(client: TestClient) -> None:
+    longer = move(deadline=300.0)
+    refused(client.post("/optimize", json=longer), problems.Validation)
+    path = client.post("/optimize", json=longer, headers=LATER).headers["location"]
+    assert ended(client, path)["counts"]["done"] == 1
+
+
+def test_limits_of_the_service() -> None:
+    settings = Settings(workers=1, max_waiting=3, max_job_bytes=4096, max_job_deadline=5.0)
+    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as small:
+        content = refused(small.post("/jobs", json={"requests": [evaluation()] * 4}), problems.Busy)
+        assert "jobs" in content["detail"]
+        answer = small.post("/jobs", json={"requests": [optimization()] * 100})
+        refused(answer, problems.BodyTooLarge)
+        late = {"requests": [evaluation(), {"optimize": move(deadline=6.0)}]}
+        (error,) = refused(small.post("/jobs", json=late), problems.Validation)["errors"]
+        assert error == {
+            "loc": ["body", "requests", 1, "optimize", "deadline"],
+            "msg": "deadline must be at most 5 s.",
+        }
+        answer = small.post("/optimize", json=move(deadline=6.0), headers=LATER)
+        assert refused(answer, problems.Validation)["errors"][0]["loc"] == ["body", "deadline"]

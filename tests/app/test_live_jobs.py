@@ -1,0 +1,159 @@
+"""Jobs in `python -m app` over a real socket: killed services and workers, several services, cancelling, callers."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import httpx2
+import pytest
+from sqlalchemy import text
+
+from app.schemas.errors import WorkerDied
+from app.store.database import create_database_engine
+from tests.app.databases import postgres, why_no_postgres
+from tests.app.job_clients import Event, KilledService, ended, evaluation, events, optimization, over, sent, shown
+from tests.app.live import GRACE, Server, alive, processor_time, serving
+from tests.app.requests import long_search, move
+from tests.app.test_server import AT_WORK, until
+
+MISSING = why_no_postgres()
+LONG = {"optimize": long_search(100.0)}
+
+
+def mixture(count: int) -> list[dict[str, Any]]:
+    """Different requests, one in four of which takes longer than the others."""
+    return [optimization(1.0 + 0.01 * k) if k % 4 == 0 else evaluation(1.0 + 0.01 * k) for k in range(count)]
+
+
+def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: list[Any]) -> None:
+    """Every request has its own answer, and none has two."""
+    assert [line["index"] for line in lines] == list(range(len(requests)))
+    assert [line["state"] for line in lines] == ["done"] * len(requests), job["counts"]
+    assert len({line["answer"] for line in lines}) == len(requests)
+    for line, request in zip(lines, requests, strict=True):
+        assert line["result"]["id"] == f"{job['id']}.{line['index']}"
+        if line["kind"] == "evaluate":
+            assert line["result"]["duration"] == pytest.approx(request["evaluate"]["time_per_segment"])
+
+
+@pytest.mark.parametrize(
+    ("kills", "count"), [(2, 30), pytest.param(20, 500, marks=pytest.mark.long)], ids=["short", "long"]
+)
+def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_path: Path) -> None:
+    """Neither answers nor events: the client knows the number of the last event that it received whole."""
+    requests = mixture(count)
+    service = KilledService(tmp_path, seed=kills, workers=1, deadline_grace=GRACE)
+    lines, job = service.run(requests, kills, longest=0.08 * count / kills)
+    assert service.kills == kills
+    check_each_once(lines, job, requests)
+    assert min(service.progress_at_kills) < 1.0, "it was killed while the job ran"
+    check_events(service.events, count)
+
+
+def check_events(found: list[Event], count: int) -> None:
+    """None is lost, and none comes twice."""
+    assert [event.number for event in found] == list(range(1, len(found) + 1))
+    assert sorted(event.data["index"] for event in found if event.name == "request") == list(range(count))
+    assert [event.name for event in found].count("end") == 1 and found[-1].name == "end"
+
+
+@pytest.fixture(scope="module")
+def single() -> Iterator[Server]:
+    """A service with one worker."""
+    with serving(workers=1, deadline_grace=GRACE) as server:
+        yield server
+
+
+def running(server: Server, path: str) -> None:
+    """Waits until a worker is at work on the job."""
+    until(lambda: shown(over(server), path)["counts"]["running"] > 0)
+
+
+def test_cancelling_kills_the_worker_that_runs(single: Server) -> None:
+    path = sent(over(single), [LONG, evaluation()])
+    running(single, path)
+    (worker,) = single.workers()
+    answer = single.post(f"{path}/cancel", None)
+    assert answer.status_code == 202
+    until(lambda: not alive(worker))
+    job = ended(over(single), path)
+    assert (job["state"], job["counts"]["cancelled"]) == ("cancelled", 2)
+    assert single.post(f"{path}/cancel", None).json()["state"] == "cancelled"
+    assert single.post("/optimize", move()).status_code == 200
+
+
+def test_deleting_kills_the_worker_that_runs(single: Server) -> None:
+    until(lambda: len(single.workers()) == 1)
+    path = sent(over(single), [LONG])
+    running(single, path)
+    (worker,) = single.workers()
+    assert httpx2.delete(single.url + path).status_code == 204
+    until(lambda: not alive(worker))
+    assert single.get(path).status_code == 404
+
+
+def test_a_request_that_kills_its_workers_fails(single: Server) -> None:
+    path = sent(over(single), [LONG])
+    used: dict[int, float] = {}
+    killed: list[int] = []
+
+    def has_failed() -> bool:
+        for worker in set(single.workers()) - set(killed):
+            if processor_time(worker) > used.setdefault(worker, processor_time(worker)) + AT_WORK:
+                os.kill(worker, signal.SIGKILL)
+                killed.append(worker)
+        return bool(shown(over(single), path)["state"] == "done")
+
+    until(has_failed)
+    assert len(killed) == 3
+    (only,) = shown(over(single), path)["requests"]
+    assert (only["state"], only["attempt"]) == ("failed", 3)
+    WorkerDied.model_validate(only["problem"])
+
+
+def test_a_caller_need_not_wait_for_a_job(single: Server) -> None:
+    path = sent(over(single), [LONG])
+    running(single, path)
+    assert single.post("/optimize", move()).status_code == 200
+    assert shown(over(single), path)["state"] == "running", "it was not waited for"
+    single.post(f"{path}/cancel", None)
+    assert ended(over(single), path)["state"] == "cancelled"
+
+
+def test_a_stop_ends_event_streams_and_gives_the_work_back(tmp_path: Path) -> None:
+    url, found = f"sqlite:///{tmp_path}/joulepath.db", list[Event]()
+    with serving(database_url=url, workers=1) as server:
+        path = sent(over(server), [LONG, evaluation()])
+        follower = threading.Thread(target=lambda: found.extend(events(server, path)))
+        follower.start()
+        running(server, path)
+        assert server.terminate() == 0
+        follower.join()
+        assert [entry for entry in server.logged() if entry["level"] == "error"] == []
+    assert [event.name for event in found][:2] == ["state", "state"]
+    with create_database_engine(url).connect() as connection:
+        rows = connection.execute(text("SELECT state, leased_by, deaths FROM job_requests")).all()
+    assert [tuple(row) for row in rows] == [("waiting", None, 0)] * 2
+
+
+@pytest.mark.long
+@pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
+def test_services_share_one_postgresql() -> None:
+    requests = mixture(60)
+    with postgres() as database, ExitStack() as services:
+        servers = [services.enter_context(serving(database_url=database.url, workers=1)) for _ in range(2)]
+        path = sent(over(servers[0]), requests)
+        until(lambda: shown(over(servers[1]), path)["counts"]["done"] > 5)
+        servers[0].process.kill()
+        job = ended(over(servers[1]), path)
+        found = list(events(servers[1], path))
+    assert Counter(each["state"] for each in job["requests"]) == {"done": 60}
+    assert len({each["answer"] for each in job["requests"]}) == 60
+    check_events(found, 60)
