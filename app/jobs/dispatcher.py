@@ -229,7 +229,8 @@ class Dispatcher:
                 if (each.lease.key, each.lease.attempt) not in kept:
                     self._stop_work(each)
         if self._times.pruned is None or now - self._times.pruned >= PRUNING:
-            await self._store.write(partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age)))
+            prune = partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age))
+            await self._store.write(prune, frees=True)
             self._times.pruned = now
 
     async def _settle(self, outcomes: list[Outcome]) -> set[str]:

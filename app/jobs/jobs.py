@@ -55,7 +55,7 @@ class Jobs:
 
     async def delete(self, job_id: str, client: Client) -> None:
         """Deletes a job with its answers; what runs is stopped. Raises UnknownJob, NotOwner or StoreUnavailable."""
-        await self.store.write(partial(jobs.delete, job_id=job_id, client=client))
+        await self.store.write(partial(jobs.delete, job_id=job_id, client=client), frees=True)
         self._has_changed(job_id, stop=True)
 
     async def ended(self, job_id: str, longest: float) -> JobView:

@@ -5,9 +5,35 @@ from __future__ import annotations
 import signal
 from importlib import import_module
 
-from app.tasks import compare, cycle, evaluate, ik, ik_path, optimize, own_robot, pareto, read_body, whatif
+from app.tasks import (
+    compare,
+    cycle,
+    evaluate,
+    ik,
+    ik_path,
+    job_body,
+    job_request,
+    optimize,
+    own_robot,
+    pareto,
+    read_body,
+    whatif,
+)
 
-__all__ = ["compare", "cycle", "evaluate", "ik", "ik_path", "optimize", "own_robot", "pareto", "read_body", "whatif"]
+__all__ = [
+    "compare",
+    "cycle",
+    "evaluate",
+    "ik",
+    "ik_path",
+    "job_body",
+    "job_request",
+    "optimize",
+    "own_robot",
+    "pareto",
+    "read_body",
+    "whatif",
+]
 
 # imported where it is called, because the process that answers HTTP does not need it
 import_module("toppra")
