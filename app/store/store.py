@@ -114,15 +114,21 @@ class Store:
         return result
 
     def _free(self, work: Callable[[Session], T]) -> T:
-        try:
+        if self._reserve is None or self._file is None:
             return self._write(work)
+        released = False
+        try:
+            result = self._write(work)
         except StoreUnavailable as error:
-            if error.cause != "full" or self._reserve is None or not self._reserve.release():
+            released = error.cause == "full" and self._reserve.release()
+            if not released:
                 raise
-        result = self._write(work)
-        self._empty_log()
-        assert self._reserve is not None
-        self._reserve.fill()
+            result = self._write(work)
+        with contextlib.suppress(OSError):
+            # what was deleted is of use only if the log may grow; to empty it, the file may have to
+            if released or (room(self._file) < LEAST_ROOM and self._reserve.release()):
+                self._empty_log()
+                self._reserve.fill()
         return result
 
     def _empty_log(self) -> None:

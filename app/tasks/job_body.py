@@ -102,12 +102,14 @@ def _job(asked: JobModel, deadlines: Deadlines) -> NewJob:
 
 
 def _too_long(asked: Request, deadlines: Deadlines) -> str | None:
-    given = getattr(asked, "deadline", 0.0) if "deadline" in asked.model_fields_set else 0.0
-    return f"deadline must be at most {deadlines.longest:g} s." if given > deadlines.longest else None
+    given = getattr(asked, "deadline", None) if "deadline" in asked.model_fields_set else None
+    too_long = given is not None and given > deadlines.longest
+    return f"deadline must be at most {deadlines.longest:g} s." if too_long else None
 
 
 def _new_request(kind: str, asked: Request, deadlines: Deadlines) -> NewRequest:
-    deadline = min(getattr(asked, "deadline", deadlines.without), deadlines.longest)
+    given = getattr(asked, "deadline", None)
+    deadline = min(deadlines.without if given is None else given, deadlines.longest)
     body = asked.model_dump_json(exclude_unset=True).encode()
     return NewRequest(kind, zlib.compress(body), deadline)
 
