@@ -53,6 +53,7 @@ class Store:
         self.pruning = Pruning(clock)
         self._paused: dict[bool, tuple[float, StoreFault]] = {}
         self._checking: asyncio.Task[None] | None = None
+        self._told: StoreFault | None = None
         self.fault: StoreFault | None = None
         """What is wrong with the database, as far as known; None if it was last read and written."""
 
@@ -70,18 +71,20 @@ class Store:
 
     async def check(self) -> None:
         """Brings `fault` up to date, without writing anything."""
-        known = self.fault
         try:
             await asyncio.get_running_loop().run_in_executor(self._threads, self._check)
         except StoreUnavailable as error:
-            if known != error.cause:
+            # `fault` may be known from other work, of which the operator was told nothing
+            if self._told != error.cause:
+                self._told = error.cause
                 logger.error(
                     "the database cannot be used: requests that need studies or stored answers return 503 until it "
                     "can; all other requests work",
                     extra={"database": str(self), "cause": error.cause},
                 )
         else:
-            if known is not None:
+            if self._told is not None:
+                self._told = None
                 logger.info("the database can be used again", extra={"database": str(self)})
 
     async def read(self, work: Callable[[Session], T]) -> T:

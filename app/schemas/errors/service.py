@@ -200,8 +200,8 @@ class NotOwner(ProblemDetails):
 
 
 class AnswerInUse(ProblemDetails):
-    """The answer belongs to a study, whose history refers to it. It is deleted with the study:
-    `DELETE /studies/{id}`."""
+    """The answer belongs to a study or a job, which refers to it. It is deleted with that: `DELETE /studies/{id}` or
+    `DELETE /jobs/{id}`."""
 
     type: Literal["/problems/answer-in-use"] = fixed("type", "/problems/answer-in-use")
     title: Literal["Answer in use"] = fixed("title", "Answer in use")
