@@ -21,6 +21,7 @@ from optimizer.exceptions import (
     UnreachablePose,
 )
 from optimizer.optimize import optimize
+from optimizer.optimize_many import Optimized, optimize_many
 from optimizer.optimize_round import optimize_round
 from optimizer.pareto import Front, pareto
 from optimizer.problem.arm import Arm, Payload
@@ -50,6 +51,7 @@ __all__ = [
     "NoReachableTarget",
     "NoSequence",
     "NoTrajectory",
+    "Optimized",
     "OutsideLimits",
     "PathInfeasible",
     "Payload",
@@ -67,6 +69,7 @@ __all__ = [
     "WorkRound",
     "load_robot",
     "optimize",
+    "optimize_many",
     "optimize_round",
     "pareto",
 ]

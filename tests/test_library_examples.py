@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+import subprocess
 import sys
 from pathlib import Path
 
@@ -73,3 +74,14 @@ def test_pareto_front(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     assert energies == sorted(energies, reverse=True)
     assert all(bound <= energy for bound, energy in zip(bounds, energies, strict=True))
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_many_moves() -> None:
+    """As a user runs it: the processes that it starts import the script."""
+    name = "many_moves"
+    told = subprocess.run(
+        [sys.executable, "-m", f"examples.library.{name}"], capture_output=True, text=True, cwd=FOLDER.parents[1]
+    )
+    assert told.returncode == 0, told.stderr
+    assert len(re.findall(r"^\d of 6: \d+\.\d J$", told.stdout, re.MULTILINE)) == 6
+    assert "cheapest (" in told.stdout

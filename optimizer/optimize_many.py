@@ -1,0 +1,91 @@
+"""Public entry point: `optimize_many(problems)` solves many problems at a time."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from itertools import islice
+from queue import SimpleQueue
+from typing import Protocol
+
+from optimizer.exceptions import JoulepathError
+from optimizer.optimize import optimize
+from optimizer.problem.problem import Problem
+from optimizer.solution import Solution
+
+# problems that are handed out ahead of time: however many there are, memory does not grow with them
+AHEAD = 64
+
+
+class DaskClient(Protocol):
+    """A client of a Dask cluster: `distributed.Client`."""
+
+    def get_executor(self) -> Executor:
+        """The cluster by the interface of `concurrent.futures`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Optimized:
+    """What became of the problem at `index`: its solution, or why there is none."""
+
+    index: int
+    solution: Solution | None
+    error: JoulepathError | None
+
+    def result(self) -> Solution:
+        """The solution. Raises the error if there is none."""
+        if self.solution is None:
+            assert self.error is not None
+            raise self.error
+        return self.solution
+
+
+def optimize_many(
+    problems: Iterable[Problem], client: DaskClient | Executor | None = None, workers: int | None = None
+) -> Iterator[Optimized]:
+    """Solves each problem as `optimize` does, and yields what becomes of them as they end, in any order.
+
+    The problems are solved in `workers` processes of this machine, by default one for each CPU; with a `client`, on a
+    Dask cluster, or by any executor of `concurrent.futures`. They are taken from the iterable as they are needed. If
+    the iteration ends early, what has not begun is not solved.
+
+    The processes import the main module of a script: it needs `if __name__ == "__main__":`. Raises BrokenProcessPool
+    if one of them dies.
+    """
+    if client is not None:
+        yield from _solved_by(client if isinstance(client, Executor) else client.get_executor(), problems)
+        return
+    # forked processes would share the threads of libraries
+    own = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        yield from _solved_by(own, problems)
+    finally:
+        own.shutdown(wait=False, cancel_futures=True)
+
+
+def _solved_by(executor: Executor, problems: Iterable[Problem]) -> Iterator[Optimized]:
+    waiting, done = enumerate(problems), SimpleQueue[Future[Optimized]]()
+    open_ = set[Future[Optimized]]()
+    try:
+        while True:
+            for index, problem in islice(waiting, AHEAD - len(open_)):
+                future = executor.submit(_solved, index, problem)
+                open_.add(future)
+                future.add_done_callback(done.put)
+            if not open_:
+                return
+            ended = done.get()
+            open_.discard(ended)
+            yield ended.result()
+    finally:
+        for future in open_:
+            future.cancel()
+
+
+def _solved(index: int, problem: Problem) -> Optimized:
+    try:
+        return Optimized(index, optimize(problem), None)
+    except JoulepathError as error:
+        return Optimized(index, None, error)
