@@ -5,8 +5,9 @@
 
 From random configurations of a UR5e a straight line leads 0.1 to 0.5 m in a random direction, and the tool turns by up
 to 0.5 rad on the way. With `--corners` a second line of as much length follows, and the corner between them is rounded
-within 40 mm. `even speed` is the least energy of an even speed on the same path with ramps of a third each, over all
-durations within the limits on speed, acceleration and torque; its jerk is left out, as that of a ramp has no bound.
+within 40 mm. `even speed` is the least energy of an even speed on the same path with smooth ramps, over durations and
+lengths of the ramps, within the limits on speed, acceleration, jerk and torque, which the answers keep. `ramps of even
+acceleration` is the same with ramps of a third each and without the limit on jerk, which no such ramp can keep.
 """
 
 from __future__ import annotations
@@ -35,13 +36,17 @@ from optimizer.problem.tool_path import ToolPath
 from optimizer.search.baselines import motion_energy
 from optimizer.search.path_baselines import along
 from optimizer.solution import Solution
-from optimizer.trajectories.time_scalings import even_speed
+from optimizer.trajectories.quadrature import lobatto_nodes
+from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.time_scalings import SampledMotion, even_speed
 
 MIDDLE = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
 # spread of the joints of the start [rad], lengths [m], greatest turn [rad], blend of a corner [m]
 SPREAD, LENGTHS, TURN, BLEND = 0.8, (0.1, 0.5), 0.5, 0.04
 # durations of an even speed that are tried, in multiples of ours, and their number
-DURATIONS, TRIED = (0.5, 4.0), 200
+DURATIONS, TRIED = (0.5, 6.0), 200
+# shares of the time that smooth ramps take, and quadrature panels in each phase
+RAMPS, PANELS = (0.2, 0.3, 0.4, 0.5), 12
 
 
 def tasks(seed: int, count: int, corners: bool) -> Iterator[Problem]:
@@ -67,20 +72,46 @@ def _beyond(rng: np.random.Generator, T: Array) -> Array:
     return goal
 
 
-def even(problem: Problem, found: Solution) -> float:
-    """Least energy [J] of an even speed on the path of the answer."""
+def even(problem: Problem, found: Solution, ramps: tuple[float, ...]) -> float:
+    """Least energy [J] of an even speed on the path of the answer, whose smooth `ramps` take such shares of the time;
+    without any, with ramps of even acceleration and any jerk."""
     prepared, limits = PreparedProblem.of(problem), problem.arm.active_limits
     path = prepared.joint_path(found.start.q)
     assert path is not None
     least = np.inf
     for duration in found.trajectory.spline.duration * np.linspace(*DURATIONS, TRIED):
-        motion = along(path, even_speed(float(duration)))
-        tau = prepared.torques(motion.q, motion.v, motion.a)
-        limited = np.abs(limited_torque(problem.arm, tau, motion.v, motion.a)).max(axis=0)
-        peaks, most = (motion.peak_v, motion.peak_a, limited), (limits.v_max, limits.a_max, limits.tau_max)
-        if all((a <= b).all() for a, b in zip(peaks, most, strict=True)):
-            least = min(least, motion_energy(problem, motion, tau, prepared.potential).electrical.total)
+        laws = [smooth(path, float(duration), ramp) for ramp in ramps] or [along(path, even_speed(float(duration)))]
+        for motion in laws:
+            tau = prepared.torques(motion.q, motion.v, motion.a)
+            limited = np.abs(limited_torque(problem.arm, tau, motion.v, motion.a)).max(axis=0)
+            peaks, most = (motion.peak_v, motion.peak_a, limited), (limits.v_max, limits.a_max, limits.tau_max)
+            held = all((a <= b).all() for a, b in zip(peaks, most, strict=True))
+            if held and (not ramps or (motion.peak_jerk <= limits.j_max).all()):
+                least = min(least, motion_energy(problem, motion, tau, prepared.potential).electrical.total)
     return float(least)
+
+
+def smooth(path: Spline, duration: float, ramp: float) -> SampledMotion:
+    """An even speed along a path over [0, 1]; in the ramps, of such a share of the time each, it is a cubic of time."""
+    edges = [np.linspace(a, b, PANELS + 1) for a, b in ((0.0, ramp), (ramp, 1 - ramp), (1 - ramp, 1.0))]
+    tau, weights = lobatto_nodes(np.unique(np.concatenate(edges)))
+    x, speed = np.minimum(np.minimum(tau, 1 - tau) / ramp, 1.0), 1 / (1 - ramp)
+    way = (
+        speed * np.where(tau < 0.5, 1, -1) * (ramp * (x**3 - x**4 / 2) + np.maximum(np.minimum(tau, 1 - tau) - ramp, 0))
+    )
+    rising = np.where(tau < 0.5, 1, -1) * (x < 1)
+    s = np.where(tau < 0.5, way, 1 + way)
+    r1, r2, r3 = (
+        speed * (3 * x**2 - 2 * x**3),
+        speed * rising * 6 * (x - x**2) / ramp,
+        speed * 6 * (1 - 2 * x) / ramp**2,
+    )
+    r1, r2, r3 = r1 / duration, r2 / duration**2, np.where(x < 1, r3, 0.0) / duration**3
+    d1, d2, d3 = (path.curve(s, k) for k in (1, 2, 3))
+    v, a = d1 * r1[:, None], d2 * r1[:, None] ** 2 + d1 * r2[:, None]
+    jerk = d3 * r1[:, None] ** 3 + 3 * d2 * (r1 * r2)[:, None] + d1 * r3[:, None]
+    peaks = (np.abs(each).max(axis=0) for each in (v, a, jerk))
+    return SampledMotion(tau * duration, weights * duration, path.curve(s), v, a, *peaks)
 
 
 def main() -> None:
@@ -109,7 +140,8 @@ def main() -> None:
         row = {"time [s]": time.perf_counter() - began, "gap": 1 - answer.lower_bound / energy}
         row["deviation [m]"] = ratio["path_position"] * ToolPath().position_tolerance
         row["deviation [rad]"] = ratio["path_rotation"] * ToolPath().rotation_tolerance
-        row["saved against even speed"] = 1 - energy / even(problem, answer)
+        row["saved against even speed"] = 1 - energy / even(problem, answer, RAMPS)
+        row["ramps of even acceleration"] = 1 - energy / even(problem, answer, ())
         for name, value in row.items():
             found.setdefault(name, []).append(float(value))
     held = given.count - refused - failed
