@@ -7,46 +7,22 @@ import zlib
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from functools import partial
-from pathlib import Path
 
 import pytest
-from sqlalchemy import func, select, text
+from sqlalchemy import func, select
 
 from app.access.client import OPERATOR
 from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
 from app.store import answers, job_events, jobs, leases
-from app.store.database import create_database_engine
 from app.store.jobs import NewJob, NewRequest
 from app.store.leases import Figures, Lease, Outcome
 from app.store.store import Store
 from app.store.tables import Answer, JobEvent, JobRequest, new_id
-from tests.app.databases import Postgres, postgres, why_no_postgres
 
-MISSING = why_no_postgres()
 MUCH = 1 << 30
 START = datetime(2030, 1, 1, tzinfo=UTC)
 SOON = timedelta(seconds=30)
 BODY = zlib.compress(b"{}")
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Postgres]:
-    with postgres() as server:
-        yield server
-
-
-@pytest.fixture(
-    params=["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING)))]
-)
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """An empty database."""
-    if request.param == "sqlite":
-        return f"sqlite:///{tmp_path}/joulepath.db"
-    server: Postgres = request.getfixturevalue("server")
-    with create_database_engine(server.url).begin() as connection:
-        connection.execute(text("DROP SCHEMA public CASCADE"))
-        connection.execute(text("CREATE SCHEMA public"))
-    return server.url
 
 
 class Bench:

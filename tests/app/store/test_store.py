@@ -8,7 +8,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -31,33 +31,13 @@ from app.store.database import create_database_engine, migrate
 from app.store.store import Store
 from app.store.store_answers import store_answers
 from app.store.tables import Answer, Table, new_id, now
-from tests.app.databases import Postgres, postgres, why_no_postgres
+from tests.app.databases import Postgres, why_no_postgres
 from tests.app.live import ROOT, WARM_UP, Server, serving
 from tests.app.requests import move
 
 MISSING = why_no_postgres()
 A_DAY = timedelta(days=1)
 MUCH = 1 << 30
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[Postgres]:
-    with postgres() as server:
-        yield server
-
-
-@pytest.fixture(
-    params=["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING)))]
-)
-def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """An empty database."""
-    if request.param == "sqlite":
-        return f"sqlite:///{tmp_path}/folder/joulepath.db"
-    server: Postgres = request.getfixturevalue("server")
-    with create_database_engine(server.url).begin() as connection:
-        connection.execute(text("DROP SCHEMA public CASCADE"))
-        connection.execute(text("CREATE SCHEMA public"))
-    return server.url
 
 
 def with_store(url: str, test: Callable[[Store], Awaitable[None]]) -> None:

@@ -1,0 +1,34 @@
+"""Empty databases: an SQLite file, and a schema of a PostgreSQL server where there is one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+from app.store.database import create_database_engine
+from tests.app.databases import Postgres, postgres, why_no_postgres
+
+MISSING = why_no_postgres()
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Postgres]:
+    with postgres() as server:
+        yield server
+
+
+@pytest.fixture(
+    params=["sqlite", pytest.param("postgres", marks=pytest.mark.skipif(MISSING is not None, reason=str(MISSING)))]
+)
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """An empty database."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path}/folder/joulepath.db"
+    server: Postgres = request.getfixturevalue("server")
+    with create_database_engine(server.url).begin() as connection:
+        connection.execute(text("DROP SCHEMA public CASCADE"))
+        connection.execute(text("CREATE SCHEMA public"))
+    return server.url
