@@ -24,6 +24,7 @@ PUBLIC = {
     "NoReachableTarget",
     "NoSequence",
     "NoTrajectory",
+    "Optimized",
     "OutsideLimits",
     "PathInfeasible",
     "Payload",
@@ -41,6 +42,7 @@ PUBLIC = {
     "WorkRound",
     "load_robot",
     "optimize",
+    "optimize_many",
     "optimize_round",
     "pareto",
 }
@@ -50,7 +52,7 @@ def test_the_public_names_are_a_promise() -> None:
     assert set(optimizer.__all__) == PUBLIC
     assert optimizer.__all__ == sorted(optimizer.__all__)
     # `optimizer.optimize` is also a module: the name must stay the function's however the package was imported
-    assert callable(optimizer.optimize)
+    assert callable(optimizer.optimize) and callable(optimizer.optimize_many)
     assert callable(optimizer.pareto)
     assert callable(optimizer.optimize_round)
 
