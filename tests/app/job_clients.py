@@ -8,13 +8,14 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import httpx2
 
 from app.schemas.jobs import Job, JobDetail
-from tests.app.live import CLIENT, Server, serving
+from tests.app.live import CLIENT, Server, serving, until
 from tests.app.requests import HOME, NEAR, move
 
 PATIENCE = 120.0
@@ -90,6 +91,10 @@ def events(server: Server, path: str, after: int | None = None) -> Iterator[Even
         yield from parsed(answer.iter_lines())
 
 
+MOMENT = 0.03
+"""Longest time [s] from an answer to a kill: about that of a request."""
+
+
 class KilledService:
     """A service on one database that is killed again and again, and a client that follows the events of its job."""
 
@@ -100,9 +105,9 @@ class KilledService:
         self.events: list[Event] = []
         self.progress_at_kills: list[float] = []
 
-    def run(self, requests: list[Any], kills: int, longest: float) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-        """Sends a job, kills the service `kills` times at random instants of up to `longest` s after it is ready, and
-        returns the results of the job and the job."""
+    def run(self, requests: list[Any], kills: int) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+        """Sends a job, kills the service `kills` times while the job runs, each time after random requests of the next
+        part of it, and returns the results of the job and the job."""
         path = ""
         while True:
             with serving(**self._settings) as server:
@@ -114,12 +119,20 @@ class KilledService:
                     follower.join()
                     lines = CLIENT.get(f"{server.url}{path}/results").text.splitlines()
                     return [json.loads(line) for line in lines], job
-                time.sleep(self._rng.uniform(0.0, longest))
+                answered = int(len(requests) * (self.kills + self._rng.random()) / (kills + 1))
+                until(partial(self._has, answered))
+                time.sleep(self._rng.uniform(0.0, MOMENT))
                 server.process.kill()
                 self.kills += 1
             follower.join()
-            done = sum(event.name == "request" for event in self.events)
-            self.progress_at_kills.append(done / len(requests))
+            self.progress_at_kills.append(self._answered / len(requests))
+
+    def _has(self, answered: int) -> bool:
+        return self._answered >= answered
+
+    @property
+    def _answered(self) -> int:
+        return sum(event.name == "request" for event in self.events)
 
     def _follow(self, server: Server, path: str) -> None:
         try:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -158,6 +158,14 @@ def serving(warm: bool = True, **settings: Any) -> Iterator[Server]:
         finally:
             process.kill()
             process.wait()
+
+
+def until(condition: Callable[[], bool], patience: float = ANSWER) -> None:
+    """Waits until a condition holds, for `patience` [s] at most."""
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
 
 
 def processor_time(pid: int) -> float:

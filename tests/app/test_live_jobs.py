@@ -19,9 +19,9 @@ from app.schemas.errors import WorkerDied
 from app.store.database import create_database_engine
 from tests.app.databases import postgres, why_no_postgres
 from tests.app.job_clients import Event, KilledService, ended, evaluation, events, optimization, over, sent, shown
-from tests.app.live import GRACE, Server, alive, processor_time, serving
+from tests.app.live import GRACE, Server, alive, processor_time, serving, until
 from tests.app.requests import long_search, move
-from tests.app.test_server import AT_WORK, until
+from tests.app.test_server import AT_WORK
 
 MISSING = why_no_postgres()
 LONG = {"optimize": long_search(100.0)}
@@ -29,7 +29,8 @@ LONG = {"optimize": long_search(100.0)}
 
 def mixture(count: int) -> list[dict[str, Any]]:
     """Different requests, one in four of which takes longer than the others."""
-    return [optimization(1.0 + 0.01 * k) if k % 4 == 0 else evaluation(1.0 + 0.01 * k) for k in range(count)]
+    durations = [1.0 + 0.005 * k for k in range(count)]
+    return [evaluation(each) if k % 4 else optimization(each) for k, each in enumerate(durations)]
 
 
 def check_each_once(lines: list[dict[str, Any]], job: dict[str, Any], requests: list[Any]) -> None:
@@ -50,7 +51,7 @@ def test_a_killed_service_loses_and_doubles_nothing(kills: int, count: int, tmp_
     """Neither answers nor events: the client knows the number of the last event that it received whole."""
     requests = mixture(count)
     service = KilledService(tmp_path, seed=kills, workers=1, deadline_grace=GRACE)
-    lines, job = service.run(requests, kills, longest=0.08 * count / kills)
+    lines, job = service.run(requests, kills)
     assert service.kills == kills
     check_each_once(lines, job, requests)
     assert min(service.progress_at_kills) < 1.0, "it was killed while the job ran"

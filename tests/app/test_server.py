@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import socket
-import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
@@ -16,7 +15,7 @@ import pytest
 
 from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, MalformedHttp, ShuttingDown
 from app.schemas.response import OptimizeResponse
-from tests.app.live import CLIENT, EXIT, WARM_UP, Server, alive, processor_time, serving
+from tests.app.live import CLIENT, EXIT, WARM_UP, Server, alive, processor_time, serving, until
 from tests.app.requests import EXAMPLES, long_search, move
 
 T = TypeVar("T")
@@ -27,13 +26,6 @@ PATIENCE = 60.0
 LONG = 30.0
 # Processor time that only a worker with a task uses [s].
 AT_WORK = 0.1
-
-
-def until(condition: Callable[[], bool], patience: float = PATIENCE) -> None:
-    end = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 def received(server: Server) -> int:

@@ -23,10 +23,9 @@ import pytest
 from app.schemas import errors as problems
 from tests.app.access.test_key_file import add
 from tests.app.databases import postgres, why_no_postgres
-from tests.app.live import ANSWER, ROOT, Server, serving
+from tests.app.live import ANSWER, ROOT, Server, serving, until
 from tests.app.requests import move
 from tests.app.routes.test_problems import refused
-from tests.app.test_server import until
 
 NAME = "robots.example"
 START = 30.0

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import signal
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 
 import pytest
 
 from app.schemas.errors import Busy, HeadTooLarge, RequestTimeout, ShuttingDown, TooManyRequests
-from tests.app.live import ANSWER, EXIT, Server, serving
+from tests.app.live import EXIT, Server, serving, until
 from tests.app.raw import answer_on, connected, ends, is_reset, post
 
 MOST_HEAD = 4096
@@ -43,13 +42,6 @@ def _nobody_is_connected(strict: Server) -> None:
             return all(answer_on(connection).status == 200 for connection in connections)
 
     until(all_fit)
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + ANSWER
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.live import CLIENT, LOCAL, Server, serving
+from tests.app.live import CLIENT, LOCAL, Server, serving, until
 from tests.app.requests import long_search, move
-from tests.app.test_server import until, until_replaced
+from tests.app.test_server import until_replaced
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import pytest
 from app.exceptions import TooManyBytes, TooManyBytesOfClient
 from app.http.transfers import BytesInFlight
 from app.schemas.errors import Busy, TooManyRequests
-from tests.app.live import ANSWER, Server, serving
+from tests.app.live import Server, serving, until
 from tests.app.raw import RawAnswer, answer_on, connected, post
 
 BODY = 1 << 20
@@ -28,13 +27,6 @@ def tight() -> Iterator[Server]:
     ) as server:
         server.wait_listening()
         yield server
-
-
-def until(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + ANSWER
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.02)
 
 
 def begun(server: Server, stack: ExitStack, path: str, address: str) -> None:

@@ -25,7 +25,7 @@ ANSWERED: dict[str, list[dict[str, Any]]] = {
     "/ik/path": [BODY_EXAMPLES["/ik/path"]["application/json"]["positions"]["value"]],
     "/compare": [move(methods=["bspline", "time_scaling"])],
     "/pareto": [move(points=3)],
-    "/cycle": [BODY_EXAMPLES["/cycle"]["application/json"]["pick_and_place"]["value"] | {"deadline": AMPLE}],
+    "/cycle": [{"start": {"q": HOME}, "stops": [{"target": {"q": [0.3, *HOME[1:]]}}], "deadline": AMPLE}],
     "/whatif": [
         {
             "optimize": move(scene=SCENE),
