@@ -61,14 +61,20 @@ class PreparedProblem(Plant):
         """The tool path as it was followed from starts q (nq,) [rad], by the bytes of these."""
         return {}
 
+    @cached_property
+    def _joint_paths(self) -> dict[bytes, Spline | None]:
+        return {}
+
     def joint_path(self, q_start: Array) -> Spline | None:
         """The joints' path over [0, 1] along the tool path, from q_start (nq,) [rad]; None if they cannot follow it."""
         assert self.course is not None
         key = q_start.tobytes()
-        if key not in self.traces:
-            (self.traces[key],) = traces(self.arm, self.course, q_start[None])
-        trace = self.traces[key]
-        return joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
+        if key not in self._joint_paths:
+            if key not in self.traces:
+                (self.traces[key],) = traces(self.arm, self.course, q_start[None])
+            trace = self.traces[key]
+            self._joint_paths[key] = joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
+        return self._joint_paths[key]
 
     def satisfies_path_constraints(self, q: Array, v: Array) -> bool:
         """Whether samples q [rad], v [rad/s] (k, nq) of a motion satisfy the path constraints and do not collide."""

@@ -107,7 +107,8 @@ def joint_path(arm: Arm, course: ToolCourse, trace: Trace) -> Spline | None:
         if denser is None:
             return None
         trace = denser
-        path = _fit(trace.q, trace.at, bspline.clamped(breaks))
+        knots = bspline.clamped(breaks)
+        path = Spline(bspline.DEGREE, knots, bspline.fit(trace.q, trace.at, knots, resting=1))
         checked = np.sort(np.concatenate([trace.at, (trace.at[1:] + trace.at[:-1]) / 2]))
         off = course.ratios(tcp_pose(arm, path.curve(checked)), course.poses(checked))
         bad = np.unique(np.searchsorted(breaks, checked[off > SHARE], side="right").clip(1, len(breaks) - 1))
@@ -130,15 +131,6 @@ def _denser(arm: Arm, course: ToolCourse, trace: Trace, breaks: Array) -> Trace 
             return None
     order = np.argsort(np.concatenate([trace.at, at]), kind="stable")
     return Trace(np.concatenate([trace.q, found])[order], np.concatenate([trace.at, at])[order])
-
-
-def _fit(q: Array, at: Array, knots: Array) -> Spline:
-    """The spline that is nearest to configurations q (m, nq) at fractions (m,), and meets the first and the last."""
-    matrix = bspline.basis_matrix(knots, at)
-    points = np.zeros((matrix.shape[1], q.shape[1]))
-    points[0], points[-1] = q[0], q[-1]
-    points[1:-1] = np.linalg.lstsq(matrix[:, 1:-1], q - matrix @ points, rcond=None)[0]
-    return Spline(bspline.DEGREE, knots, points)
 
 
 def path_ratios(arm: Arm, course: ToolCourse, q: Array) -> dict[str, float]:

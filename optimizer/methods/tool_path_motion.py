@@ -34,7 +34,7 @@ TOO_SHARP = "the path turns too sharply for its tolerance: give a larger path.bl
 class ToolPathMotion(Method):
     """Solves a candidate along the problem's tool path, from its start configuration to where the path leads."""
 
-    # every candidate follows a curve of its own: some are solved, none is refined
+    # every candidate follows a curve of its own, which no other candidate's solution tells anything of
     most_solved = 64
 
     def solve(self) -> SolveResult:

@@ -44,12 +44,16 @@ def greville(knots: Array) -> Array:
     return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
 
 
-def fit(samples: Array, at: Array, knots: Array) -> Array:
-    """Control points (n, r), at rest at both ends, of the least-squares fit to samples (k, r) at (k,) in [0, 1]."""
+def fit(samples: Array, at: Array, knots: Array, resting: int = REST_POINTS) -> Array:
+    """Control points (n, r) of the least-squares fit to samples (k, r) at (k,) in [0, 1].
+
+    The first and the last sample are met exactly. As many control points as are `resting` coincide at either end: with
+    REST_POINTS the curve is at rest there, with one it is not.
+    """
     matrix = basis_matrix(knots, at)
     points = np.zeros((matrix.shape[1], samples.shape[1]))
-    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
-    inner = slice(REST_POINTS, len(points) - REST_POINTS)
+    points[:resting], points[-resting:] = samples[0], samples[-1]
+    inner = slice(resting, len(points) - resting)
     points[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ points, rcond=None)[0]
     return points
 
