@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast, get_args
 
+import numpy as np
 import pinocchio as pin
 
 from models.arrays import read_only
@@ -56,12 +57,21 @@ def robot_of(name: str, figures: dict[str, Any]) -> Robot:
         figures=figures,
         torque_side=_torque_side(limits),
         elbow=_elbow(figures, capsules),
+        T_base_base_link=_base_link(figures["kinematics"]),
     )
 
 
 def _joints(figure: dict[str, Any], nq: int) -> Array:
     """Value of a figure as a read-only array (nq,): the robot is shared by all who load it. Raises ValueError."""
     return read_only(figure["value"], (nq,), "A figure over joints")
+
+
+def _base_link(kinematics: dict[str, Any]) -> Array:
+    """Pose (4, 4) of ROS's `base_link` in `base`; the same frame for a robot without this figure. Raises ValueError."""
+    if "base_link_origin" not in kinematics:
+        return read_only(np.eye(4), (4, 4), "A pose")
+    origin = read_only(kinematics["base_link_origin"]["value"], (6,), "kinematics.base_link_origin")
+    return read_only(pin.SE3(pin.rpy.rpyToMatrix(*origin[3:]), origin[:3]).homogeneous, (4, 4), "A pose")
 
 
 def _torque_side(limits: dict[str, Any]) -> TorqueSide:

@@ -140,6 +140,7 @@ class Robot:
     touch at any joint positions, without adjacent links. `elbow` is the capsule around the elbow, whose speed can be
     limited; None for an arm without one. `default_motion` is None for an arm whose controller's defaults are unknown.
     `torque_side`: the torque limits are for the `motor`, rotor and friction included, or for the `link`, without them.
+    `T_base_base_link` (4, 4) is the pose of ROS's frame `base_link` in `base`.
     """
 
     name: str
@@ -156,6 +157,7 @@ class Robot:
     figures: dict[str, Any] = field(repr=False)
     torque_side: TorqueSide = "motor"
     elbow: LinkCapsule | None = None
+    T_base_base_link: Array = field(default_factory=lambda: np.eye(4), repr=False)
 
     @property
     def nq(self) -> int:

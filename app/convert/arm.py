@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from app.convert.own_robots import own_figures_of
-from app.convert.pose import to_matrix
+from app.convert.pose import to_base, to_matrix
 from app.convert.scene import to_attachment, to_scene, to_tool
 from app.schemas import arm as asked
 from models.own_arm.robots import own_robot
@@ -46,9 +46,9 @@ def to_arm(request: asked.ArmRequest) -> Arm:
         bus=_to_bus(request.bus),
         link_mass_scale=np.array(request.link_mass_scale),
         tool=to_tool(request.tool),
-        scene=to_scene(request.scene),
+        scene=to_scene(request.scene, robot),
         collisions=request.collisions,
-        tool_cone=_to_tool_cone(request.tool_cone),
+        tool_cone=_to_tool_cone(request.tool_cone, robot),
         tcp_speed=request.limits.tcp_speed,
         elbow_speed=request.limits.elbow_speed,
     )
@@ -63,8 +63,11 @@ def _to_bus(bus: asked.Bus) -> Bus:
     return Bus(bus.mode)
 
 
-def _to_tool_cone(cone: asked.ToolCone | None) -> ToolCone | None:
-    return None if cone is None else ToolCone(np.array(cone.axis), np.array(cone.direction), cone.half_angle)
+def _to_tool_cone(cone: asked.ToolCone | None, robot: Robot) -> ToolCone | None:
+    if cone is None:
+        return None
+    direction = to_base(cone.frame, robot)[:3, :3] @ cone.direction
+    return ToolCone(np.array(cone.axis), direction, cone.half_angle)
 
 
 def to_payload(payload: asked.Payload | None) -> Payload:

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.convert.arm import to_arm, to_limits, to_payload
 from app.convert.fields import fields
+from app.convert.pose import to_base
 from app.convert.request import to_branch, to_target
 from app.convert.solution import energy_fields, optimality_gap
 from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
@@ -35,7 +36,7 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
     least, most = (time.min, time.max) if isinstance(time, asked.TimeRange) else (time, time)
     return WorkRound(
         arm=arm,
-        start=to_target(request.start),
+        start=to_target(request.start, arm.robot),
         stops=[_to_stop(k, stop, arm.robot) for k, stop in enumerate(request.stops)],
         closed=request.closed,
         duration_min=least,
@@ -68,24 +69,27 @@ def _to_stop(k: int, stop: asked.StopRequest, robot: Robot) -> Stop:
         raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
     return Stop(
         name=str(k + 1) if stop.name is None else stop.name,
-        target=to_target(stop.target),
+        target=to_target(stop.target, robot),
         dwell=stop.dwell,
         payload=payload,
         branch=to_branch(stop.branch),
         limits=limits,
         tcp_speed=stop.limits.tcp_speed,
         elbow_speed=stop.limits.elbow_speed,
-        approach=_to_line(f"stops.{k}.approach", stop.approach),
-        retreat=_to_line(f"stops.{k}.retreat", stop.retreat),
+        approach=_to_line(f"stops.{k}.approach", stop.approach, robot),
+        retreat=_to_line(f"stops.{k}.retreat", stop.retreat, robot),
         obstacles_ignored=stop.obstacles_ignored,
     )
 
 
-def _to_line(field: str, line: LineRequest | None) -> Line | None:
+def _to_line(field: str, line: LineRequest | None, robot: Robot) -> Line | None:
     if line is None:
         return None
+    direction, at_stop = np.array(line.direction), line.frame == "tcp"
+    if line.frame != "tcp":
+        direction = to_base(line.frame, robot)[:3, :3] @ direction
     try:
-        return Line(direction=np.array(line.direction), distance=line.distance, frame=line.frame, speed=line.speed)
+        return Line(direction=direction, distance=line.distance, frame="tcp" if at_stop else "base", speed=line.speed)
     except InvalidProblem as error:
         raise InvalidProblem(f"{field}.{error.field}", str(error)) from None
 

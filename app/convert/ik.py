@@ -47,5 +47,5 @@ def to_collision_arm(request: IKRequest, robot: Robot) -> Arm:
         robot=robot,
         tool=to_tool(request.tool),
         payload=Payload(shape=None if carried is None else to_attachment(carried.shape, carried.touches)),
-        scene=to_scene(request.scene),
+        scene=to_scene(request.scene, robot),
     )

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from app.schemas import common as asked
-from models.robot import Array
+from models.robot import Array, Robot
 from optimizer.problem.pose import Pose
 
 
@@ -16,6 +18,18 @@ def to_pose(position: Sequence[float], orientation: asked.WithQuaternion | asked
     if isinstance(orientation, asked.WithRpy):
         return Pose.from_rpy(position, orientation.rpy)
     return Pose.from_rotvec(position, orientation.rotvec)
+
+
+def to_base(frame: asked.Frame, robot: Robot) -> Array:
+    """Pose (4, 4) of a frame at the robot's base in `base` [m]."""
+    return robot.T_base_base_link if frame == "base_link" else np.eye(4)
+
+
+def to_base_pose(pose: asked.BasePose, robot: Robot) -> Pose:
+    """The pose in the robot's base frame of one that is given in this frame or in `base_link`."""
+    if pose.frame == "base":
+        return to_pose(pose.position, pose)
+    return Pose(to_base(pose.frame, robot) @ to_matrix(pose))
 
 
 def to_matrix(pose: asked.Pose) -> Array:

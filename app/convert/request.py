@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from app.convert.arm import to_arm
-from app.convert.pose import to_pose
+from app.convert.pose import to_base, to_base_pose, to_pose
 from app.schemas import request as asked
 from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
 from app.schemas.orientation import InCone
 from app.schemas.path import Path
+from models.robot import Array, Robot
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import LONGEST_DURATION, Problem
 from optimizer.problem.targets import AnyOf, Single, Target
 from optimizer.problem.tool_path import ToolPath
@@ -25,12 +27,12 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     Raises UnknownRobot, InvalidProblem or OutsideLimits.
     """
     shortest, longest = _duration_bounds(request)
-    path = request.path
+    path, arm = request.path, to_arm(request)
     return Problem(
-        start=to_target(request.start),
-        goal=to_target(request.goal),
-        arm=to_arm(request) if path is None else to_arm(request).no_faster_than(path.speed),
-        tool_path=None if path is None else to_tool_path(path),
+        start=to_target(request.start, arm.robot),
+        goal=to_target(request.goal, arm.robot),
+        arm=arm if path is None else arm.no_faster_than(path.speed),
+        tool_path=None if path is None else to_tool_path(path, arm.robot),
         method=request.method,
         objective=request.objective,
         duration_min=shortest,
@@ -44,11 +46,11 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     )
 
 
-def to_tool_path(path: Path) -> ToolPath:
+def to_tool_path(path: Path, robot: Robot) -> ToolPath:
     """The tool path of the library. Raises InvalidProblem."""
     return ToolPath(
         shape=path.shape,
-        via=[to_pose(pose.position, pose) for pose in path.via],
+        via=[to_base_pose(pose, robot) for pose in path.via],
         blend=path.blend,
         position_tolerance=path.tolerance.position,
         rotation_tolerance=path.tolerance.rotation,
@@ -67,28 +69,32 @@ def to_cycle(asked_for: asked.Cycle | None) -> Cycle | None:
     return Cycle(asked_for.time, asked_for.hold, asked_for.brake_delay, asked_for.brake_power)
 
 
-def to_target(target: asked.Target) -> Target:
+def to_target(target: asked.Target, robot: Robot) -> Target:
     """The target of the library."""
     if isinstance(target, asked.AnyOfTarget):
-        return AnyOf(tuple(_single(member) for member in target.any_of))
-    return _single(target)
+        return AnyOf(tuple(_single(member, robot) for member in target.any_of))
+    return _single(target, robot)
 
 
-def _single(target: asked.JointTarget | asked.PoseTarget) -> Single:
+def _single(target: asked.JointTarget | asked.PoseTarget, robot: Robot) -> Single:
     if isinstance(target, asked.JointTarget):
         return np.array(target.q)
     pose = target.pose
-    return _cone_oriented(pose) if isinstance(pose, ConeOrientedPoseSchema) else to_pose(pose.position, pose)
+    if isinstance(pose, ConeOrientedPoseSchema):
+        return _cone_oriented(pose, to_base(pose.frame, robot))
+    return to_base_pose(pose, robot)
 
 
-def _cone_oriented(pose: ConeOrientedPoseSchema) -> ConeOrientedPose:
-    position, orientation = np.array(pose.position), pose.orientation
+def _cone_oriented(pose: ConeOrientedPoseSchema, T_base_frame: Array) -> ConeOrientedPose:
+    R, orientation = T_base_frame[:3, :3], pose.orientation
+    position = R @ pose.position + T_base_frame[:3, 3]
     if isinstance(orientation, str):
         return ConeOrientedPose(position)
     if isinstance(orientation, InCone):
         cone = orientation.cone
-        return ConeOrientedPose(position, np.array(cone.axis), np.array(cone.direction), cone.half_angle)
-    return ConeOrientedPose.about(to_pose(pose.position, orientation), np.array(orientation.free_about))
+        return ConeOrientedPose(position, np.array(cone.axis), R @ cone.direction, cone.half_angle)
+    given = Pose(T_base_frame @ to_pose(pose.position, orientation).T)
+    return ConeOrientedPose.about(given, np.array(orientation.free_about))
 
 
 def _duration_bounds(request: asked.MotionRequest) -> tuple[float | None, float | None]:

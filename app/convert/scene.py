@@ -9,9 +9,10 @@ from typing import TypeVar
 import numpy as np
 
 from app.convert.mesh_file import mesh_from_file
-from app.convert.pose import to_matrix
+from app.convert.pose import to_base, to_matrix
 from app.convert.voxels import occupied_cells
 from app.schemas import scene as asked
+from models.robot import Array, Robot
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.clouds import Points, Voxels
 from optimizer.problem.scene import (
@@ -31,9 +32,10 @@ from optimizer.problem.scene import (
 Made = TypeVar("Made")
 
 
-def to_scene(scene: asked.Scene) -> Scene:
+def to_scene(scene: asked.Scene, robot: Robot) -> Scene:
     """The scene of the library. Raises InvalidProblem."""
-    return Scene([_named(f"scene.obstacles.{k}", partial(_to_obstacle, o)) for k, o in enumerate(scene.obstacles)])
+    place = partial(_to_obstacle, T_base_frame=to_base(scene.frame, robot))
+    return Scene([_named(f"scene.obstacles.{k}", partial(place, o)) for k, o in enumerate(scene.obstacles)])
 
 
 def to_tool(tool: asked.Tool) -> list[Attachment]:
@@ -46,8 +48,8 @@ def to_attachment(shape: asked.CarriedShape, touches: list[str] | None) -> Attac
     return _named("payload.shape", lambda: Attachment(_to_shape(shape), to_matrix(shape.pose), touches))
 
 
-def _to_obstacle(given: asked.Obstacle) -> Obstacle:
-    return Obstacle(given.name, _to_shape(given), to_matrix(given.pose), given.margin)
+def _to_obstacle(given: asked.Obstacle, T_base_frame: Array) -> Obstacle:
+    return Obstacle(given.name, _to_shape(given), T_base_frame @ to_matrix(given.pose), given.margin)
 
 
 def _to_shape(given: asked.CarriedShape | asked.Obstacle) -> Shape:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import Request, Vector3, described
+from app.schemas.common import Frame, Request, Vector3, described, frame_of
 from app.schemas.examples.values import BOX
 from app.schemas.orientation import Cone
 from app.schemas.scene import CarriedShape, CellRequest, LinkNames, touched_links
@@ -106,6 +106,7 @@ class ToolCone(Cone):
     """An axis of the tool stays within an angle of a direction during the whole motion."""
 
     half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.2, ge=1e-3, le=pi)
+    frame: Frame = frame_of("`direction`")
 
 
 Scale = Annotated[float, Field(ge=0.1, le=10)]
@@ -201,7 +202,7 @@ class ArmRequest(CellRequest):
         "Payload at the flange. Null: no payload.", None, {"mass": 2.0, "com": [0.0, 0.0, 0.05]}, default=None
     )
     gravity: Annotated[list[Annotated[float, Field(ge=-100, le=100)]], Field(min_length=3, max_length=3)] = described(
-        "Acceleration of gravity, [x, y, z] in the base frame. For a ceiling mount: [0, 0, 9.81].",
+        "Acceleration of gravity, [x, y, z] in the robot's base frame (`base`). For a ceiling mount: [0, 0, 9.81].",
         "m/s²",
         [0.0, 0.0, -9.81],
         default=[0.0, 0.0, -9.81],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
@@ -189,6 +189,46 @@ Pose = Annotated[
     Annotated[QuaternionPose, Tag("by quaternion")]
     | Annotated[RpyPose, Tag("by rpy")]
     | Annotated[RotvecPose, Tag("by rotvec")],
+    by_field("quaternion", "rpy", "rotvec", beside="position"),
+]
+
+Frame = Literal["base", "base_link"]
+
+
+def frame_of(what: str) -> Any:
+    """The field `frame` of what is given in one of the two frames at the robot's base."""
+    return described(
+        f"Frame of {what}. `base`: the robot's base frame, as on the teach pendant and in every answer. `base_link`: "
+        "the frame of this name in ROS. For Universal Robots it is `base` after half a turn about z, so x and y have "
+        "the opposite sign. For a robot whose figures have no `base_link_origin`, the two are the same.",
+        None,
+        "base",
+        default="base",
+    )
+
+
+class InFrame(Request):
+    """A pose in one of the two frames at the robot's base."""
+
+    frame: Frame = frame_of("the pose")
+
+
+class BaseQuaternionPose(QuaternionPose, InFrame):
+    """Position and unit quaternion in a frame of the robot's base."""
+
+
+class BaseRpyPose(RpyPose, InFrame):
+    """Position and roll, pitch, yaw in a frame of the robot's base."""
+
+
+class BaseRotvecPose(RotvecPose, InFrame):
+    """Position and rotation vector in a frame of the robot's base, by default the one of the teach pendant."""
+
+
+BasePose = Annotated[
+    Annotated[BaseQuaternionPose, Tag("by quaternion")]
+    | Annotated[BaseRpyPose, Tag("by rpy")]
+    | Annotated[BaseRotvecPose, Tag("by rotvec")],
     by_field("quaternion", "rpy", "rotvec", beside="position"),
 ]
 

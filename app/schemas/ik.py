@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.schemas.common import Answer, Pose, Response, described, part
+from app.schemas.common import Answer, BasePose, Response, described, part
 from app.schemas.examples.values import BOX, HOME, LABEL
 from app.schemas.response import BODIES
 from app.schemas.scene import CarriedBody, CellRequest
@@ -12,8 +12,10 @@ from optimizer.problem.problem import LONGEST_DURATION
 class IKRequest(CellRequest):
     """A pose of the TCP."""
 
-    pose: Pose = described(
-        "Pose of the TCP in the robot's base frame.", None, {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]}
+    pose: BasePose = described(
+        "Pose of the TCP in the robot's base frame, or in its `frame`.",
+        None,
+        {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )
     windings: bool = described(
         "Whether to return all full-turn alternatives q + 2πk within the joint range. If false: one solution per "

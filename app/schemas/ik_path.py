@@ -10,12 +10,14 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.common import (
     Answer,
+    BasePose,
+    Frame,
     JointPositions,
-    Pose,
     Response,
     RobotWithTcp,
     Vector3,
     described,
+    frame_of,
     part,
 )
 from app.schemas.examples.ik import ARC
@@ -33,10 +35,11 @@ class IKPathRequest(RobotWithTcp):
         "Time of each point; each later than the previous one by 1 µs or more.", "s", [0.0, 0.5, 1.0]
     )
     points: Annotated[list[Vector3], Field(min_length=1, max_length=MAXARC)] | None = described(
-        "Positions [x, y, z] of the TCP in the robot's base frame. The orientation is free.", "m", ARC, default=None
+        "Positions [x, y, z] of the TCP in `frame`. The orientation is free.", "m", ARC, default=None
     )
-    poses: Annotated[list[Pose], Field(min_length=1, max_length=MAXARC)] | None = described(
-        "Poses of the TCP in the robot's base frame.",
+    frame: Frame = frame_of("`points`; each of `poses` has its own")
+    poses: Annotated[list[BasePose], Field(min_length=1, max_length=MAXARC)] | None = described(
+        "Poses of the TCP, each in the robot's base frame or in its `frame`.",
         None,
         [{"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
         default=None,

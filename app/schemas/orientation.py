@@ -9,11 +9,12 @@ from pydantic import AfterValidator, Discriminator, Tag
 from pydantic_core import PydanticCustomError
 
 from app.schemas.common import (
+    BaseQuaternionPose,
+    BaseRotvecPose,
+    BaseRpyPose,
+    InFrame,
     Positioned,
-    QuaternionPose,
     Request,
-    RotvecPose,
-    RpyPose,
     Vector3,
     WithQuaternion,
     WithRotvec,
@@ -59,7 +60,11 @@ class Cone(Request):
     """All orientations with an axis of the tool within an angle of a direction. The tool may rotate about that axis."""
 
     axis: Axis = described("Axis of the tool in the TCP frame; any length except zero.", "1", [0.0, 0.0, 1.0])
-    direction: Axis = described("Direction in the base frame; any length except zero.", "1", [0.0, 0.0, -1.0])
+    direction: Axis = described(
+        "Direction in the robot's base frame, or in the `frame` that is given; any length except zero.",
+        "1",
+        [0.0, 0.0, -1.0],
+    )
     half_angle: float = described("Largest allowed angle between `axis` and `direction`.", "rad", 0.35, ge=0, le=pi)
 
 
@@ -101,7 +106,7 @@ Orientation = Annotated[
 ]
 
 
-class ConeOrientedPose(Positioned):
+class ConeOrientedPose(Positioned, InFrame):
     """A position with an orientation that is free in part."""
 
     orientation: Orientation = described(
@@ -113,9 +118,9 @@ class ConeOrientedPose(Positioned):
 
 
 TargetPose = Annotated[
-    Annotated[QuaternionPose, Tag("by quaternion")]
-    | Annotated[RpyPose, Tag("by rpy")]
-    | Annotated[RotvecPose, Tag("by rotvec")]
+    Annotated[BaseQuaternionPose, Tag("by quaternion")]
+    | Annotated[BaseRpyPose, Tag("by rpy")]
+    | Annotated[BaseRotvecPose, Tag("by rotvec")]
     | Annotated[ConeOrientedPose, Tag("by orientation")],
     by_field("quaternion", "rpy", "rotvec", "orientation", beside="position"),
 ]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from app.schemas.arm import Speed
-from app.schemas.common import Pose, Request, described
+from app.schemas.common import BasePose, Request, described
 from app.schemas.orientation import Axis
 from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
 from optimizer.problem.tool_path import LEAST_TOLERANCE, MOST_POINTS, POSITION_TOLERANCE, ROTATION_TOLERANCE, PathShape
@@ -40,7 +40,7 @@ class Path(Request):
         "lines",
         default="lines",
     )
-    via: Annotated[list[Pose], Field(max_length=max(MOST_POINTS.values()))] = described(
+    via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
         f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
         "a curve, exactly one of an arc.",
         None,
@@ -69,8 +69,11 @@ class Line(Request):
     """A straight line of the TCP into or out of a stop; the tool keeps its orientation."""
 
     direction: Axis = described("Direction of the motion, of any length.", "1", [0.0, 0.0, 1.0])
-    frame: Literal["tcp", "base"] = described(
-        "Frame of `direction`: that of the TCP at the stop, or of the base.", None, "tcp", default="tcp"
+    frame: Literal["tcp", "base", "base_link"] = described(
+        "Frame of `direction`: that of the TCP at the stop, the robot's base frame, or ROS's `base_link`.",
+        None,
+        "tcp",
+        default="tcp",
     )
     distance: float = described("Length of the line.", "m", 0.08, ge=LEAST_DISTANCE, le=MOST_DISTANCE)
     speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)

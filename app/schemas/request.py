@@ -45,7 +45,7 @@ class PoseTarget(Request):
     """A target as a pose of the TCP. Every arm configuration that reaches it is a candidate."""
 
     pose: TargetPose = described(
-        "Pose of the TCP in the robot's base frame. The orientation of a goal may be free in part.",
+        "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal may be free in part.",
         None,
         {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )

@@ -6,7 +6,18 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import IDENTITY, NO_CONTROLS, PLAIN, Pose, Request, RobotWithTcp, Vector3, described
+from app.schemas.common import (
+    IDENTITY,
+    NO_CONTROLS,
+    PLAIN,
+    Frame,
+    Pose,
+    Request,
+    RobotWithTcp,
+    Vector3,
+    described,
+    frame_of,
+)
 from app.schemas.examples.values import BOX, MESH_FILE, TOOL, at
 from optimizer.problem.arm import MOST_PARTS
 from optimizer.problem.clouds import MOST_ALONG_EDGE, MOST_POINTS, MOST_VOXELS
@@ -14,7 +25,7 @@ from optimizer.problem.names import LONGEST_NAME
 from optimizer.problem.scene import DEFAULT_MARGIN, MOST_OBSTACLES, MOST_VERTICES
 
 _POSE = {"position": [0.5, 0.1, 0.2], "quaternion": [0.0, 0.0, 0.0, 1.0]}
-_POSE_TEXT = "Pose of the shape: of an obstacle in the base frame, of a payload in the flange frame."
+_POSE_TEXT = "Pose of the shape: of an obstacle in the scene's `frame`, of a payload in the flange frame."
 # standard alphabet, filled to a multiple of four characters
 BASE64 = r"^[A-Za-z0-9+/]*={0,2}$"
 # most cells of a grid in bits, and most bytes of a mesh file, and the lengths of their base64
@@ -284,6 +295,7 @@ class Scene(Request):
         [{"name": "floor", "shape": "half_space", "pose": at(0.0, 0.0, -0.1)}],
         default=[],
     )
+    frame: Frame = frame_of("the obstacles' poses")
 
 
 class ToolCapsule(Request):

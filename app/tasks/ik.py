@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.convert.arm import robot_named
 from app.convert.ik import to_collision_arm, to_ik_response
-from app.convert.pose import to_matrix
+from app.convert.pose import to_base_pose, to_matrix
 from app.engine.result import TaskResult
 from app.schemas.ik import IKRequest
 from optimizer.collision.model import collision_model
@@ -26,7 +26,7 @@ class IKTask:
         robot = robot_named(request.robot)
         kinematics = required_inverse_kinematics(robot, "pose")
         solutions = kinematics.solve(
-            to_matrix(request.pose), to_matrix(request.tcp), robot.limits, request.windings, "goal"
+            to_base_pose(request.pose, robot).T, to_matrix(request.tcp), robot.limits, request.windings, "goal"
         )
         model = collision_model(to_collision_arm(request, robot))
         contacts = model.closest_pairs([solution.q for solution in solutions])

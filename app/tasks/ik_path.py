@@ -8,7 +8,7 @@ import numpy as np
 
 from app.convert.arm import robot_named
 from app.convert.fields import fields
-from app.convert.pose import to_matrix, to_pose
+from app.convert.pose import to_base, to_base_pose, to_matrix
 from app.engine.result import TaskResult
 from app.schemas.ik_path import IKPathRequest
 from optimizer.kinematics.path_following import follow
@@ -26,10 +26,11 @@ class IKPathTask:
         """The answer of `POST /ik/path`. `deadline` is not watched: a thousand points take less than a second."""
         request = self.request
         arm = Arm(robot=robot_named(request.robot), T_flange_tcp=to_matrix(request.tcp))
+        T_base_frame = to_base(request.frame, arm.robot)
         targets = (
-            np.array(request.points)
+            np.array(request.points) @ T_base_frame[:3, :3].T + T_base_frame[:3, 3]
             if request.points is not None
-            else [to_pose(pose.position, pose) for pose in request.poses or []]
+            else [to_base_pose(pose, arm.robot) for pose in request.poses or []]
         )
         found = follow(arm, targets, np.array(request.guess), request.tolerance, request.near_singular)
         written = [(t, point.q) for t, point in zip(request.t, found, strict=True) if point.written]

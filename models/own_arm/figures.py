@@ -67,7 +67,7 @@ def _link_names(chain: Chain) -> list[str]:
 
 def _kinematics(description: Description, chain: Chain, upright: UprightChain, links: list[str]) -> dict[str, Any]:
     frame = f"{_PLACEMENT} of each joint's frame in that of the link before, turned so that the joint turns about z."
-    return {
+    figures = {
         "joint_names": stated(description, list(chain.joints), "1", "From base to flange."),
         "link_names": stated(description, links, "1", "The link that each joint moves."),
         "joint_origin": stated(description, [_row(each) for each in upright.placements], "m, rad", frame),
@@ -75,6 +75,10 @@ def _kinematics(description: Description, chain: Chain, upright: UprightChain, l
             description, _row(upright.flange), "m, rad", f"{_PLACEMENT} of the tip in the frame of the last link."
         ),
     }
+    if (ros_base := chain.T_base_base_link) is not None:
+        text = f"{_PLACEMENT} of the link `base_link` in the base."
+        figures["base_link_origin"] = stated(description, _row(pin.SE3(ros_base)), "m, rad", text)
+    return figures
 
 
 def _row(placement: pin.SE3) -> list[float]:

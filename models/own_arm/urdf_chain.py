@@ -26,6 +26,7 @@ CONTINUOUS = 2 * math.pi
 ROUNDED_ANGLE, ROUNDED_LENGTH, QUARTER = 5e-6, 1e-9, math.pi / 2
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 ORIGIN = "0 0 0"
+ROS_BASE = "base_link"
 TURNING, FIXED = ("revolute", "continuous"), "fixed"
 
 
@@ -35,9 +36,10 @@ class Chain:
 
     `model`: Pinocchio's, with these joints alone; what others carry is merged into their links. `links` are the names
     of the links that the joints move; `axes` (nq, 3) unit vectors that the joints turn about, in their frames. `T_base`
-    (4, 4) places the base link in the model's world, `T_tip` (4, 4) the tip in the frame of the last joint. Limits
-    (nq,): position [rad], speed [rad/s], torque [N·m]; 0 where none is given. `rigid` names, for the base and each
-    joint, the URDF links that move with it.
+    (4, 4) places the base link in the model's world, `T_tip` (4, 4) the tip in the frame of the last joint,
+    `T_base_base_link` (4, 4) the link `base_link` in the base, None if it is the base or not fixed to it. Limits (nq,):
+    position [rad], speed [rad/s], torque [N·m]; 0 where none is given. `rigid` names, for the base and each joint, the
+    URDF links that move with it.
     """
 
     model: pin.Model
@@ -47,6 +49,7 @@ class Chain:
     axes: Array
     T_base: Array
     T_tip: Array
+    T_base_base_link: Array | None
     q_min: Array
     q_max: Array
     v_max: Array
@@ -217,7 +220,11 @@ def _merged(
                 q[whole.joints[k].idx_q] = locked.get(given.get(whole.names[k], ""), 0.0)
         model = pin.buildReducedModel(whole, held, q)
         # a joint that Pinocchio does not understand takes its link away
-        ends = [model.frames[model.getFrameId(name, pin.FrameType.BODY)].placement for name in (base, tip)]
+        base_link = ROS_BASE if ROS_BASE in tree.links and tree.carrier(ROS_BASE, names) == 0 else base
+        named = (base, tip, base_link)
+        T_base, T_tip, T_base_link = (
+            model.frames[model.getFrameId(name, pin.FrameType.BODY)].placement for name in named
+        )
         if model.nq != len(moving):
             raise ValueError(f"of {len(moving)} joints it finds {model.nq}")
     except (RuntimeError, ValueError, IndexError) as error:
@@ -230,7 +237,8 @@ def _merged(
     axes = np.array([_axis(joint) for joint in moving])
     return Chain(
         model, tuple(names), tuple(_end(joint, "child") for joint in moving), tuple(map(tuple, rigid)),
-        axes, ends[0].homogeneous, ends[1].homogeneous, q_min, q_max, v_max, tau_max, root,
+        axes, T_base.homogeneous, T_tip.homogeneous,
+        None if base_link == base else T_base.actInv(T_base_link).homogeneous, q_min, q_max, v_max, tau_max, root,
     )  # fmt: skip
 
 

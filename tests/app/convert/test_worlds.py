@@ -16,6 +16,7 @@ from app.convert.mesh_file import MOST_KEPT_TRIANGLES, mesh_from_file
 from app.convert.scene import to_scene
 from app.schemas.examples.values import MESH_FILE
 from app.schemas.scene import MOST_CELLS, Scene
+from models.registry import load_robot
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.clouds import MOST_TRIANGLES, Points, Voxels
@@ -30,7 +31,7 @@ def base64_of(content: bytes | str) -> str:
 
 def shape_of(**fields: Any) -> Any:
     scene = Scene.model_validate_json(json.dumps({"obstacles": [{"name": "scan"} | fields]}))
-    return to_scene(scene).obstacles[0].shape
+    return to_scene(scene, load_robot("ur5e")).obstacles[0].shape
 
 
 def bits_of(occupied: Any) -> str:
