@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Sequence
-from io import BufferedIOBase
+from typing import Protocol
 
 import numpy as np
 
@@ -16,10 +16,19 @@ FIRST_ROW = 2
 """Line of the first row of numbers: the header is line 1."""
 SEPARATORS = ",;\t"
 _WORDS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
+
+
+class Lines(Protocol):
+    """What lines are read from: a file, or what unpacks one."""
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """The next line, or the first `size` bytes of it."""
+
+
 _SPREADSHEET = b"PK\x03\x04"
 
 
-def line_of(file: BufferedIOBase, row: int, longest: int) -> str:
+def line_of(file: Lines, row: int, longest: int) -> str:
     """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also above `longest`."""
     raw = file.readline(longest + 1)
     if len(raw) > longest:
@@ -36,7 +45,7 @@ def line_of(file: BufferedIOBase, row: int, longest: int) -> str:
         raise InvalidTable(f"Line {row} is no UTF-8 text: send CSV as plain text.", row) from None
 
 
-def header_of(file: BufferedIOBase, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
+def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
     """Names of the columns, in lower case, and what separates them: the most frequent of `separators`, where a space
     counts only if there is none of the others. Raises InvalidTable."""
     first = line_of(file, 1, longest)
@@ -101,7 +110,8 @@ def _first_error(
 def wrong_length(line: str, row: int, cells: int, columns: int, separator: str) -> InvalidTable:
     """The error for line `row` with another number of cells than the header has columns."""
     message = f"Line {row} has {cells} columns, but the header has {columns}: correct the line."
-    if separator == "," and cells == 2 * columns:
+    # numbers without a fraction have no comma
+    if separator == "," and 1.5 * columns < cells <= 2 * columns:
         message += " For numbers with a decimal comma, separate the columns by semicolons, also in the header."
     elif any(other in line for other in SEPARATORS.replace(separator, "")):
         message += f" The header separates them by {_WORDS[separator]}: do so in every line."

@@ -241,8 +241,9 @@ def csv_of(
         header += ["P"] if form == "own" else ["actual_robot_voltage", "actual_robot_current"]
         columns += [power] if form == "own" else [np.full_like(power, 48.0), power / 48.0]
     lines = [separator.join(header)]
-    rows = np.hstack(columns).tolist()
-    lines += [separator.join(f"{value:.9g}".replace(".", decimal) for value in row) for row in rows]
+    for row in np.hstack(columns).tolist():
+        cells = [f"{row[0]:.12g}", *(f"{value:.9g}" for value in row[1:])]
+        lines.append(separator.join(cells).replace(".", decimal))
     return "\n".join(lines).encode() + b"\n"
 
 
