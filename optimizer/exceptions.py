@@ -4,6 +4,8 @@ JoulepathError
 ├── InvalidProblem          malformed or contradictory request
 │   ├── OutsideLimits       given joints beyond a limit
 │   └── InvalidTable        a row of a given motion, or its table as a whole
+├── LogTooLarge             a log with more rows or bytes than are read
+├── EffortNotUsable         logged efforts that say nothing of the arm
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
 ├── SingularPose            reached on a self-motion of unknown form only
@@ -84,6 +86,28 @@ class InvalidTable(InvalidProblem):
     def __init__(self, message: str, row: int | None = None, column: str | None = None) -> None:
         super().__init__("motion", message)
         self.row, self.column = row, column
+
+
+class LogTooLarge(JoulepathError):
+    """A log has more than `limit` rows, or bytes after unpacking: `unit` says which."""
+
+    def __init__(self, limit: int, unit: str) -> None:
+        super().__init__(
+            f"The log has more than {limit} {unit}: send it in parts, at a lower rate, or only the columns that count."
+        )
+        self.limit, self.unit = limit, unit
+
+
+class EffortNotUsable(JoulepathError):
+    """The efforts of a log are without gravity (`meaning` is external), or it is not clear what they are (None).
+
+    `slope` is that of the effort against the torque of the rigid model, by the names of two joints; None for one that
+    the log does not determine.
+    """
+
+    def __init__(self, message: str, meaning: str | None, slope: dict[str, float | None]) -> None:
+        super().__init__(message)
+        self.meaning, self.slope = meaning, slope
 
 
 class UnknownRobot(JoulepathError):

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from app.convert.fields import fields
-from app.convert.motion_csv import FIRST_ROW, MotionCsv
+from app.convert.motion_csv import MotionCsv
 from app.convert.solution import energy_fields
 from app.convert.warnings import sampled_warnings
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
+from optimizer.csv_table import FIRST_ROW
 from optimizer.exceptions import InvalidProblem
 from optimizer.replay.evaluate import Evaluation
 from optimizer.replay.interval_energy import IntervalEnergy

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,16 +13,12 @@ from typing import Literal
 import numpy as np
 
 from models.robot import Array
+from optimizer.csv_table import FIRST_ROW, header_of, line_of, numbers_of, with_points
 from optimizer.exceptions import InvalidTable
 from optimizer.replay.recording import BLOCK, LogBlock
 
-FIRST_ROW = 2
-"""Line of the first row of numbers: the header is line 1."""
 LONGEST_LINE = 4096
 _COLUMN = re.compile(r"t|[qva][1-9][0-9]?")
-_SEPARATORS = ",;\t"
-_WORDS = {",": "commas", ";": "semicolons", "\t": "tabs"}
-_SPREADSHEET = b"PK\x03\x04"
 _NUMBER = re.compile(r'"?[-+]?[0-9.]')
 
 
@@ -52,12 +46,7 @@ class MotionCsv:
     @staticmethod
     def of(file: BufferedReader, nq: int, units: Literal["rad", "deg"]) -> MotionCsv:
         """Reads the header of a file for an arm with nq joints. Raises InvalidTable, now or when rows are read."""
-        first = _line(file, 1)
-        if not first:
-            raise InvalidTable("The file is empty: send a header and two or more rows.")
-        header = first.removeprefix("\ufeff").strip()
-        separator = max(_SEPARATORS, key=header.count)
-        columns = [name.strip().strip('"').strip().lower() for name in header.split(separator)]
+        columns, separator = header_of(file, LONGEST_LINE)
         _check_header(columns, nq)
         return MotionCsv(nq, columns, pi / 180 if units == "deg" else 1.0, _blocks(file, columns, separator))
 
@@ -97,29 +86,12 @@ def _check_header(columns: list[str], nq: int) -> None:
     raise InvalidTable(f"The header has {len(columns)} columns: they must be {wanted}", 1)
 
 
-def _line(file: BufferedReader, row: int) -> str:
-    """The next line, empty at the end of the file."""
-    raw = file.readline(LONGEST_LINE + 1)
-    if len(raw) > LONGEST_LINE:
-        raise InvalidTable(f"Line {row} is longer than {LONGEST_LINE} characters: send one row per line.", row)
-    if row == 1 and raw.startswith(_SPREADSHEET):
-        raise InvalidTable("The file is a spreadsheet: export it as CSV.", row)
-    if row == 1 and raw.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InvalidTable("The file is UTF-16: save it as CSV in UTF-8.", row)
-    if b"\0" in raw:
-        raise InvalidTable(f"Line {row} has binary data: send CSV as plain text.", row)
-    try:
-        return raw.decode()
-    except UnicodeDecodeError:
-        raise InvalidTable(f"Line {row} is no UTF-8 text: send CSV as plain text.", row) from None
-
-
 def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterator[Array]:
     row = FIRST_ROW
     while lines := [*islice(_lines(file, row), BLOCK)]:
         if separator != ",":
-            lines = [*_with_points(lines, row)]
-        yield _numbers(lines, row, columns, separator)
+            lines = [*with_points(lines, row)]
+        yield numbers_of(lines, range(row, row + len(lines)), columns, separator, range(len(columns)))
         row += len(lines)
         if len(lines) < BLOCK:
             return
@@ -127,57 +99,11 @@ def _blocks(file: BufferedReader, columns: list[str], separator: str) -> Iterato
 
 def _lines(file: BufferedReader, row: int) -> Iterator[str]:
     """All lines up to the end of the file, without empty ones at the end."""
-    while line := _line(file, row):
+    while line := line_of(file, row, LONGEST_LINE):
         if not line.strip():
-            while rest := _line(file, row):
+            while rest := line_of(file, row, LONGEST_LINE):
                 if rest.strip():
                     raise InvalidTable(f"Line {row} is empty: delete it.", row)
             return
         yield line
         row += 1
-
-
-def _with_points(lines: list[str], first: int) -> Iterator[str]:
-    """Lines with decimal points in place of decimal commas."""
-    for row, line in enumerate(lines, first):
-        if "," not in line:
-            yield line
-        elif "." in line:
-            raise InvalidTable(
-                f"Line {row} has both commas and points in its numbers: use one of them as the decimal sign, and "
-                "nothing between thousands.",
-                row,
-            )
-        else:
-            yield line.replace(",", ".")
-
-
-def _numbers(lines: list[str], row: int, columns: list[str], separator: str) -> Array:
-    """Lines as numbers (k, columns)."""
-    try:
-        values = np.loadtxt(lines, delimiter=separator, comments=None, quotechar='"', ndmin=2)
-    except ValueError:
-        raise _first_error(lines, row, columns, separator) from None
-    if values.shape != (len(lines), len(columns)) or not np.isfinite(values).all():
-        raise _first_error(lines, row, columns, separator)
-    return np.asarray(values, dtype=float)
-
-
-def _first_error(lines: list[str], first: int, columns: list[str], separator: str) -> InvalidTable:
-    for row, line in enumerate(lines, first):
-        cells = next(csv.reader([line], delimiter=separator), [])
-        if len(cells) != len(columns):
-            message = f"Line {row} has {len(cells)} columns, but the header has {len(columns)}: correct the line."
-            if separator == "," and len(cells) == 2 * len(columns):
-                message += " For numbers with a decimal comma, separate the columns by semicolons, also in the header."
-            elif any(other in line for other in _SEPARATORS.replace(separator, "")):
-                message += f" The header separates them by {_WORDS[separator]}: do so in every line."
-            return InvalidTable(message, row)
-        for name, cell in zip(columns, cells, strict=True):
-            try:
-                finite = math.isfinite(float(cell)) and "_" not in cell
-            except ValueError:
-                finite = False
-            if not finite:
-                return InvalidTable(f"{name} in line {row} is no finite number: correct or delete it.", row, name)
-    return InvalidTable(f"The lines from line {first} on cannot be read: write plain numbers.", first)

@@ -1,0 +1,118 @@
+"""Lines and numbers of a CSV file, as motions and logs have them. Errors name line and column."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.exceptions import InvalidTable
+
+FIRST_ROW = 2
+"""Line of the first row of numbers: the header is line 1."""
+SEPARATORS = ",;\t"
+_WORDS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces"}
+
+
+class Lines(Protocol):
+    """What lines are read from: a file, or what unpacks one."""
+
+    def readline(self, size: int | None = -1, /) -> bytes:
+        """The next line, or the first `size` bytes of it."""
+
+
+_SPREADSHEET = b"PK\x03\x04"
+
+
+def line_of(file: Lines, row: int, longest: int) -> str:
+    """The next line, which is line `row`; empty at the end of the file. Raises InvalidTable, also above `longest`."""
+    raw = file.readline(longest + 1)
+    if len(raw) > longest:
+        raise InvalidTable(f"Line {row} is longer than {longest} characters: send one row per line.", row)
+    if row == 1 and raw.startswith(_SPREADSHEET):
+        raise InvalidTable("The file is a spreadsheet: export it as CSV.", row)
+    if row == 1 and raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InvalidTable("The file is UTF-16: save it as CSV in UTF-8.", row)
+    if b"\0" in raw:
+        raise InvalidTable(f"Line {row} has binary data: send CSV as plain text.", row)
+    try:
+        return raw.decode()
+    except UnicodeDecodeError:
+        raise InvalidTable(f"Line {row} is no UTF-8 text: send CSV as plain text.", row) from None
+
+
+def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
+    """Names of the columns, in lower case, and what separates them: the most frequent of `separators`, where a space
+    counts only if there is none of the others. Raises InvalidTable."""
+    first = line_of(file, 1, longest)
+    if not first:
+        raise InvalidTable("The file is empty: send a header and two or more rows.")
+    header = first.removeprefix("\ufeff").strip()
+    separator = max(separators, key=lambda each: header.count(each) * (0.01 if each == " " else 1.0))
+    return [name.strip().strip('"').strip().lower() for name in header.split(separator)], separator
+
+
+def with_points(lines: Sequence[str], first: int) -> Iterator[str]:
+    """Lines from line `first` on, with decimal points in place of decimal commas. Raises InvalidTable."""
+    for row, line in enumerate(lines, first):
+        if "," not in line:
+            yield line
+        elif "." in line:
+            raise InvalidTable(
+                f"Line {row} has both commas and points in its numbers: use one of them as the decimal sign, and "
+                "nothing between thousands.",
+                row,
+            )
+        else:
+            yield line.replace(",", ".")
+
+
+def numbers_of(
+    lines: Sequence[str], rows: Sequence[int], columns: list[str], separator: str, used: Sequence[int]
+) -> Array:
+    """The columns with the indices `used` of the lines with the numbers `rows`, (k, used). Raises InvalidTable.
+
+    Where not all columns are used, the caller makes sure that the lines have as many cells as the header.
+    """
+    # with a choice of columns, numpy accepts lines that are too long
+    chosen = None if len(used) == len(columns) else used
+    try:
+        values = np.loadtxt(lines, delimiter=separator, comments=None, quotechar='"', ndmin=2, usecols=chosen)
+    except ValueError:
+        raise _first_error(lines, rows, columns, separator, used) from None
+    if values.shape != (len(lines), len(used)) or not np.isfinite(values).all():
+        raise _first_error(lines, rows, columns, separator, used)
+    return np.asarray(values, dtype=float)
+
+
+def _first_error(
+    lines: Sequence[str], rows: Sequence[int], columns: list[str], separator: str, used: Sequence[int]
+) -> InvalidTable:
+    for row, line in zip(rows, lines, strict=True):
+        cells = next(csv.reader([line], delimiter=separator), [])
+        if len(cells) != len(columns):
+            return wrong_length(line, row, len(cells), len(columns), separator)
+        for k in used:
+            try:
+                finite = math.isfinite(float(cells[k])) and "_" not in cells[k]
+            except ValueError:
+                finite = False
+            if not finite:
+                name = columns[k]
+                return InvalidTable(f"{name} in line {row} is no finite number: correct or delete it.", row, name)
+    return InvalidTable(f"The lines from line {rows[0]} on cannot be read: write plain numbers.", rows[0])
+
+
+def wrong_length(line: str, row: int, cells: int, columns: int, separator: str) -> InvalidTable:
+    """The error for line `row` with another number of cells than the header has columns."""
+    message = f"Line {row} has {cells} columns, but the header has {columns}: correct the line."
+    # numbers without a fraction have no comma
+    if separator == "," and 1.5 * columns < cells <= 2 * columns:
+        message += " For numbers with a decimal comma, separate the columns by semicolons, also in the header."
+    elif any(other in line for other in SEPARATORS.replace(separator, "")):
+        message += f" The header separates them by {_WORDS[separator]}: do so in every line."
+    return InvalidTable(message, row)

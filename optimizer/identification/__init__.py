@@ -1,0 +1,1 @@
+"""An arm's own figures from logs of its motions."""

@@ -1,0 +1,173 @@
+"""Which columns of a log hold what, by the names in its header."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from optimizer.exceptions import InvalidProblem, InvalidTable
+
+Group = Literal["q", "v", "a", "current", "torque", "effort", "temperature", "commanded", "power", "payload"]
+"""What columns hold: joint positions, speeds, accelerations, currents, torques, efforts of unknown meaning,
+temperatures, commanded speeds; power of the arm, or voltage and current that multiply to it; mass and centre of the
+payload."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """Names of the columns of one kind of log: expressions whose first group, if any, is the number of a joint."""
+
+    name: str
+    time: str
+    joints: Mapping[Group, str]
+    power: tuple[str, ...] = ()
+    payload: tuple[str, ...] = ()
+
+
+# brackets, underscores or points before the number of a joint
+_AT = r"[._\[]?([0-9]+)\]?"
+FORMS = (
+    Form(
+        "rtde",
+        "timestamp",
+        {
+            "q": f"actual_q{_AT}",
+            "v": f"actual_qd{_AT}",
+            "a": f"target_qdd{_AT}",
+            "current": f"actual_current{_AT}",
+            "temperature": f"joint_temperatures{_AT}",
+            "commanded": f"target_qd{_AT}",
+        },
+        ("actual_robot_voltage", "actual_robot_current"),
+        ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2"),
+    ),
+    Form(
+        "own",
+        "t",
+        {"q": "q([0-9]+)", "v": "v([0-9]+)", "a": "a([0-9]+)", "current": "i([0-9]+)", "torque": "tau([0-9]+)"},
+        ("p",),
+    ),
+    Form(
+        "ros",
+        "%?time",
+        {
+            "q": rf"(?:field\.)?position{_AT}",
+            "v": rf"(?:field\.)?velocity{_AT}",
+            "effort": rf"(?:field\.)?effort{_AT}",
+        },
+    ),
+)
+_KNOWN = (
+    "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS JointState as CSV). "
+    "Otherwise say in `columns` which columns hold what"
+)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Indices of the columns of a log: its `form`, `time`, and `groups`, those of joints with one index per joint."""
+
+    form: str
+    names: Sequence[str]
+    time: int
+    groups: Mapping[Group, tuple[int, ...]]
+
+    MAPPED: ClassVar[tuple[str, ...]] = ("time", "q", "v", "a", "current", "torque", "effort", "temperature", "power")
+    """What a map of columns may name."""
+
+    @property
+    def used(self) -> list[int]:
+        """All indices, each once, in the order of the file."""
+        return sorted({self.time, *(k for group in self.groups.values() for k in group)})
+
+
+def recognised(names: Sequence[str], nq: int) -> Columns:
+    """The columns of a header for an arm with nq joints, of one of the FORMS. Raises InvalidTable."""
+    for form in FORMS:
+        time = next((k for k, name in enumerate(names) if re.fullmatch(form.time, name)), None)
+        found = {group: indices for group, pattern in form.joints.items() if (indices := _numbered(names, pattern))}
+        if "q" not in found:
+            continue
+        if time is None:
+            raise InvalidTable(
+                f"The header has joint positions, as {names[found['q'][0]]}, but no column `{form.time.strip('%?')}`: "
+                "a log needs the time [s] of every row.",
+                1,
+                form.time.strip("%?"),
+            )
+        _check_counts(found, names, nq)
+        return Columns(form.name, names, time, found | dict(_single(form, names)))
+    raise InvalidTable(f"The header names no joint positions that are known: begin it with {_KNOWN}.", 1)
+
+
+def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
+    """Indices of the columns whose names match, by the number in them. Raises InvalidTable unless these are
+    consecutive from 0 or 1."""
+    found: dict[int, int] = {}
+    for k, name in enumerate(names):
+        match = re.fullmatch(pattern, name)
+        if match is None:
+            continue
+        number = int(match[1])
+        if number in found:
+            raise InvalidTable(f"The header has the column {name} twice: delete one of them.", 1, name)
+        found[number] = k
+    if found and sorted(found) not in ([*range(len(found))], [*range(1, len(found) + 1)]):
+        name = names[found[min(found)]]
+        raise InvalidTable(
+            f"The columns like {name} are not numbered without gaps from 0 or from 1: a log has every joint.", 1, name
+        )
+    return tuple(found[number] for number in sorted(found))
+
+
+def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int, ...]]]:
+    """The columns of a form that belong to no joint."""
+    if form.power and all(name in names for name in form.power):
+        yield "power", tuple(names.index(name) for name in form.power)
+    present = tuple(names.index(name) for name in form.payload if name in names)
+    if form.payload and form.payload[0] in names:
+        # the centre only if all of it is there
+        yield "payload", present if len(present) == len(form.payload) else present[:1]
+
+
+def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
+    """The columns that a caller's map names: `time` and `power` by one name, others by one name per joint.
+
+    Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
+    """
+    unknown = sorted(set(columns) - set(Columns.MAPPED))
+    if unknown or not {"time", "q"} <= set(columns):
+        raise InvalidProblem(
+            "columns", f"columns must name `time` and `q`, and beside them only {', '.join(Columns.MAPPED[2:])}."
+        )
+    found: dict[str, tuple[int, ...]] = {}
+    for group, given in columns.items():
+        wanted = [given] if isinstance(given, str) else [*given]
+        if group in ("time", "power") and len(wanted) != 1:
+            raise InvalidProblem(f"columns.{group}", f"columns.{group} must be the name of one column.")
+        found[group] = tuple(_index(names, each) for each in wanted)
+    (time,) = found.pop("time")
+    groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
+    _check_counts({group: indices for group, indices in groups.items() if group != "power"}, names, nq)
+    return Columns("mapped", names, time, groups)
+
+
+def _index(names: Sequence[str], name: str) -> int:
+    if names.count(name.lower()) != 1:
+        has = "does not have" if name.lower() not in names else "has more than once"
+        raise InvalidTable(f"The header {has} the column {name}: correct `columns` or the header.", 1, name)
+    return names.index(name.lower())
+
+
+def _check_counts(groups: Mapping[Group, tuple[int, ...]], names: Sequence[str], nq: int) -> None:
+    for indices in groups.values():
+        if len(indices) != nq:
+            name = names[indices[0]] if indices else None
+            raise InvalidTable(
+                f"The header has {len(indices)} columns like {name}, but the robot has {nq} joints: a log is of one "
+                "robot, with one column for each of its joints.",
+                1,
+                name,
+            )
