@@ -1,11 +1,13 @@
 """Attacks the proven lower bound: motions that the service did not find, none of which may spend less than the bound.
 
     python -m benchmarks.bound_attack --count 1000 --starts 20
+    python -m benchmarks.bound_attack --robot panda --load 0.2 --bound tight
 
 Every request is solved, and its lower bound kept. Then motions are optimised from random starts on POINTS control
 points, each to a random configuration that reaches the goal, from one that reaches the start: any branch, any full
 turn, any member of a self-motion, any allowed orientation. The kinds of targets take turns, and half of the requests
-has other conditions: payload, mounting, bus, cycle, a fixed duration, the mechanical objective.
+has other conditions: payload, mounting, bus, cycle, a fixed duration, the mechanical objective. With `--load` friction
+grows with the torque that a joint carries.
 """
 
 from __future__ import annotations
@@ -82,8 +84,8 @@ CONFIGURATIONS: dict[str, Callable[[Robot, np.random.Generator], Array]] = {
 TARGETS = ("pose", "start and goal", "free about", "cone", "free", "several")
 
 
-def request(robot: Robot, seed: int, index: int) -> tuple[str, Problem]:
-    """Request `index` of a seed and the name of its kind."""
+def request(robot: Robot, seed: int, index: int, **fixed: Any) -> tuple[str, Problem]:
+    """Request `index` of a seed, with fields that all of them have, and the name of its kind."""
     rng = np.random.default_rng([seed, index])
     where, what = (
         list(CONFIGURATIONS)[index % len(CONFIGURATIONS)],
@@ -103,7 +105,7 @@ def request(robot: Robot, seed: int, index: int) -> tuple[str, Problem]:
         "several": AnyOf((Pose(T), Pose(tcp_pose(arm, _general(robot, rng))))),
     }
     begin: Any = Pose(tcp_pose(arm, CONFIGURATIONS[where](robot, rng))) if what == "start and goal" else start
-    return f"{what}, {where}", Problem(arm=arm, start=begin, goal=targets[what], deadline=DEADLINE, **fields)
+    return f"{what}, {where}", Problem(arm=arm, start=begin, goal=targets[what], deadline=DEADLINE, **fields, **fixed)
 
 
 def _conditions(robot: Robot, rng: np.random.Generator) -> tuple[Arm, dict[str, Any]]:
@@ -180,19 +182,30 @@ def _near(choices: Array, q: Array, coulomb: Array, rng: np.random.Generator) ->
     return np.asarray(choices[order[min(int(rng.geometric(ODDS)) - 1, len(order) - 1)]])
 
 
+def _loaded(robot: Robot, share: float) -> Robot:
+    """The robot with friction that grows with the load, if the share of it that is lost is not zero."""
+    if not share:
+        return robot
+    load = np.full(robot.nq, share)
+    return replace(robot, friction_laws={n: replace(law, load=load) for n, law in robot.friction_laws.items()})
+
+
 def main() -> int:
     """Prints every broken bound, and how near the attack came; returns 1 if one is broken."""
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=60, help="requests (%(default)s)")
     arguments.add_argument("--starts", type=int, default=20, help="motions for each request (%(default)s)")
+    arguments.add_argument("--robot", default="ur5e", help="robot (%(default)s)")
+    arguments.add_argument("--load", type=float, default=0.0, help="share of a joint's load that is lost (%(default)s)")
+    arguments.add_argument("--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
-    robot = load_robot("ur5e")
+    robot = _loaded(load_robot(given.robot), given.load)
     compile_kernel(robot)
     rows: list[dict[str, Any]] = []
     refused, broken = 0, list[str]()
     for index in range(given.count):
-        kind, problem = request(robot, given.seed, index)
+        kind, problem = request(robot, given.seed, index, bound=given.bound)
         try:
             solution = optimize(problem)
         except JoulepathError as error:

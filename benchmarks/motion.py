@@ -80,7 +80,7 @@ def replay(problem: Problem, motion: Motion, q_start: Array, q_goal: Array) -> R
     tau = torques(problem, q, v, a)
     model, data = _model(problem)
     potential = [pin.computePotentialEnergy(model, data, np.ascontiguousarray(q[i])) for i in (0, -1)]
-    energy = breakdown(weights, v, tau, potential[1] - potential[0], problem.arm)
+    energy = breakdown(weights, v, a, tau, potential[1] - potential[0], problem.arm)
     ends = max(float(np.abs(q[0] - q_start).max()), float(np.abs(q[-1] - q_goal).max()))
     return Replay(motion.duration, energy, _ratios(problem, q, v, a, jerk, tau), ends)
 

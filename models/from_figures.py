@@ -109,12 +109,26 @@ def _elbow(figures: dict[str, Any], capsules: tuple[LinkCapsule, ...]) -> LinkCa
     return [capsule for capsule in capsules if capsule.link == link][-1]
 
 
+def _load(name: str, law: dict[str, Any], nq: int) -> Array | None:
+    """Share of the carried torque that is lost, (nq,); None where the figures name none. Raises ValueError.
+
+    From a share of 1 on a joint could not be moved by its load at all.
+    """
+    if "load" not in law or not np.any(law["load"]["value"]):
+        return None
+    load = _joints(law["load"], nq)
+    if not ((load >= 0) & (load < 1)).all():
+        raise ValueError(f"friction_laws.{name}.load must be at least 0 and below 1 for every joint.")
+    return load
+
+
 def _friction_laws(figures: dict[str, Any], nq: int) -> dict[str, FrictionLaw]:
     knee = float(figures["friction_table"]["knee"]["value"])
     return {
         name: FrictionLaw(
             name=name,
             knee=knee,
+            load=_load(name, law, nq),
             **{part: _joints(law[part], nq) for part in ("coulomb", "curved", "speed", "viscous")},
         )
         for name, law in figures["friction_laws"].items()

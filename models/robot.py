@@ -52,13 +52,15 @@ class Limits:
 
 @dataclass(frozen=True)
 class FrictionLaw:
-    """Joint friction torque, odd in the speed v and analytic.
+    """Joint friction torque, odd in the speed v.
 
-    tau_f(v) = coulomb · v / sqrt(v² + knee²) + curved · asinh(v / speed) + viscous · v
+    tau_f = (coulomb + load · |tau_link|) · v / sqrt(v² + knee²) + curved · asinh(v / speed) + viscous · v
 
-    The first term is Coulomb friction with its step spread over `knee` [rad/s], the second the concave rise that
-    strain-wave gears show, the third viscous friction. Arrays have shape (nq,): coulomb, curved [N·m],
-    speed [rad/s], viscous [N·m·s/rad].
+    The first term is Coulomb friction with its step spread over `knee` [rad/s]. It grows with the torque tau_link of
+    the rigid bodies alone, which passes through the gear, the rotor's does not. The second term is the concave rise
+    that strain-wave gears show, the third viscous friction. Arrays have shape (nq,): coulomb, curved [N·m], load [1],
+    speed [rad/s], viscous [N·m·s/rad]. `load` is None for a law that does not depend on the load. With `bend` [N·m]
+    above zero |tau_link| is sqrt(tau_link² + bend²).
     """
 
     name: str
@@ -67,16 +69,28 @@ class FrictionLaw:
     speed: Array
     viscous: Array
     knee: float = 1e-3
+    load: Array | None = None
+    bend: Any = 0.0
 
     FORMULA: ClassVar[str] = "coulomb v / sqrt(v² + knee²) + curved asinh(v / speed) + viscous v"
+    LOAD_FORMULA: ClassVar[str] = FORMULA.replace("coulomb", "(coulomb + load |tau_link|)")
 
-    def torque(self, v: Any, xp: Any = np) -> Any:
-        """Friction torque [N·m] for joint speeds v, shape (..., nq); `xp` is numpy, or casadi for symbols."""
+    def torque(self, v: Any, tau_link: Any = None, xp: Any = np) -> Any:
+        """Friction torque [N·m] for joint speeds v and torques of the rigid bodies tau_link [N·m], shapes (..., nq).
+
+        A law that does not depend on the load needs no tau_link. `xp` is numpy, or casadi for symbols.
+        """
+        dry = self.coulomb
+        if self.load is not None:
+            dry = dry + self.load * xp.sqrt(tau_link * tau_link + self.bend * self.bend)
         return (
-            self.coulomb * v / xp.sqrt(v * v + self.knee * self.knee)
-            + self.curved * xp.asinh(v / self.speed)
-            + self.viscous * v
+            dry * v / xp.sqrt(v * v + self.knee * self.knee) + self.curved * xp.asinh(v / self.speed) + self.viscous * v
         )
+
+    @property
+    def unloaded(self) -> FrictionLaw:
+        """The law of a joint that carries nothing: the least friction, as no coefficient is negative."""
+        return replace(self, load=None)
 
 
 @dataclass(frozen=True)
@@ -183,6 +197,11 @@ class Robot:
     def friction(self) -> FrictionLaw:
         """The default friction law."""
         return next(iter(self.friction_laws.values()))
+
+    @property
+    def has_load_friction(self) -> bool:
+        """Whether the friction of one of its laws grows with the load."""
+        return any(law.load is not None for law in self.friction_laws.values())
 
     def loaded_model(
         self, mass: float, com: Array, inertia: Array, gravity: Array, link_mass_scale: Array | None = None

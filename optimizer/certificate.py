@@ -114,7 +114,7 @@ class _Replay:
         ]
         gain_potential, gain_kinetic = (after - before for before, after in zip(*ends, strict=True))
         weights = simpson_weights(self.t)
-        return breakdown(weights, self.v, self.tau, gain_potential, self.arm, kinetic=gain_kinetic)
+        return breakdown(weights, self.v, self.a, self.tau, gain_potential, self.arm, kinetic=gain_kinetic)
 
     @property
     def final_holding_power(self) -> float:

@@ -164,7 +164,12 @@ def _friction(figures: dict[str, Any]) -> Friction:
     return Friction(
         table=figures["friction_table"],
         laws=[
-            FrictionLaw(name=name, default=name == default, formula=Law.FORMULA, coefficients=coefficients)
+            FrictionLaw(
+                name=name,
+                default=name == default,
+                formula=Law.LOAD_FORMULA if "load" in coefficients else Law.FORMULA,
+                coefficients=coefficients,
+            )
             for name, coefficients in laws.items()
         ],
     )

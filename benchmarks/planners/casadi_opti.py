@@ -107,7 +107,7 @@ def _node(robot: Robot) -> ca.Function:
     )
     law = robot.friction
     friction = FrictionLaw(law.name, law.coulomb, law.curved, law.speed, law.viscous, KNEE)
-    flow = power_flow(tau, v, robot.drives, friction, 0.1 * WIDTH, ca)
+    flow = power_flow(tau, v, a, robot.drives, friction, 0.1 * WIDTH, ca)
     electronics = robot.electronics
     net = electronics.idle_power + electronics.controller_power + ca.sum1(flow.joints)
     return ca.Function("node", [q, v, a], [drawn_power(net, electronics.regeneration, WIDTH, ca), flow.tau_motor])

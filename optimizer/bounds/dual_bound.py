@@ -8,6 +8,18 @@ constants
 
     energy ≥ ΔU + ∫ (base - Σ c λ² + Σ_j (v_j + ω_j) tau_f(v_j) + ω · g - ω̇ · M v - v · N v / 2) dt.
 
+**Load.** Friction may grow with the load: tau_f = f(v) + load |tau_l| s, where tau_l = tau - J a is the torque without
+the rotor's, s has the sign of v, and |s| ≤ 1. Then v tau_f ≥ v f(v). The copper's inequality is taken at each instant
+with ω̂ = ω / (1 + load · sign(tau_l) s) and λ̂ = ω̂ / (2 c) in the place of ω and λ: so ω̂ (tau_l + load |tau_l| s) = ω
+tau_l, and
+
+    ω̂ (tau + tau_f) - c λ̂² = ω tau + (ω̂ - ω) J a + ω̂ f(v) - c λ̂²
+                            ≥ ω tau - |ω| load / (1 - load) · J a_max + ω̂ f(v) - c λ² / (1 - load)².
+
+ω̂ lies between ω / (1 + load) and ω / (1 - load). So the bound holds with c λ² over (1 - load)², with the power |ω| load
+/ (1 - load) · J a_max taken from the base, and with f and the worst ω̂ in H, which remains a maximum of functions linear
+in p and ω.
+
 **Path.** x(t) is any path from start to goal, b = ẋ, δ = q - x, w = v - b; δ is zero at both ends. Then ω̇ · M v + v
 · N v / 2 = (ω̇ · M b + b · N b / 2) + ρ · w + w · N w / 2 with ρ = M ω̇ + N b, at q. For any ρ̄(t) and μ_j > 0, (ρ -
 ρ̄) · w ≤ Σ_j ((ρ_j - ρ̄_j)² / (2 μ_j) + μ_j w_j² / 2); and w · N w ≤ Σ_j ν_j w_j² by `PathTerms.spread`.
@@ -69,11 +81,20 @@ class Weights:
     mixing: Array
 
 
+def multiplier_rates(multipliers: Array, loss: Array, load: Array | None) -> Array:
+    """Means (S,) over each step of Σ c λ² / (1 - load)² [W], for multipliers λ (S + 1, nq) linear on each."""
+    first, last = multipliers[:-1], multipliers[1:]
+    least = loss if load is None else loss / (1 - load) ** 2
+    return np.asarray((first * first + first * last + last * last) @ least / 3)
+
+
 @dataclass(frozen=True)
 class DualBound:
-    """The bound of a pair: terms along its path, `rates` (S,) Σ c λ² [W], powers [W] and gain of potential energy [J].
+    """The bound of a pair: terms along its path, `rates` (S,) [W] by `multiplier_rates`, powers [W] and gain of
+    potential energy [J].
 
-    `base` holds the constants of the inverters. `longest` [s] is the duration that the boxes of `terms` are made for.
+    `base` holds the constants of the inverters. `longest` [s] is the duration that the boxes of `terms` are made for,
+    `rotor` (nq,) [kg·m²] is J.
     """
 
     terms: PathTerms
@@ -83,6 +104,7 @@ class DualBound:
     base: float
     potential_gain: float
     longest: float
+    rotor: Array
 
     @cached_property
     def _torque_slope(self) -> Array:
@@ -93,6 +115,15 @@ class DualBound:
     def _momentum(self) -> Array:
         """M ω' + N x' (S, nq) on the path, the mean of both ends of each step."""
         return np.asarray(self.terms.momentum[:, :, self.terms.centre].mean(axis=1))
+
+    @cached_property
+    def _rotor_power(self) -> float:
+        """Mean over the duration of Σ |ω| load / (1 - load) · J a_max [W]; |ω| is convex on each step."""
+        load = self.friction.load
+        if load is None:
+            return 0.0
+        size = np.abs(self.terms.omega)
+        return float((size[:-1] + size[1:]).mean(axis=0) / 2 @ (load / (1 - load) * self.rotor * self.limits.a_max))
 
     def __call__(self, shortest: Array, longest: Array, weights: Weights, waiting: float = 0.0) -> Array:
         """Bounds (B,) [J] on motions of durations from `shortest` to `longest` (B,) [s], at most that of the boxes.
@@ -117,7 +148,13 @@ class DualBound:
         least = least_potential_terms(
             terms, weights.scale, weights.confinement, weights.mixing, pull, momentum, fast, slow
         )
-        rate = self.base - waiting + (least - weights.scale**2 * self.rates).mean(axis=1) - A
+        rate = (
+            self.base
+            - waiting
+            - weights.scale * self._rotor_power
+            + (least - weights.scale**2 * self.rates).mean(axis=1)
+            - A
+        )
         return np.asarray(self.potential_gain - B + np.minimum(shortest * rate, longest * rate))
 
 

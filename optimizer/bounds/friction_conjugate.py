@@ -18,22 +18,29 @@ _MOST_KNEE = 0.01
 @dataclass(frozen=True)
 class FrictionConjugate:
     """A concave friction torque between nodes of speed, per interval (k, nq): first and last speed [rad/s], the chord's
-    value at speed 0 and slope, and how far the torque rises above its chord at most [N·m]."""
+    value at speed 0 and slope, and how far the torque rises above its chord at most [N·m].
+
+    The torque is that of unloaded joints. `load` (nq,) is the share of the carried torque that is lost, too; None for a
+    law without it.
+    """
 
     first: Array
     last: Array
     constant: Array
     slope: Array
     sagitta: Array
+    load: Array | None = None
 
     @classmethod
     def of(cls, law: FrictionLaw, v_max: Array) -> FrictionConjugate | None:
         """The intervals up to v_max (nq,); None for a law that is not concave: one with a negative coefficient."""
         if min(law.coulomb.min(), law.curved.min(), law.viscous.min()) < 0 or law.knee <= 0 or law.speed.min() <= 0:
             return None
+        if law.load is not None and not ((law.load >= 0) & (law.load < 1)).all():
+            return None
         knees = np.outer(_IN_KNEES, np.minimum(law.knee, _MOST_KNEE / _IN_KNEES[-1] * v_max))
         v = np.concatenate([np.zeros((1, len(v_max))), knees, np.outer(_SHARES, v_max)])
-        torque, step = law.torque(v), np.diff(v, axis=0)
+        torque, step = law.unloaded.torque(v), np.diff(v, axis=0)
         rate = law.coulomb * law.knee**2 / (v * v + law.knee**2) ** 1.5 + law.curved / np.hypot(v, law.speed)
         rate = rate + law.viscous
         slope = np.diff(torque, axis=0) / step
@@ -41,7 +48,7 @@ class FrictionConjugate:
         bend = np.maximum(rate[:-1] - rate[1:], 1e-12)
         at = np.clip((np.diff(torque, axis=0) - rate[1:] * step) / bend, 0.0, step)
         sagitta = np.maximum((rate[:-1] - slope) * at, 0.0)
-        return cls(v[:-1], v[1:], torque[:-1] - slope * v[:-1], slope, sagitta)
+        return cls(v[:-1], v[1:], torque[:-1] - slope * v[:-1], slope, sagitta, law.load)
 
     def greatest(self, p: Array, omega: Array, square: Array, most: Array) -> tuple[Array, Array]:
         """Upper bounds (..., nq) on max over |v| ≤ most of p v - (v + omega) tau_f(v) + square v², and where it is.
@@ -49,6 +56,9 @@ class FrictionConjugate:
         For v ≥ 0 the torque is between its chord and the chord plus the sagitta. So (v + omega) tau_f(v) ≥ (v + omega)
         chord - max(-(first + omega), 0) sagitta, a quadratic function of v, whose greatest value on an interval is
         known. For v < 0 the same holds with -v, -p, -omega, as the torque is odd.
+
+        Where friction grows with the load, ω̂ stands in the place of omega: that of all from omega / (1 + load) to
+        omega / (1 - load) at which ω̂ tau_f(v) is least.
         """
         shape = np.broadcast_shapes(p.shape, omega.shape, square.shape, most.shape)
         best, where = np.zeros(shape), np.zeros(shape)
@@ -58,6 +68,8 @@ class FrictionConjugate:
         bent = second < 0
         for sign in (1.0, -1.0):
             shift = sign * omega[..., None, :]
+            if self.load is not None:
+                shift = shift / np.where(shift > 0, 1 + self.load, 1 - self.load)
             rate = sign * p[..., None, :] - self.constant - shift * self.slope
             v = np.clip(np.where(bent, -rate / np.where(bent, 2 * second, -1.0), high), low, high)
             value = np.maximum((second * v + rate) * v, (second * low + rate) * low)

@@ -56,7 +56,8 @@ def dwell_energy(cycle: Cycle, arm: Arm, hold: float, duration: float) -> float:
 
 def holding_power(arm: Arm, tau: Array) -> Array:
     """Power (...) [W] that the arm draws while its motors hold torques tau (..., nq) [N·m] at standstill."""
-    joints = power_flow(tau, np.zeros_like(tau), arm.drives, arm.friction_law).joints
+    still = np.zeros_like(tau)
+    joints = power_flow(tau, still, still, arm.drives, arm.friction_law).joints
     return np.asarray(arm.base_power + joints.sum(axis=-1))
 
 

@@ -47,6 +47,7 @@ def digest(robot: Robot) -> str:
     for path in (*(str(module.__file__) for module in SOURCES), __file__):
         h.update(Path(path).read_bytes())
     h.update(repr((version("casadi"), COMPILER_FLAGS, os.uname().machine)).encode())
+    h.update(repr(robot.has_load_friction).encode())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
     constants += [body.toDynamicParameters() for body in robot.model.inertias]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -11,7 +11,7 @@ import numpy as np
 
 from models.robot import Array, Drives, FrictionLaw, Robot
 from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
-from optimizer.energy.losses import drawn_power, power_flow, smooth_abs
+from optimizer.energy.losses import drawn_power, friction_torque, power_flow, smooth_abs
 
 FUNCTION_NAMES = ("torque", "value", "node")
 
@@ -33,13 +33,14 @@ class Parameters:
 
     The payload: `mass` [kg], `com` (3,) [m] in the flange frame, `inertia` (6,) ixx ixy ixz iyy iyz izz about the com
     [kg·m²]. `gravity` (3,) [m/s²] in the base frame. Per joint (nq,): `rotor_inertia` [kg·m²]; friction `coulomb`,
-    `curved` [N·m], `speed` [rad/s], `viscous` [N·m·s/rad]; drives `torque_constant` [N·m/A], `copper` [W/A²],
-    `inverter_constant` [W], `inverter_linear` [W/A], `inverter_quadratic` [W/A²]; `link_mass_scale` [1].
+    `curved` [N·m], `speed` [rad/s], `viscous` [N·m·s/rad], `load` [1]; drives `torque_constant` [N·m/A], `copper`
+    [W/A²], `inverter_constant` [W], `inverter_linear` [W/A], `inverter_quadratic` [W/A²]; `link_mass_scale` [1].
 
     `link_side` is 1 if the limited torque is that of the link, 0 if that of the motor. `base_power` [W] of the
     electronics; `regeneration` [1], the fraction of net surplus that the supply takes back;
     `isolated` is 1 if every joint dissipates its own surplus, else 0. `electrical`, `mechanical` [1] and `time` [W]
-    weigh the parts of the cost. `knee` [rad/s] smooths the reversal of friction, `width` [W] the corners of the cost.
+    weigh the parts of the cost. `knee` [rad/s] smooths the reversal of friction, `bend` (nq,) [N·m] the corner of
+    its growth with the load, `width` [W] the corners of the cost. `load` is None in a kernel without such friction.
     """
 
     mass: Any
@@ -51,6 +52,8 @@ class Parameters:
     curved: Any
     speed: Any
     viscous: Any
+    load: Any
+    bend: Any
     torque_constant: Any
     copper: Any
     inverter_constant: Any
@@ -85,7 +88,8 @@ class Parameters:
     @property
     def friction(self) -> FrictionLaw:
         """The friction law of these coefficients."""
-        return FrictionLaw("symbolic", self.coulomb, self.curved, self.speed, self.viscous, self.knee)
+        law = FrictionLaw("symbolic", self.coulomb, self.curved, self.speed, self.viscous, self.knee)
+        return law if self.load is None else replace(law, load=self.load, bend=self.bend)
 
     @property
     def drives(self) -> Drives:
@@ -103,11 +107,11 @@ class Parameters:
 
 @dataclass(frozen=True)
 class _Power:
-    """The cost and the friction in the limited torque, as functions of the torque tau (nq,) [N·m] and the speed v (nq,)
-    [rad/s] alone.
+    """The cost and the friction in the limited torque, as functions of the torque tau (nq,) [N·m], the speed v (nq,)
+    [rad/s] and the acceleration a (nq,) [rad/s²] alone.
 
-    `slope` (2 nq,) and `bend` (2 nq, 2 nq) are the cost's derivatives by tau and v; `friction_slope` (nq, nq) is that
-    of the friction by v, `friction_bend` (nq, nq) the second one of multiplier · friction.
+    `slope` (3 nq,) and `bend` (3 nq, 3 nq) are the cost's derivatives by tau, v and a; `friction_slope` (nq, 3 nq) is
+    that of the friction, `friction_bend` (3 nq, 3 nq) the second one of multiplier · friction.
     """
 
     cost: ca.SX
@@ -135,9 +139,11 @@ def _functions(robot: Robot) -> list[ca.Function]:
     y = ca.SX.sym("y", 3 * nq)
     q, v, a = y[:nq], y[nq : 2 * nq], y[2 * nq :]
     par, p = Parameters.symbols(nq)
+    if not robot.has_load_friction:
+        par = replace(par, load=None)
     tau = inverse_dynamics(robot.model, q, v, a, par.payload, par.gravity, par.rotor_inertia, par.link_mass_scale)
     multiplier, weight = ca.SX.sym("multiplier", nq), ca.SX.sym("weight")
-    power = _power(par, tau, v, multiplier)
+    power = _power(par, tau, v, a, multiplier)
     # on the link's side without the rotor
     rotor = par.link_side * par.rotor_inertia
     gradient, jacobian, hessian = _derivatives(power, tau, rotor, y, multiplier, weight)
@@ -151,22 +157,23 @@ def _functions(robot: Robot) -> list[ca.Function]:
     ]
 
 
-def _power(par: Parameters, tau: ca.SX, v: ca.SX, multiplier: ca.SX) -> _Power:
-    """Cost and friction at torque tau and speed v, differentiated before these are put in."""
+def _power(par: Parameters, tau: ca.SX, v: ca.SX, a: ca.SX, multiplier: ca.SX) -> _Power:
+    """Cost and friction at torque tau, speed v and acceleration a, differentiated before these are put in."""
     nq = tau.numel()
-    t, w = ca.SX.sym("t", nq), ca.SX.sym("w", nq)
-    cost = _cost(par, t, w)
-    bend, slope = ca.hessian(cost, ca.vertcat(t, w))
-    friction = (1 - par.link_side) * par.friction.torque(w, ca)
-    friction_bend, _ = ca.hessian(ca.dot(multiplier, friction), w)
-    local = [cost, friction, slope, bend, ca.jacobian(friction, w), friction_bend]
-    return _Power(*ca.substitute(local, [t, w], [tau, v]))
+    t, w, x = (ca.SX.sym(name, nq) for name in "twx")
+    inner = ca.vertcat(t, w, x)
+    cost = _cost(par, t, w, x)
+    bend, slope = ca.hessian(cost, inner)
+    friction = (1 - par.link_side) * friction_torque(par.friction, par.drives, t, w, x, ca)
+    friction_bend, _ = ca.hessian(ca.dot(multiplier, friction), inner)
+    local = [cost, friction, slope, bend, ca.jacobian(friction, inner), friction_bend]
+    return _Power(*ca.substitute(local, [t, w, x], [tau, v, a]))
 
 
-def _cost(par: Parameters, t: ca.SX, w: ca.SX) -> ca.SX:
-    """Smoothed cost [W] for torques t and speeds w."""
+def _cost(par: Parameters, t: ca.SX, w: ca.SX, x: ca.SX) -> ca.SX:
+    """Smoothed cost [W] for torques t, speeds w and accelerations x."""
     # the inverter's |i| is smoothed over a tenth of an ampere per watt of width
-    flow = power_flow(t, w, par.drives, par.friction, 0.1 * par.width, ca)
+    flow = power_flow(t, w, x, par.drives, par.friction, 0.1 * par.width, ca)
     shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
     # one corner per joint instead of one for all: each is smoothed over its share of the width
     isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / t.numel(), ca))
@@ -185,15 +192,17 @@ def _derivatives(
     a third of the operations that differentiating the composed cost twice takes.
     """
     nq = tau.numel()
-    speeds = slice(nq, 2 * nq)
     J_tau = ca.jacobian(tau, y)
-    J_inner = ca.vertcat(J_tau, ca.horzcat(ca.SX(nq, nq), ca.SX.eye(nq), ca.SX(nq, nq)))
+    J_inner = ca.vertcat(J_tau, ca.horzcat(ca.SX(2 * nq, nq), ca.SX.eye(2 * nq)))
     pull = ca.SX.sym("pull", nq)
-    dynamics_bend = ca.substitute(ca.hessian(ca.dot(pull, tau), y)[0], pull, weight * power.slope[:nq] + multiplier)
-    # half of a symmetric product, mirrored
-    hessian = dynamics_bend + ca.tril2symm(ca.tril(J_inner.T @ (weight * power.bend @ J_inner)))
-    hessian[speeds, speeds] += power.friction_bend
-    jacobian = J_tau + 0
-    jacobian[:, speeds] += power.friction_slope
+    pulled = weight * power.slope[:nq] + multiplier + power.friction_slope[:, :nq].T @ multiplier
+    dynamics_bend = ca.substitute(ca.hessian(ca.dot(pull, tau), y)[0], pull, pulled)
+    hessian = dynamics_bend + _congruent(J_inner, weight * power.bend) + _congruent(J_inner, power.friction_bend)
+    jacobian = J_tau + power.friction_slope @ J_inner
     jacobian[:, 2 * nq :] -= ca.diag(rotor)
     return J_inner.T @ power.slope, jacobian, hessian
+
+
+def _congruent(J: ca.SX, symmetric: ca.SX) -> ca.SX:
+    """Jᵀ · symmetric · J: half of the product, mirrored."""
+    return ca.tril2symm(ca.tril(J.T @ (symmetric @ J)))

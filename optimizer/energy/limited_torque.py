@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from models.robot import Array
+from optimizer.energy.losses import friction_torque
 from optimizer.problem.arm import Arm
 
 
@@ -19,10 +20,27 @@ def limited_parts(arm: Arm, tau: Array, v: Array, a: Array) -> tuple[Array, Arra
     """
     if arm.robot.torque_side == "link":
         return tau - arm.drives.rotor_inertia * a, np.zeros_like(tau)
-    return tau, arm.friction_law.torque(v)
+    return tau, friction_torque(arm.friction_law, arm.drives, tau, v, a)
 
 
 def limited_torque(arm: Arm, tau: Array, v: Array, a: Array) -> Array:
     """The torque (k, nq) [N·m] that the limit is for: see `limited_parts`."""
     smooth, friction = limited_parts(arm, tau, v, a)
     return smooth + friction
+
+
+def greatest_smooth_part(arm: Arm) -> Array:
+    """The greatest absolute value (nq,) [N·m] that the smooth part of the limited torque has within the limits.
+
+    Friction helps a motor that holds a load back. With f(v_max) that of an unloaded joint, |tau_link| ≤ |tau| +
+    rotor · a_max, and |tau| ≤ tau_max + f + load |tau_link|:
+
+        |tau| ≤ (tau_max + f(v_max) + load · rotor · a_max) / (1 - load).
+    """
+    limits, law = arm.active_limits, arm.friction_law
+    if arm.robot.torque_side == "link":
+        return limits.tau_max
+    most: Array = limits.tau_max + law.unloaded.torque(limits.v_max)
+    if law.load is None:
+        return most
+    return np.asarray((most + law.load * arm.drives.rotor_inertia * limits.a_max) / (1 - law.load))

@@ -1,6 +1,6 @@
 """Drive losses, power on the bus and the parts of a motion's energy: one definition for optimiser, report, certificate.
 
-tau_motor = tau + friction(v) [N·m],  i = tau_motor / torque_constant [A]
+tau_motor = tau + friction [N·m],  i = tau_motor / torque_constant [A]
 inverter  = constant + linear |i| + quadratic i² [W]  (Hansen, Öltjen, Meike, Ortmaier 2012)
 P_net     = base + Σ_j (tau_motor_j v_j + copper_j i_j² + inverter_j(i_j)) [W],  base = idle + controller
 P_drawn   = max(P_net, 0) - regeneration · max(-P_net, 0) [W] on a shared bus; for other buses see `bus_flow`
@@ -49,21 +49,28 @@ def smooth_abs(x: Any, width: Any, xp: Any) -> Any:
     return xp.sqrt(x * x + width * width)
 
 
-def power_flow(tau: Any, v: Any, drives: Drives, friction: FrictionLaw, width: Any = 0.0, xp: Any = np) -> PowerFlow:
+def friction_torque(law: FrictionLaw, drives: Drives, tau: Any, v: Any, a: Any, xp: Any = np) -> Any:
+    """Friction torque (..., nq) [N·m] of a motion; tau, v, a as in `power_flow`."""
+    return law.torque(v, None if law.load is None else tau - drives.rotor_inertia * a, xp)
+
+
+def power_flow(
+    tau: Any, v: Any, a: Any, drives: Drives, friction: FrictionLaw, width: Any = 0.0, xp: Any = np
+) -> PowerFlow:
     """Losses and shaft power of every joint.
 
-    tau (..., nq) [N·m] are torques of rigid body and rotor, without friction; v (..., nq) [rad/s]. `width` [A] smooths
-    the |i| of the inverter.
+    tau (..., nq) [N·m] are torques of rigid body and rotor, without friction; v [rad/s], a [rad/s²] (..., nq). `width`
+    [A] smooths the |i| of the inverter.
     """
-    friction_torque = friction.torque(v, xp)
-    tau_motor = tau + friction_torque
+    lost = friction_torque(friction, drives, tau, v, a, xp)
+    tau_motor = tau + lost
     i = tau_motor / drives.torque_constant
     inverter = (
         drives.inverter_constant + drives.inverter_linear * smooth_abs(i, width, xp) + drives.inverter_quadratic * i * i
     )
     return PowerFlow(
         tau_motor=tau_motor,
-        friction=friction_torque * v,
+        friction=lost * v,
         copper=drives.copper * i * i,
         inverter=inverter,
         shaft=tau_motor * v,
@@ -75,16 +82,18 @@ def drawn_power(net: Any, regeneration: Any, width: Any = 0.0, xp: Any = np) -> 
     return ((1 - regeneration) * smooth_abs(net, width, xp) + (1 + regeneration) * net) / 2
 
 
-def breakdown(weights: Array, v: Array, tau: Array, potential: float, arm: Arm, kinetic: float = 0.0) -> Energy:
+def breakdown(
+    weights: Array, v: Array, a: Array, tau: Array, potential: float, arm: Arm, kinetic: float = 0.0
+) -> Energy:
     """Energy of a motion of an arm from its samples, in order of time.
 
-    `weights` (k,) [s] are those of the quadrature; they add up to the duration. v (k, nq) [rad/s] and tau (k, nq)
-    [N·m] are the samples; tau are torques of rigid body and rotor, without friction. `potential` and `kinetic` [J] are
-    the gains of energy from the first to the last state, known without quadrature. A part that is zero is 0.0, never
-    -0.0.
+    `weights` (k,) [s] are those of the quadrature; they add up to the duration. v [rad/s], a [rad/s²] and tau [N·m]
+    (k, nq) are the samples; tau are torques of rigid body and rotor, without friction. `potential` and `kinetic` [J]
+    are the gains of energy from the first to the last state, known without quadrature. A part that is zero is 0.0,
+    never -0.0.
     """
     duration = float(weights.sum())
-    flow = power_flow(tau, v, arm.drives, arm.friction_law)
+    flow = power_flow(tau, v, a, arm.drives, arm.friction_law)
     bus, joints = arm.bus, flow.joints
     flows = exchange(bus, arm.regeneration, arm.base_power, joints, weights)
     surplus, charged = float(flows.surplus.sum()), float(flows.charged.sum())

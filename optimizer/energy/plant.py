@@ -19,8 +19,10 @@ from optimizer.problem.arm import Arm
 from optimizer.solution import Energy, Trajectory
 from optimizer.trajectories.spline import Spline, fine_samples, sample
 
-# smoothing in the optimiser's cost: the reversal of friction [rad/s] and the corners of |power| [W]
+# smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that friction grows with
+# as a share of the robot's torque limit, and the corners of |power| [W]
 KNEE = 0.02
+BEND = 0.01
 WIDTH = 0.5
 # widths [W] of the solves that follow, one from the other, where every joint has a corner of its own
 SHARPER_WIDTHS = (0.1, 0.02)
@@ -71,7 +73,7 @@ class Plant:
         an instant cannot depend on a charge: with an energy storage, this value stands for it. `width` [W] smooths the
         corners of the cost.
         """
-        payload, friction, drives = self.arm.payload, self.arm.friction_law, self.arm.drives
+        payload, friction, drives, nq = self.arm.payload, self.arm.friction_law, self.arm.drives, self.arm.robot.nq
         return Parameters(
             mass=payload.mass,
             com=payload.com,
@@ -82,6 +84,8 @@ class Plant:
             curved=friction.curved,
             speed=friction.speed,
             viscous=friction.viscous,
+            load=np.zeros(nq) if friction.load is None else friction.load,
+            bend=BEND * self.arm.robot.limits.tau_max,
             torque_constant=drives.torque_constant,
             copper=drives.copper,
             inverter_constant=drives.inverter_constant,
@@ -117,6 +121,10 @@ class Plant:
         """The torques (k, nq) [N·m] that the limit is for: see `limited_torque`."""
         return limited_torque(self.arm, self.torques(q, v, a), v, a)
 
+    def motor_torques(self, q: Array, v: Array, a: Array) -> Array:
+        """Motor torques at the joint (k, nq) [N·m]: rigid body, rotor and friction."""
+        return np.asarray(power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).tau_motor)
+
     def potential(self, q: Array) -> float:
         """Potential energy [J] of arm and payload."""
         return float(pin.computePotentialEnergy(self.model, self._data, q))
@@ -126,7 +134,7 @@ class Plant:
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
-        return breakdown(weights, v, self.torques(q, v, a), change, self.arm)
+        return breakdown(weights, v, a, self.torques(q, v, a), change, self.arm)
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples of a spline motion every `period` [s]; the last one lies on the end."""
@@ -134,7 +142,7 @@ class Plant:
         t = np.append(np.arange(int(np.ceil(duration / period - LEAST_STEP))) * period, duration)
         q, v, a = sample(spline, t)
         tau = self.torques(q, v, a)
-        flow = power_flow(tau, v, self.arm.drives, self.friction)
+        flow = power_flow(tau, v, a, self.arm.drives, self.friction)
         charge = self._charge(spline, t)
         power = drawn_at(self.arm.bus, self.arm.regeneration, self.arm.base_power, flow.joints, charge)
         return Trajectory(
@@ -149,6 +157,6 @@ class Plant:
         if self.arm.bus.mode != "storage":
             return np.zeros_like(t)
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        joints = power_flow(self.torques(q, v, a), v, self.arm.drives, self.friction).joints
+        joints = power_flow(self.torques(q, v, a), v, a, self.arm.drives, self.friction).joints
         charge = charges(self.arm.bus, weights * (self.arm.base_power + joints.sum(axis=1)), weights)
         return np.interp(t, np.append(0.0, weights.cumsum()), charge)

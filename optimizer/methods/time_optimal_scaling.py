@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from optimizer.energy.limited_torque import limited_parts
+from optimizer.energy.limited_torque import greatest_smooth_part, limited_parts
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.bspline import greville
 
@@ -49,7 +49,7 @@ class TimeOptimalScaling:
 def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Array) -> TimeOptimalScaling | None:
     """The time-optimal scaling under speed, acceleration and torque limits; None if there is none.
 
-    The limit of a motor's torque is relaxed by the greatest friction torque, so that the duration stays a lower bound.
+    The limit of a motor's torque is relaxed by the greatest help of friction, so that the duration stays a lower bound.
     """
     limits, model = prepared.problem.arm.active_limits, prepared.model
     from toppra import SimplePath, algorithm, constraint  # see the top of this file
@@ -62,8 +62,7 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
     def torque(q: Array, v: Array, a: Array) -> Array:
         return limited_parts(prepared.arm, pin.rnea(model, data, q, v, a), v, a)[0]
 
-    still = np.zeros_like(displacement)
-    tau = limits.tau_max + limited_parts(prepared.arm, still, limits.v_max, still)[1]
+    tau = greatest_smooth_part(prepared.arm)
     none = np.zeros(len(displacement))
     path = SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([displacement, displacement]))
     constraints = [

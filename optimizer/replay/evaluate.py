@@ -158,7 +158,7 @@ class _Evaluator:
 
     def _charge_course(self, nodes: _Nodes) -> Array:
         """Charge (k + 1,) [J] of the energy storage before each node and after the last."""
-        joints = power_flow(nodes.tau, nodes.v, self._arm.drives, self._arm.friction_law).joints
+        joints = power_flow(nodes.tau, nodes.v, nodes.a, self._arm.drives, self._arm.friction_law).joints
         net = nodes.weights * (self._arm.base_power + joints.sum(axis=1))
         charge = charges(replace(self._arm.bus, initial=self._charge), net, nodes.weights)
         self._charge = float(charge[-1])
@@ -190,6 +190,7 @@ class _Evaluator:
         return breakdown(
             nodes.weights[inside],
             nodes.v[inside],
+            nodes.a[inside],
             nodes.tau[inside],
             plant.potential(nodes.q[last]) - plant.potential(nodes.q[begin]),
             self._charged(charge),

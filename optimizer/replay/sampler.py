@@ -73,6 +73,6 @@ class Sampler:
         arm = self._plant.arm
         q, v, a, _ = motion.at_times(t)
         tau = self._plant.torques(q, v, a)
-        flow = power_flow(tau, v, arm.drives, arm.friction_law)
+        flow = power_flow(tau, v, a, arm.drives, arm.friction_law)
         power = drawn_at(arm.bus, arm.regeneration, arm.base_power, flow.joints, charge)
         self._parts.append(Samples(t, q, v, a, tau, flow.tau_motor, power, charge))

@@ -118,7 +118,9 @@ def saving(ours: float, theirs: float) -> float:
 
 def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential: Callable[[Array], float]) -> Energy:
     """Breakdown of a motion that begins and ends at rest, waiting left out, from its torques (k, nq)."""
-    return breakdown(motion.weights, motion.v, tau, potential(motion.q[-1]) - potential(motion.q[0]), problem.arm)
+    return breakdown(
+        motion.weights, motion.v, motion.a, tau, potential(motion.q[-1]) - potential(motion.q[0]), problem.arm
+    )
 
 
 def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:

@@ -122,7 +122,8 @@ def electrical(
       `energy.bus_flow`) ≥ ∫ P_net dt, as c ≤ s and neither factor exceeds 1. The charge's fall is in the total, so the
       bound holds whatever the store begins with.
 
-    Copper and inverter ≥ their constants.
+    Copper and inverter ≥ their constants. Friction that grows with the load loses v · tau_f(v) of an unloaded joint, or
+    more: its share in that is left out.
 
     friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
     The Coulomb part is at least coulomb · |displacement|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =

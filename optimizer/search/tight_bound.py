@@ -22,7 +22,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.dual_bound import DualBound, Weights
+from optimizer.bounds.dual_bound import DualBound, Weights, multiplier_rates
 from optimizer.bounds.friction_conjugate import FrictionConjugate
 from optimizer.bounds.path_terms import path_terms
 from optimizer.bounds.reference import Reference, half_sides
@@ -77,6 +77,8 @@ class _Pairs:
         arm = prepared.arm
         friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
         if friction is None or arm.robot.nq < GRID_JOINTS:
+            return None
+        if friction.load is not None and not np.isfinite(arm.active_limits.a_max).all():
             return None
         loss = (arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2
         stiffness = friction.stiffness(arm.friction_law)
@@ -198,9 +200,10 @@ class _Piece:
                 break
             reference = Reference(x, multipliers * np.array(kept))
             terms = path_terms(pairs.chain, reference, pairs.loss, half, self._grid)
-            first, last = reference.multipliers[:-1], reference.multipliers[1:]
-            rates = (first * first + first * last + last * last) @ pairs.loss / 3
-            dual = DualBound(terms, rates, pairs.friction, arm.active_limits, base, self._gain, float(longest[-1]))
+            rates = multiplier_rates(reference.multipliers, pairs.loss, pairs.friction.load)
+            dual = DualBound(
+                terms, rates, pairs.friction, arm.active_limits, base, self._gain, float(longest[-1]), pairs.chain.rotor
+            )
             for choice in choices:
                 if choice.kept == kept and deadline.left >= BOUND_TIME:
                     value = dual(shortest, longest, choice.weights, self._power)
@@ -255,4 +258,4 @@ class _Piece:
         q, v, a = sample(spline, share * spline.duration)
         q = np.array(q)
         q[0], q[-1] = candidate.q_start, candidate.q_goal
-        return q, prepared.torques(q, v, a) + prepared.friction.torque(v)
+        return q, prepared.motor_torques(q, v, a)

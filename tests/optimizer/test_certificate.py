@@ -79,7 +79,7 @@ def honest(task: Problem, start: Array = START, goal: Array = GOAL, duration: fl
     change = pin.computePotentialEnergy(model, data, goal) - pin.computePotentialEnergy(model, data, start)
     tau = by_crba(task, q, v, a)
     weights = np.tile(w / 2 * panel, 400)
-    return breakdown(weights, v, tau, change, task.arm)
+    return breakdown(weights, v, a, tau, change, task.arm)
 
 
 @pytest.fixture(scope="module")

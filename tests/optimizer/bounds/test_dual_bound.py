@@ -9,7 +9,7 @@ import pytest
 
 from models.robot import Array
 from optimizer.bounds.chain_derivatives import ChainDerivatives
-from optimizer.bounds.dual_bound import DualBound, Weights
+from optimizer.bounds.dual_bound import DualBound, Weights, multiplier_rates
 from optimizer.bounds.friction_conjugate import FrictionConjugate
 from optimizer.bounds.path_terms import path_terms
 from optimizer.bounds.reference import Reference, half_sides
@@ -35,11 +35,10 @@ def dual_of(task: PreparedProblem, reference: Reference, longest: float, grid: t
     assert friction is not None
     half = half_sides(reference, arm.active_limits, longest)
     terms = path_terms(ChainDerivatives.of(arm), reference, loss, half, grid)
-    first, last = reference.multipliers[:-1], reference.multipliers[1:]
-    rates = (first * first + first * last + last * last) @ loss / 3
+    rates = multiplier_rates(reference.multipliers, loss, friction.load)
     base = arm.base_power + float(arm.drives.inverter_constant.sum())
     gain = task.potential(x[-1]) - task.potential(x[0])
-    return DualBound(terms, rates, friction, arm.active_limits, base, gain, longest)
+    return DualBound(terms, rates, friction, arm.active_limits, base, gain, longest, arm.drives.rotor_inertia)
 
 
 def around(task: PreparedProblem, start: Array, goal: Array, rng: np.random.Generator) -> Reference:
@@ -52,7 +51,7 @@ def around(task: PreparedProblem, start: Array, goal: Array, rng: np.random.Gene
     return Reference(x, fit * (rng.random(6) < 0.6))
 
 
-@pytest.mark.parametrize("name", long_but(list(CONDITIONS)[1:2], CONDITIONS))
+@pytest.mark.parametrize("name", long_but((list(CONDITIONS)[1], "load, all recovered"), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
     """Straight and bent motions of every duration from the shortest on, with paths, multipliers and weights at
     random."""
@@ -109,6 +108,43 @@ def test_the_conjugate_is_the_greatest_value() -> None:
         exact = (p * v - (v + omega) * law.torque(v) + square * v * v).max(axis=0)
         assert (value >= exact - LEEWAY).all()
         assert (value <= exact + CHORDS * (1 + np.abs(exact))).all()
+
+
+def test_the_conjugate_allows_for_the_load() -> None:
+    """It covers every ω̂ between ω / (1 + load) and ω / (1 - load)."""
+    load, rng = np.array([0.2, 0.1, 0.05, 0.0, 0.3, 0.9]), np.random.default_rng(3)
+    friction = FrictionConjugate.of(replace(ROBOT.friction, load=load), ROBOT.limits.v_max)
+    assert friction is not None
+    v = np.linspace(-1, 1, 801)[:, None]
+    for _ in range(40):
+        p, omega = rng.normal(size=6) * 20, rng.normal(size=6) * 0.3
+        square, most = rng.uniform(0, 1.5, 6), rng.uniform(0.01, 3.0, 6)
+        value, _ = friction.greatest(p, omega, square, most)
+        for shift in (omega / (1 + load), omega, omega / (1 - load)):
+            at = v * most
+            exact = (p * at - (at + shift) * ROBOT.friction.torque(at) + square * at * at).max(axis=0)
+            assert (value >= exact - LEEWAY).all()
+
+
+def test_shaft_and_copper_are_above_their_linear_bound_under_load() -> None:
+    """The inequality of `dual_bound` under **Load** at random states, whichever way friction acts on the motor; that of
+    unloaded joints alone would be broken."""
+    rng, count = np.random.default_rng(4), 20_000
+    law, limits, rotor = ROBOT.friction, ROBOT.limits, ROBOT.drives.rotor_inertia
+    loss = ROBOT.drives.copper / ROBOT.drives.torque_constant**2
+    v, a = (rng.uniform(-1, 1, (count, 6)) * most for most in (limits.v_max, limits.a_max))
+    v *= 10 ** rng.uniform(-5, 0, (count, 1))
+    linked, multiplier = (rng.normal(size=(count, 6)) * limits.tau_max for _ in range(2))
+    load = rng.uniform(0, 0.3, (count, 6)) * (rng.random((count, 6)) < 0.9)
+    omega, tau = 2 * loss * multiplier, linked + rotor * a
+    motor = tau + replace(law, load=load).torque(v, linked)
+    power = motor * v + loss * motor**2
+    dry = law.torque(v)
+    friction = np.minimum((v + omega / (1 + load)) * dry, (v + omega / (1 - load)) * dry)
+    slack = np.abs(omega) * load / (1 - load) * rotor * limits.a_max
+    bound = (v + omega) * tau + friction - slack - loss * multiplier**2 / (1 - load) ** 2
+    assert (power >= bound - 1e-9 * (1 + np.abs(bound))).all()
+    assert (power < (v + omega) * (tau + dry) - loss * multiplier**2 - 1e-6).any()
 
 
 def test_laws_that_are_not_concave_have_no_bound() -> None:

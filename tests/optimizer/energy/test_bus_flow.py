@@ -229,7 +229,7 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
     # friction as the kernel smooths it
     friction = replace(task.friction, knee=0.02)
-    joints = power_flow(task.torques(q, v, a), v, task.arm.drives, friction).joints
+    joints = power_flow(task.torques(q, v, a), v, a, task.arm.drives, friction).joints
     exact = drawn_at(task.arm.bus, task.arm.regeneration, task.arm.base_power, joints, np.zeros(50))
     cost = task.kernel.value(y, p)[0].copy()
     assert np.abs(cost - exact).max() < KERNEL_SMOOTHING

@@ -77,7 +77,7 @@ def test_costs_are_the_reported_powers(compiled: Kernel, kind: str) -> None:
     y = states(4)
     v = y[:, 6:12]
     tau = torques(task, y[:, :6], v, y[:, 12:])
-    flow = power_flow(tau, v, LOSSY, task.arm.friction_law)
+    flow = power_flow(tau, v, y[:, 12:], LOSSY, task.arm.friction_law)
     net = 36.7 + 9 + flow.joints.sum(axis=1)
     assert net.min() < 0 < net.max()  # both sides of the corner are seen
     expected = {

@@ -26,6 +26,7 @@ LOSSY = replace(  # the UR5e's inverter loss is unknown and zero: give it one, s
     inverter_linear=np.array([0.3, 0.3, 0.3, 0.5, 0.5, 0.5]),
     inverter_quadratic=np.full(6, 0.02),
 )
+LOADED = replace(ROBOT.friction, load=np.array([0.1, 0.2, 0.05, 0.0, 0.1, 0.2]))
 
 
 def arm(drives: Drives, electronics: Electronics = ROBOT.electronics) -> Arm:
@@ -55,7 +56,7 @@ def test_parts_add_up_over_a_closed_motion(regeneration: float, amplitude: float
     """Back where it began, neither potential nor kinetic energy has changed: every joule is a loss."""
     weights, q, v, a = closed_motion(duration=2.0, amplitude=amplitude)
     electronics = replace(ROBOT.electronics, controller_power=11.0, regeneration=regeneration)
-    energy = breakdown(weights, v, torques(q, v, a), 0.0, arm(LOSSY, electronics))
+    energy = breakdown(weights, v, a, torques(q, v, a), 0.0, arm(LOSSY, electronics))
     electrical = energy.electrical
     assert electrical.parts_sum == pytest.approx(electrical.total, rel=IDENTITY_TOLERANCE)
     assert electrical.idle == pytest.approx(2.0 * (36.7 + 11.0), rel=HAND_TOLERANCE)
@@ -84,7 +85,7 @@ def test_a_part_that_is_zero_has_no_sign(bus: Bus) -> None:
     off = replace(ROBOT.electronics, idle_power=0.0, controller_power=0.0, regeneration=0.0)
     weights, q, v, a = closed_motion(duration=2.0, amplitude=0.5, samples=40)
     asked = replace(arm(ROBOT.drives, off), bus=bus)
-    for states in ((0.0 * v, 0.0 * v), (-0.0 * v, -0.0 * v), (v, torques(q, v, a))):
+    for states in ((0.0 * v, a, 0.0 * v), (-0.0 * v, a, -0.0 * v), (v, a, torques(q, v, a))):
         energy = breakdown(weights, *states, 0.0, asked)
         parts = {**asdict(energy.electrical), "peak": energy.peak_power, "mean": energy.mean_power}
         parts |= {} if energy.storage is None else asdict(energy.storage)
@@ -105,7 +106,7 @@ def test_parts_add_up_when_energy_is_stored() -> None:
     potential = float(np.diff([pin.computePotentialEnergy(ROBOT.model, data, q[i]) for i in (-2, -1)])[0])
     kinetic = float(np.diff([pin.computeKineticEnergy(ROBOT.model, data, q[i], v[i]) for i in (-2, -1)])[0])
     tau = torques(q, v, a)[:-2]
-    energy = breakdown(weights, v[:-2], tau, potential, arm(LOSSY), kinetic=kinetic)
+    energy = breakdown(weights, v[:-2], a[:-2], tau, potential, arm(LOSSY), kinetic=kinetic)
     rotors = 0.5 * ROBOT.drives.rotor_inertia @ (v[-1] ** 2 - v[-2] ** 2)
     assert abs(rotors) > 0.1  # J: the identity would not hold without the rotors' share of the kinetic energy
     assert energy.electrical.parts_sum == pytest.approx(energy.electrical.total, rel=IDENTITY_TOLERANCE)
@@ -115,7 +116,7 @@ def test_constant_power_by_hand() -> None:
     """One second at constant speed and torque: each term from its own formula, UR5e figures written out."""
     v, tau = np.zeros((2, 6)), np.zeros((2, 6))
     v[:, 0], tau[:, 0] = 1.5, 20.0
-    energy = breakdown(np.array([0.25, 0.75]), v, tau, 0.0, arm(LOSSY))
+    energy = breakdown(np.array([0.25, 0.75]), v, 0 * v, tau, 0.0, arm(LOSSY))
     friction = float(ROBOT.friction.torque(np.full(6, 1.5))[0])
     i = (20.0 + friction) / 10.15
     inverter = 6 * 0.7 + 0.3 * i + 0.02 * i**2  # the constant is paid by every joint
@@ -142,12 +143,12 @@ def test_braking_costs_nothing_but_its_losses() -> None:
     """A joint braking hard, 200 W at the shaft: without regeneration nothing is drawn, and the surplus is reported."""
     v, tau = np.zeros((1, 6)), np.zeros((1, 6))
     v[:, 0], tau[:, 0] = 2.0, -100.0
-    flow = power_flow(tau, v, ROBOT.drives, ROBOT.friction)
+    flow = power_flow(tau, v, 0 * v, ROBOT.drives, ROBOT.friction)
     surplus = -(36.7 + flow.joints.sum())
     assert surplus > 50.0  # W
     for regeneration in (0.0, 0.5):
         electronics = replace(ROBOT.electronics, regeneration=regeneration)
-        electrical = breakdown(np.ones(1), v, tau, 0.0, arm(ROBOT.drives, electronics)).electrical
+        electrical = breakdown(np.ones(1), v, 0 * v, tau, 0.0, arm(ROBOT.drives, electronics)).electrical
         assert electrical.braking == pytest.approx(surplus, rel=HAND_TOLERANCE)
         assert electrical.total == pytest.approx(-regeneration * surplus, rel=HAND_TOLERANCE, abs=1e-12)
 
@@ -164,9 +165,9 @@ def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
             assert excess.max() == pytest.approx((1 - regeneration) * width / 2, rel=1e-9)  # the sample at zero
     _, q, v, a = closed_motion(duration=2.0, amplitude=0.4, samples=200)
     tau = torques(q, v, a)
-    exact_loss = power_flow(tau, v, LOSSY, ROBOT.friction).inverter
+    exact_loss = power_flow(tau, v, a, LOSSY, ROBOT.friction).inverter
     for width in (1.0, 0.1, 1e-3):
-        excess = power_flow(tau, v, LOSSY, ROBOT.friction, width).inverter - exact_loss
+        excess = power_flow(tau, v, a, LOSSY, ROBOT.friction, width).inverter - exact_loss
         assert excess.min() >= 0
         assert (excess <= LOSSY.inverter_linear * width + 1e-12).all()
     assert smooth_abs(-3.0, 0.0, np) == 3.0
@@ -175,17 +176,17 @@ def test_smoothing_is_an_upper_bound_that_vanishes_with_its_width() -> None:
 @pytest.mark.parametrize("width", [0.0, 0.05])
 def test_casadi_and_numpy_agree(width: float) -> None:
     """The optimiser and the report use the same lines; the modules they run in must not make a difference."""
-    tau, v = ca.SX.sym("tau", 6), ca.SX.sym("v", 6)
-    flow = power_flow(tau, v, LOSSY, ROBOT.friction, width, ca)
+    tau, v, a = (ca.SX.sym(name, 6) for name in ("tau", "v", "a"))
+    flow = power_flow(tau, v, a, LOSSY, LOADED, width, ca)
     net = 36.7 + ca.sum1(flow.joints)
     outputs = [flow.tau_motor, flow.friction, flow.copper, flow.inverter, flow.shaft, drawn_power(net, 0.2, width, ca)]
-    symbolic = ca.Function("flow", [tau, v], outputs)
+    symbolic = ca.Function("flow", [tau, v, a], outputs)
     rng = np.random.default_rng(3)
     for _ in range(100):
-        torque, speed = rng.uniform(-100.0, 100.0, 6), rng.uniform(-3.0, 3.0, 6)
-        flow = power_flow(torque, speed, LOSSY, ROBOT.friction, width)
+        states = rng.uniform(-100.0, 100.0, 6), rng.uniform(-3.0, 3.0, 6), rng.uniform(-10.0, 10.0, 6)
+        flow = power_flow(*states, LOSSY, LOADED, width)
         drawn = drawn_power(36.7 + flow.joints.sum(), 0.2, width)
         expected = [flow.tau_motor, flow.friction, flow.copper, flow.inverter, flow.shaft, drawn]
-        for ours, theirs in zip(symbolic(torque, speed), expected, strict=True):
+        for ours, theirs in zip(symbolic(*states), expected, strict=True):
             scale = 1.0 + np.abs(theirs).max()
             assert np.abs(ours.full().ravel() - theirs).max() <= ROUTE_TOLERANCE * scale

@@ -87,7 +87,7 @@ def power(case: Case, q: Array, v: Array, a: Array) -> Array:
     if task.objective == "mechanical":
         return np.asarray(np.hypot(tau * v, WIDTH).sum(axis=1))
     friction = replace(task.arm.friction_law, knee=KNEE)
-    net = 36.7 + power_flow(tau, v, ROBOT.drives, friction, 0.1 * WIDTH).joints.sum(axis=1)
+    net = 36.7 + power_flow(tau, v, a, ROBOT.drives, friction, 0.1 * WIDTH).joints.sum(axis=1)
     return np.asarray(drawn_power(net, 0.4, WIDTH))
 
 

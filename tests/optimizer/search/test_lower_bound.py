@@ -37,6 +37,7 @@ MOVES = 24
 SHALLOW = replace(  # friction whose reversal is spread so wide that motions crawl through it
     ROBOT.friction, name="shallow", knee=0.3
 )
+LOADED = replace(ROBOT.friction, name="loaded", load=np.array([0.2, 0.2, 0.2, 0.1, 0.0, 0.2]))
 LOSSY = replace(
     ROBOT.drives,
     inverter_constant=np.full(6, 0.7),
@@ -62,6 +63,8 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "lossy": {"robot": robot(drives=LOSSY), "friction": "coulomb_viscous"},
     "slow limits": {"limits": limits(v_max=0.4, a_max=1.5, j_max=8.0)},
     "weightless": {"gravity": [0, 0, 0]},
+    "friction of the load": {"robot": robot(friction_laws={"loaded": LOADED}), "payload": PAYLOAD},
+    "load, all recovered": {"robot": robot(idle=0.5, regeneration=1.0, friction_laws={"loaded": LOADED})},
 }
 
 
@@ -105,10 +108,10 @@ def motions(task: Problem, start: Array, goal: Array, torques: Torques, seed: in
         duration = float((peaks.max(axis=1) ** (1 / np.arange(1, 4))).max()) * (1 + 1e-9)
         t, weights = quadrature(space.knots * duration, 24)
         curve = BSpline(space.knots * duration, points, DEGREE)
-        v = curve(t, 1)
+        v, a = curve(t, 1), curve(t, 2)
         change = torques.task.potential(goal) - torques.task.potential(start)
-        tau = torques(curve(t), v, curve(t, 2))
-        yield duration, breakdown(weights, v, tau, change, task.arm)
+        tau = torques(curve(t), v, a)
+        yield duration, breakdown(weights, v, a, tau, change, task.arm)
 
 
 def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Array, Array]:
@@ -118,7 +121,7 @@ def bound(torques: Torques, start: Array, goal: Array, **given: Any) -> tuple[Ar
     return lower_bounds(task, goal - start, potential_gain)
 
 
-@pytest.mark.parametrize("name", long_but(("loaded and tilted", "lossy"), CONDITIONS))
+@pytest.mark.parametrize("name", long_but(("loaded and tilted", "lossy", "load, all recovered"), CONDITIONS))
 def test_no_motion_spends_less(name: str) -> None:
     """Thousands of motions over all conditions, electrical and mechanical, with free duration and with their own."""
     task = problem(objective="electrical", duration_max=500.0, **CONDITIONS[name])
