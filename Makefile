@@ -14,7 +14,7 @@ JOULEPATH_ROBOTS ?= ur5e
 export JOULEPATH_ROBOTS
 VENV := .venv
 PY := $(VENV)/bin/python
-INSTALL := $(PY) -m pip install --quiet --disable-pip-version-check --require-hashes --no-deps
+INSTALL := $(PY) scripts/install.py
 SOURCES := app optimizer models tests benchmarks examples scripts
 
 # The optimiser compiles its kernels once per robot. Where there is no C compiler, one comes as a Python package.
@@ -59,25 +59,23 @@ kernels: $(VENV)/.runtime $(COMPILER)
 
 # The dev lockfile holds the runtime one whole, at the same versions.
 $(VENV)/.runtime: requirements.lock $(PY)
-	@echo "Installing $< into $(VENV) ..."
-	@$(INSTALL) -r $<
+	@$(INSTALL) $<
+	@$(PY) scripts/slim.py $(VENV)
 	@$(PY) scripts/link_libgomp.py
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
-	@echo "Installing $< into $(VENV) ..."
-	@$(INSTALL) -r $<
+	@$(INSTALL) $<
 	@touch $@
 
 # The other planners that the benchmarks compare with, on top of the runtime.
 $(VENV)/.benchmarks: requirements-benchmarks.lock $(VENV)/.runtime
-	@echo "Installing $< into $(VENV) ..."
-	@$(INSTALL) -r $<
+	@$(INSTALL) $<
 	@touch $@
 
 $(VENV)/bin/cc: requirements-compiler.lock $(PY)
-	@echo "No C compiler on this machine: installing one into $(VENV) ..."
-	@$(INSTALL) -r $<
+	@echo "No C compiler on this machine: one comes as a package."
+	@$(INSTALL) $<
 	@printf '#!/bin/sh\nexec "$${0%%/*}/python" -m ziglang cc "$$@"\n' > $@
 	@chmod +x $@
 

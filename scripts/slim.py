@@ -1,7 +1,7 @@
 """Removes from an environment what only builds and tests need, and puts links where wheels hold copies.
 
 Wheels of C++ libraries carry headers, build files, static libraries and, since a wheel cannot hold links, every shared
-library under two or three names. Needs binutils. For images: run it, then run the program that is to work there.
+library under two or three names. Where binutils are there, libraries that nothing asks for and symbol tables go, too.
 """
 
 from __future__ import annotations
@@ -87,10 +87,11 @@ def main() -> None:
                 path.unlink()
     for folder in (casadi, cmeel):
         link_copies(folder)
-    remove_unreached(casadi, {casadi / "_casadi.so", *casadi.glob("libcasadi_*.so")})
-    remove_unreached(cmeel, set(cmeel.glob("python*/site-packages/*/*.so")))
-    libraries = [str(path) for pattern in SYMBOLS for path in packages.glob(pattern)]
-    subprocess.run(["strip", "--strip-unneeded", *libraries], check=True)
+    if shutil.which("readelf") and shutil.which("strip"):
+        remove_unreached(casadi, {casadi / "_casadi.so", *casadi.glob("libcasadi_*.so")})
+        remove_unreached(cmeel, set(cmeel.glob("python*/site-packages/*/*.so")))
+        libraries = [str(path) for pattern in SYMBOLS for path in packages.glob(pattern)]
+        subprocess.run(["strip", "--strip-unneeded", *libraries], check=True)
     print(f"{packages}: {before} MiB before, {size(packages)} MiB after")
 
 
