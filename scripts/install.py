@@ -12,8 +12,7 @@ import sys
 from pathlib import Path
 
 PIP = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--require-hashes", "--no-deps"]
-# bytecode is left to the first import: of most packages, a small part is ever imported
-PIP += ["--no-compile", "--progress-bar", "off"]
+PIP += ["--progress-bar", "off"]
 # so many lines of pip tell what went wrong
 LAST = 20
 

@@ -20,7 +20,7 @@ BUILD_FOLDERS = [
     "cmeel.prefix/lib64/cmake", "cmeel.prefix/lib64/pkgconfig", "cmeel.prefix/share/doc",
     "matplotlib/mpl-data/sample_data", "numpy/_core/include", "numpy/_core/lib",
 ]  # fmt: skip
-BUILD_FILES = ["**/*.a", "**/*.la", "**/*.pyx", "**/*.pxd", "**/*.hpp", "**/__pycache__", "**/tests"]
+BUILD_FILES = ["**/*.a", "**/*.la", "**/*.pyx", "**/*.pxd", "**/*.hpp", "**/tests"]
 # CasADi's plugins of these kinds are many and heavy, and loaded by name: these stay.
 CASADI_KINDS = ["archiver", "conic", "graphmodel", "modelicaparser", "nlpsol", "onnx"]
 CASADI_PLUGINS = ["conic_daqp", "conic_qpoases", "conic_qrqp", "nlpsol_ipopt", "nlpsol_qrsqp", "nlpsol_sqpmethod"]
