@@ -11,21 +11,22 @@ from optimizer.linear_algebra import one_thread
 from optimizer.methods import METHODS
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
+from optimizer.progress import Tell, forward, nobody
 from optimizer.search.run import Run
 from optimizer.solution import Solution
 
 
-def optimize(problem: Problem, clock: Clock = time.perf_counter) -> Solution:
+def optimize(problem: Problem, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Solution:
     """Find the motion of least energy between the problem's targets, certified against every limit.
 
-    `clock` gives the time [s] for the problem's deadline.
+    `clock` gives the time [s] for the problem's deadline. `tell` gets what is found, while the search runs.
 
     Raises the errors of `optimizer.exceptions`: UnreachablePose, SingularPose, NoReachableTarget, TorqueInfeasible,
     StartInCollision, GoalInCollision, DurationTooShort, NoTrajectory, NoCollisionFreeTrajectory, DeadlineExceeded, or
     InvalidProblem for a payload beyond the robot's rating or ends outside the tool's cone.
     """
     with one_thread():
-        return Run(problem, clock=clock).solution()
+        return Run(problem, clock=clock, tell=forward(tell)).solution()
 
 
 def warm_up(robot_name: str) -> None:

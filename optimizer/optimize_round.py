@@ -9,6 +9,7 @@ from dataclasses import replace
 from optimizer.deadline import Clock
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
+from optimizer.progress import Improved, Tell, forward, nobody, only_improved
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.proven_bound import proven_bound
 from optimizer.sequence.round_baselines import (
@@ -25,39 +26,50 @@ from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Solution
 
 
-def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter) -> RoundSolution:
+def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tell = nobody) -> RoundSolution:
     """Find the round of least energy, every move of it certified against every limit.
 
-    `clock` gives the time [s] for the deadline. Choosing a branch at one stop changes what the moves from there cost,
-    so that all stops are decided together, and a free order with them. A round that must be faster or slower than the
-    one of least energy shares its time among the moves, and waits where that costs least.
+    `clock` gives the time [s] for the deadline. `tell` gets what is found, while the search runs.
+
+    Choosing a branch at one stop changes what the moves from there cost, so that all stops are decided together, and a
+    free order with them. A round that must be faster or slower than the one of least energy shares its time among the
+    moves, and waits where that costs least.
 
     Raises the errors of `optimize` for an end, with the stop named; NoSequence if no chain of configurations goes
     round; RoundTooShort; DeadlineExceeded if the time is too short for any round.
     """
     with one_thread():
-        began = clock()
+        began, tell = clock(), forward(tell)
         if asked.order is None:
-            return replace(_in_given_order(asked, clock), wall_time=clock() - began)
-        orders = OrderSearch(asked, clock)
+            found = _in_given_order(asked, clock, tell)
+            _tell_found(tell, found)
+            return replace(found, wall_time=clock() - began)
+        orders = OrderSearch(asked, clock, tell)
         ordered = orders.run()
         left = max(asked.deadline - (clock() - began), LEAST_TIME)
-        found = _in_given_order(replace(ordered, deadline=left), clock)
+        # the moves of every order have been told already
+        found = _in_given_order(replace(ordered, deadline=left), clock, only_improved(tell))
         left = asked.deadline - (clock() - began)
         baseline = given_order(asked, left, found, clock)
         # the bound of the best order does not hold for the others
-        return replace(
+        found = replace(
             found,
             status=found.status if orders.exact and found.price_of_time == 0 else "feasible",
             lower_bound=min(orders.bound, found.lower_bound),
             baselines=[*found.baselines, *([] if baseline is None else [baseline])],
             wall_time=clock() - began,
         )
+        _tell_found(tell, found)
+        return found
 
 
-def _in_given_order(asked: WorkRound, clock: Clock) -> RoundSolution:
+def _tell_found(tell: Tell, found: RoundSolution) -> None:
+    tell(Improved(sum(each.energy for each in found.moves), found.duration, found.lower_bound))
+
+
+def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
     """The round of least energy over the stops in their order."""
-    search = RoundSearch(asked, clock)
+    search = RoundSearch(asked, clock, tell=tell)
     nodes = search.run()
     greedy = move_by_move(search, nodes[0])
     if greedy is not None and search.cost(greedy) < search.cost(nodes):

@@ -32,6 +32,7 @@ from optimizer.deadline import Clock
 from optimizer.exceptions import DeadlineExceeded, DurationTooShort, InvalidProblem, NoTrajectory
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.problem import Problem
+from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, forward, nobody
 from optimizer.search.fastest import fastest, fastest_from, fastest_of
 from optimizer.search.reserve import report_time
 from optimizer.search.run import Run
@@ -94,11 +95,13 @@ class _Node:
         return None if self.answer is None else self.answer.trajectory.spline
 
 
-def pareto(problem: Problem, n: int, clock: Clock = time.perf_counter) -> Front:
+def pareto(problem: Problem, n: int, clock: Clock = time.perf_counter, tell: Tell = nobody) -> Front:
     """The front of the objective's energy over duration, from at most `n` durations (2 … 100).
 
     `problem` bounds the duration or leaves it free; the front ends where the objective is least. The mechanical
     objective needs `duration_max`. `problem.deadline` [s] holds for the whole front.
+    `tell` gets what is found, while the search runs: its candidates are the durations, its best answer that of least
+    energy.
 
     Raises what `optimize` does; InvalidProblem for a fixed duration or a number of points out of range.
     """
@@ -107,15 +110,15 @@ def pareto(problem: Problem, n: int, clock: Clock = time.perf_counter) -> Front:
     if problem.duration_min is not None and problem.duration_min == problem.duration_max:
         raise InvalidProblem("duration", "A front runs over durations: leave duration out or give a range.")
     with one_thread():
-        return _Search(problem, n, clock).front()
+        return _Search(problem, n, clock, forward(tell)).front()
 
 
 class _Search:
     """The computation of one front."""
 
-    def __init__(self, problem: Problem, n: int, clock: Clock) -> None:
+    def __init__(self, problem: Problem, n: int, clock: Clock, tell: Tell) -> None:
         self.clock, self.began = clock, clock()
-        self.problem, self.n = problem, n
+        self.problem, self.n, self.tell = problem, n, tell
         self.nodes: list[_Node] = []
         self.solves = 0
         self.least: _Node
@@ -125,6 +128,7 @@ class _Search:
 
     def front(self) -> Front:
         """The front. Raises the errors of `pareto`."""
+        self.tell(CandidatesFound(self.n))
         spline, found = self.fastest()
         problem = self.problem
         if problem.duration_max is not None and spline.duration > problem.duration_max:
@@ -134,6 +138,8 @@ class _Search:
         self.solve(first, [spline])
         # as `optimize` solves it: with the same durations, and without what else the front knows
         self.least = self.add(self.run([]), problem.duration_max or math.inf) if found is None else self.keep(found)
+        if (answer := self.least.answer) is not None:
+            self.tell(Improved(self.least.energy, answer.duration, answer.lower_bound, answer.goal.q))
         while len(self.nodes) < self.n and self.left() > 0 and (k := self.next_interval()) is not None:
             left, right = self.nodes[k : k + 2]
             if len(self.nodes) == self.n - 1 and self.refine_last():
@@ -218,7 +224,17 @@ class _Search:
         """The node, put among the others."""
         self.nodes.append(node)
         self.nodes.sort(key=lambda node: (node.duration, node.energy))
+        self.tell_tried(node)
         return node
+
+    def tell_tried(self, node: _Node) -> None:
+        """Tell what became of the last duration."""
+        index, answer = len(self.nodes) - 1, node.answer
+        if answer is None:
+            self.tell(CandidateTried(index, "failed", None, None))
+        else:
+            self.tell(CandidateTried(index, "solved", answer.lower_bound, node.energy))
+            self.tell(Improved(node.energy, node.duration, q_goal=answer.goal.q))
 
     def try_switch(self, left: _Node, right: _Node) -> bool:
         """Solve for the right candidate's fastest duration, and just below; false if it is not between the two."""

@@ -21,6 +21,7 @@ from app.engine.worker import Worker
 from app.exceptions import ShuttingDown, WorkerDied
 from app.settings import Settings
 from optimizer.exceptions import DeadlineExceeded
+from optimizer.progress import Tell, nobody
 
 logger = logging.getLogger(__name__)
 
@@ -97,10 +98,11 @@ class Engine:
         """The engine for the requests of one client."""
         return ClientEngine(self, client)
 
-    async def run(self, task: Task, deadline: float, client: str = "") -> TaskResult:
+    async def run(self, task: Task, deadline: float, client: str = "", tell: Tell = nobody) -> TaskResult:
         """The task's result, within `deadline` seconds and `settings.deadline_grace`. Time in the queue counts.
 
         Clients have their turns, see `FairQueue`. A task whose worker another client needs begins again later.
+        `tell` gets what the task finds, after a new begin from the first on.
         If cancelled, the task leaves the queue, or its worker is killed. Raises what the task raises (see `Task.run`),
         Busy, TooManyRequests, ShuttingDown, DeadlineExceeded or WorkerDied.
         """
@@ -112,13 +114,15 @@ class Engine:
                 async with asyncio.timeout_at(end) as limit:
                     self._in_flight.add(limit)
                     try:
-                        return await self._run_in_worker(task, end, limit, place)
+                        return await self._run_in_worker(task, end, limit, place, tell)
                     finally:
                         self._in_flight.discard(limit)
         except TimeoutError:
             raise (ShuttingDown() if self._draining.is_set() else DeadlineExceeded([])) from None
 
-    async def _run_in_worker(self, task: Task, end: float, limit: asyncio.Timeout, place: Place[Worker]) -> TaskResult:
+    async def _run_in_worker(
+        self, task: Task, end: float, limit: asyncio.Timeout, place: Place[Worker], tell: Tell
+    ) -> TaskResult:
         while True:
             limit.reschedule(min(end, self._latest_end))
             async with AsyncExitStack() as turn:
@@ -130,7 +134,7 @@ class Engine:
                 left = end - asyncio.get_running_loop().time()
                 if left <= 0:
                     raise DeadlineExceeded([])
-                asking = asyncio.ensure_future(worker.ask(task, left))
+                asking = asyncio.ensure_future(worker.ask(task, left, tell))
                 if not place.gave_back:  # nobody is stopped twice
                     place.give_back = asking.cancel
                 try:
@@ -182,9 +186,9 @@ class ClientEngine:
     engine: Engine
     client: str
 
-    async def run(self, task: Task, deadline: float) -> TaskResult:
+    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """See `Engine.run`."""
-        return await self.engine.run(task, deadline, self.client)
+        return await self.engine.run(task, deadline, self.client, tell)
 
 
 def _is_cancelled() -> bool:

@@ -14,6 +14,7 @@ from app.engine.task import Task
 from app.engine.worker import Worker
 from app.exceptions import Preempted
 from optimizer.exceptions import DeadlineExceeded
+from optimizer.progress import Tell, nobody
 
 
 @dataclass(eq=False)
@@ -32,14 +33,15 @@ class SpareWorkers:
         self._queue, self._workers, self._census, self._grace = queue, workers, census, grace
         self._runs: dict[Worker, _Run] = {}
 
-    async def run(self, task: Task, deadline: float, stoppable: bool = True) -> TaskResult:
+    async def run(self, task: Task, deadline: float, stoppable: bool = True, tell: Tell = nobody) -> TaskResult:
         """The task's result, once a worker is idle and no caller waits for one. `deadline` [s] counts from then on.
+        `tell` gets what the task finds.
 
         If cancelled, its worker is killed. Raises what the task raises, DeadlineExceeded, WorkerDied, or, if it is
         `stoppable`, Preempted: a caller took the worker.
         """
         worker = await self._queue.spare()
-        run = self._runs[worker] = _Run(asyncio.create_task(worker.ask(task, deadline)), stoppable)
+        run = self._runs[worker] = _Run(asyncio.create_task(worker.ask(task, deadline, tell)), stoppable)
         try:
             with self._census.works():
                 async with asyncio.timeout(deadline + self._grace):

@@ -20,7 +20,7 @@ class Task(Protocol):
         """Id of the request that the task belongs to; the worker's log names it."""
 
     def run(self, deadline: float) -> TaskResult:
-        """The result, within about `deadline` seconds.
+        """The result, within about `deadline` seconds. What it finds before goes to `listener()`.
 
         A JoulepathError or ServiceError reaches the caller of `Engine.run` as it is. Any other exception is a defect:
         the worker logs it, and the caller gets TaskFailed.

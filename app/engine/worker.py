@@ -20,11 +20,13 @@ from multiprocessing.connection import Connection, wait
 from typing import TypeVar
 
 from app.engine.forkserver import CONTEXT
+from app.engine.listening import listening
 from app.engine.result import TaskResult
 from app.engine.task import Task, outcome
 from app.exceptions import ServiceError, WorkerDied
 from app.logs import configure_logging
 from optimizer.exceptions import JoulepathError
+from optimizer.progress import Event, Tell, nobody
 
 logger = logging.getLogger(__name__)
 
@@ -58,12 +60,14 @@ class Worker:
         await self._in_thread(self._start)
         asyncio.get_running_loop().add_reader(self._process.sentinel, self._has_ended)
 
-    async def ask(self, task: Task, deadline: float) -> TaskResult:
+    async def ask(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result. If cancelled, it kills the worker, because nothing else stops a computation.
 
-        Raises what the task raises (see `Task.run`), or WorkerDied.
+        `tell` gets what the task finds, before the result. Raises what the task raises (see `Task.run`), or WorkerDied.
         """
-        return await self._in_thread(partial(self._exchange, task, deadline))
+        loop = asyncio.get_running_loop()
+        heard = None if tell is nobody else lambda event: loop.call_soon_threadsafe(tell, event)
+        return await self._in_thread(partial(self._exchange, task, deadline, heard))
 
     def kill(self) -> None:
         """Ends the process at once. Does nothing if it has ended."""
@@ -89,9 +93,13 @@ class Worker:
         self._child_pipe.close()
         self._pipe.recv()
 
-    def _exchange(self, task: Task, deadline: float) -> TaskResult:
-        self._pipe.send((task, deadline))
-        received: TaskResult | JoulepathError | ServiceError = self._pipe.recv()
+    def _exchange(self, task: Task, deadline: float, heard: Callable[[Event], object] | None) -> TaskResult:
+        self._pipe.send((task, deadline, heard is not None))
+        received: Event | TaskResult | JoulepathError | ServiceError = self._pipe.recv()
+        while isinstance(received, Event):
+            if heard is not None:
+                heard(received)
+            received = self._pipe.recv()
         if isinstance(received, Exception):
             raise received
         return received
@@ -120,10 +128,12 @@ def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:
     pipe.send("warm")
     while True:
         try:
-            task, deadline = pipe.recv()
+            task, deadline, is_heard = pipe.recv()
         except EOFError:
             return
-        pipe.send(outcome(task, deadline))
+        with listening(pipe.send if is_heard else nobody):
+            ended = outcome(task, deadline)
+        pipe.send(ended)
 
 
 def _end_with_parent() -> None:

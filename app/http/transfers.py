@@ -88,7 +88,10 @@ class Bodies:
 
 
 class Answers:
-    """ASGI middleware: an answer for which there is no room is thrown away, and its client gets a problem."""
+    """ASGI middleware: an answer for which there is no room is thrown away, and its client gets a problem.
+
+    To send an event for which there is no room raises TooManyBytes or TooManyBytesOfClient.
+    """
 
     def __init__(self, app: ASGIApp, in_flight: BytesInFlight) -> None:
         self._app, self._in_flight = app, in_flight
@@ -99,21 +102,25 @@ class Answers:
             await self._app(scope, receive, send)
             return
         held: _Held | None = None
-        is_dropped = False
+        is_dropped = is_by_events = False
 
         async def counted(message: Message) -> None:
-            nonlocal held, is_dropped
+            nonlocal held, is_dropped, is_by_events
             if is_dropped:
                 return
             if message["type"] == "http.response.start":
                 held = _Held(self._in_flight, client_of(Request(scope)).name)  # whose key is known by now
+                headers = Headers(raw=message["headers"])
+                is_by_events = headers.get("content-type", "").startswith("text/event-stream")
                 try:
                     # a stream declares no size: it is sent as it is made
-                    held.hold(int(Headers(raw=message["headers"]).get("content-length", "0")))
+                    held.hold(int(headers.get("content-length", "0")))
                 except (TooManyBytes, TooManyBytesOfClient) as error:
                     is_dropped = True
                     await (await problem_response(Request(scope), error))(scope, receive, send)
                     return
+            elif is_by_events and held is not None:
+                held.hold(len(message.get("body", b"")))
             await _send_in_pieces(message, send)
 
         try:

@@ -13,12 +13,14 @@ from app.exceptions import StoreUnavailable
 from app.jobs.changes import Changes
 from app.jobs.executor import Executor
 from app.jobs.holder import is_gone, new_holder
+from app.jobs.progress import HEARD, Found
 from app.jobs.work import defect, outcome_of
 from app.settings import Settings
 from app.store import jobs, leases
 from app.store.leases import Key, Lease, Outcome
 from app.store.store import Store
 from app.store.tables import now as present_time
+from optimizer.progress import Tell, nobody
 
 logger = logging.getLogger(__name__)
 
@@ -45,8 +47,14 @@ class _Held:
     """A lease and the work on it. `dropped`: nobody wants it any more."""
 
     lease: Lease
+    found: Found
     work: asyncio.Task[Outcome] | None = None
     dropped: bool = False
+
+    @property
+    def tell(self) -> Tell:
+        """What gets the progress of the work."""
+        return self.found.tell if self.lease.kind in HEARD else nobody
 
 
 @dataclass
@@ -56,6 +64,7 @@ class _Times:
     renewed: datetime
     pruned: datetime | None = None
     looked: float = field(default=0.0)
+    reported: float = field(default=0.0)
 
 
 class Dispatcher:
@@ -137,7 +146,7 @@ class Dispatcher:
             # a request whose work is stopped waits again, unless its job was cancelled: `settle` knows
             outcome = Outcome(held.lease, "waiting")
             if not held.dropped:
-                held.work = asyncio.create_task(outcome_of(held.lease, self._executor))
+                held.work = asyncio.create_task(outcome_of(held.lease, self._executor, held.tell))
                 try:
                     await asyncio.wait({held.work})
                 finally:
@@ -181,6 +190,7 @@ class Dispatcher:
     async def _exchange(self) -> None:
         await self._store_outcomes()
         await self._watch()
+        await self._report()
         want = self._most_held - len(self._held)
         if want <= 0 or self._draining:
             return
@@ -190,7 +200,7 @@ class Dispatcher:
             leased, changed = await self._store.write(lease)
             self._more = len(leased) == want
             for each in leased:
-                self._held[each.key] = held = _Held(each, dropped=self._draining)
+                self._held[each.key] = held = _Held(each, Found(each.attempt), dropped=self._draining)
                 self._ready.put_nowait(held)
             self.changes.ring(changed)
 
@@ -199,6 +209,10 @@ class Dispatcher:
         """Requests that it may have leased: one for each worker, and some ahead."""
         ahead = max(1, round(AHEAD / max(self._mean_work, AHEAD / MOST_AHEAD)))
         return self._settings.workers_for_jobs * (1 + ahead)
+
+    @staticmethod
+    def _clock() -> float:
+        return asyncio.get_running_loop().time()
 
     async def _store_outcomes(self) -> None:
         outcomes, self._outcomes = self._outcomes, []
@@ -217,7 +231,7 @@ class Dispatcher:
 
     async def _watch(self) -> None:
         """Renews leases, stops what was cancelled elsewhere, and deletes old jobs."""
-        now, clock = self._now(), asyncio.get_running_loop().time()
+        now, clock = self._now(), self._clock()
         if self._held and now - self._times.renewed >= LEASE / 3:
             await self._store.write(partial(leases.renew, holder=self.holder, until=now + LEASE))
             self._times.renewed = now
@@ -232,6 +246,18 @@ class Dispatcher:
             prune = partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age))
             await self._store.write(prune, frees=True)
             self._times.pruned = now
+
+    async def _report(self) -> None:
+        """Records progress within requests, where there is some."""
+        fresh = {held.lease.key: held.found for held in self._held.values() if held.found.is_news}
+        if fresh and self._clock() - self._times.reported >= LOOK:
+            self._times.reported = self._clock()
+            reports = {key: found.report for key, found in fresh.items()}
+            report = partial(leases.report, holder=self.holder, reports=reports, now=self._now())
+            changed = await self._store.write(report)
+            for (job_id, number), found in fresh.items():
+                found.is_news = job_id not in changed or found.report is not reports[job_id, number]
+            self.changes.ring(changed)
 
     async def _settle(self, outcomes: list[Outcome]) -> set[str]:
         settle = partial(leases.settle, holder=self.holder, outcomes=outcomes, now=self._now())

@@ -10,13 +10,14 @@ from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
+from optimizer.progress import Tell, nobody
 
 
 class Executor(Protocol):
     """Runs one task at a time for each of its callers."""
 
-    async def run(self, task: Task, deadline: float, stoppable: bool) -> TaskResult:
-        """The task's result, for which `deadline` [s] is left once work on it begins.
+    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
+        """The task's result, for which `deadline` [s] is left once work on it begins. `tell` gets what it finds.
 
         If cancelled, the work is stopped at once. Raises what the task raises, DeadlineExceeded, WorkerDied,
         ShuttingDown, or, if it is `stoppable`, Preempted.
@@ -31,9 +32,9 @@ class LocalExecutor:
     engine: Engine
     store: Store
 
-    async def run(self, task: Task, deadline: float, stoppable: bool) -> TaskResult:
+    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
         """See `Executor`."""
-        return await ArmEngine(_Spare(self.engine, stoppable), self.store).run(task, deadline)
+        return await ArmEngine(_Spare(self.engine, stoppable), self.store).run(task, deadline, tell)
 
 
 @dataclass(frozen=True)
@@ -41,5 +42,5 @@ class _Spare:
     engine: Engine
     stoppable: bool
 
-    async def run(self, task: Task, deadline: float) -> TaskResult:
-        return await self.engine.spare.run(task, deadline, self.stoppable)
+    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+        return await self.engine.spare.run(task, deadline, self.stoppable, tell)

@@ -23,6 +23,7 @@ from app.jobs.executor import Executor
 from app.store.leases import Figures, Lease, Outcome
 from app.tasks.job_request import JobRequestTask, JobResult
 from optimizer.exceptions import JoulepathError
+from optimizer.progress import Tell
 
 logger = logging.getLogger(__name__)
 
@@ -32,12 +33,12 @@ MOST_PREEMPTIONS = 2
 """Times that a caller may take the worker of a request; then it is left to end."""
 
 
-async def outcome_of(lease: Lease, executor: Executor) -> Outcome:
-    """Runs the request of a lease. Raises CancelledError only."""
+async def outcome_of(lease: Lease, executor: Executor, tell: Tell) -> Outcome:
+    """Runs the request of a lease; `tell` gets what it finds. Raises CancelledError only."""
     began = time.perf_counter()
     task = JobRequestTask(lease.kind, lease.body, _request_id(lease))
     try:
-        result = await executor.run(task, lease.deadline, stoppable=lease.preempted < MOST_PREEMPTIONS)
+        result = await executor.run(task, lease.deadline, lease.preempted < MOST_PREEMPTIONS, tell)
     except Preempted:
         return Outcome(lease, "waiting", preempted=True)
     except (ShuttingDown, StoreUnavailable):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.later import ACCEPTED, ServiceLater
 from app.routes.parameters import deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
+from app.routes.reply import BY_EVENTS, ServiceReply
 from app.schemas import errors as problems
 from app.schemas.compare import CompareRequest, CompareResponse
 from app.tasks.compare import CompareTask
@@ -23,7 +22,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     "/compare",
     summary="The same motion by several methods",
     response_model=CompareResponse,
-    responses={**ACCEPTED, **problem_responses(*MOTION_PROBLEMS, problems.KeyReused)},
+    responses={200: {"content": BY_EVENTS}, **ACCEPTED, **problem_responses(*MOTION_PROBLEMS, problems.KeyReused)},
 )
 async def compare(
     request: Request,
@@ -31,11 +30,13 @@ async def compare(
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     later: ServiceLater,
+    reply: ServiceReply,
 ) -> Response:
     """Solves one request with several methods, one after another. The answer is a table of their energies, durations
     and solve times; each motion is certified. A method that finds no motion has its problem in its row. If no method
-    finds a motion, the answer is the problem of the first method in the request."""
+    finds a motion, the answer is the problem of the first method in the request. `Accept: text/event-stream` returns
+    events while the methods run, and then the answer."""
     if later.wanted:
         return await later.respond("compare", body)
-    work = engine.run(CompareTask(body, request.state.id), deadline_of(body, settings.max_deadline))
-    return result_response(await unless_disconnected(request, work))
+    task = CompareTask(body, request.state.id)
+    return await reply.of(lambda tell: engine.run(task, deadline_of(body, settings.max_deadline), tell))

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Protocol
 from fastapi import Depends, Header, Path, Request, Response
 
 from app.exceptions import InvalidRequest
+from app.http.event_stream import EVENT_STREAM
 from app.schemas.common import KEY_HEADER
 from app.schemas.examples.values import STUDY_ID
 from app.schemas.studies import IdempotencyKey
@@ -42,7 +43,8 @@ def allowed_deadline(given: float | None, default: float, longest: float, where:
 
 
 async def _wanted_format(request: Request) -> Literal["json", "csv"]:
-    return "csv" if "text/csv" in request.headers.get("accept", "").lower() else "json"
+    accepted = request.headers.get("accept", "").lower()
+    return "csv" if "text/csv" in accepted and EVENT_STREAM not in accepted else "json"
 
 
 WantedFormat = Annotated[Literal["json", "csv"], Depends(_wanted_format)]

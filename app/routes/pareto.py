@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
 
-from app.http.disconnect import unless_disconnected
-from app.http.handlers import result_response
+from app.engine.result import TaskResult
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.later import ACCEPTED, ServiceLater
 from app.routes.parameters import WantedFormat, deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
+from app.routes.reply import BY_EVENTS, ServiceReply
 from app.schemas import errors as problems
 from app.schemas.pareto import ParetoRequest, ParetoResponse
 from app.store.store_answers import store_answers
 from app.tasks.pareto import ParetoTask
+from optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -25,7 +26,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     summary="Energy over duration",
     response_model=ParetoResponse,
     responses={
-        200: {"content": {"text/csv": {"schema": {"type": "string"}}}},
+        200: {"content": {"text/csv": {"schema": {"type": "string"}}, **BY_EVENTS}},
         **ACCEPTED,
         **problem_responses(*MOTION_PROBLEMS, problems.StoreUnavailable, problems.KeyReused),
     },
@@ -39,11 +40,17 @@ async def pareto(
     store: ServiceStore,
     client: ServiceClient,
     later: ServiceLater,
+    reply: ServiceReply,
 ) -> Response:
     """Finds the Pareto front of duration and energy over all arm configurations, from the fastest motion to the motion
-    of least energy. Each point refers to its complete answer. `Accept: text/csv` returns the points as CSV."""
+    of least energy. Each point refers to its complete answer. `Accept: text/csv` returns the points as CSV,
+    `Accept: text/event-stream` events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("pareto", body)
     task = ParetoTask(body, request.state.id, wanted)
-    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
-    return result_response(await store_answers(store, settings, "optimize", result, client.owner))
+
+    async def work(tell: Tell) -> TaskResult:
+        result = await engine.run(task, deadline_of(body, settings.max_deadline), tell)
+        return await store_answers(store, settings, "optimize", result, client.owner)
+
+    return await reply.of(work)

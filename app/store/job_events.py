@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -18,6 +19,24 @@ STATES = ("waiting", "running", "done", "failed", "cancelled")
 ENDED = ("done", "failed", "cancelled")
 
 Counts = dict[str, int]
+
+
+@dataclass(frozen=True)
+class Report:
+    """Progress within an attempt at a request: energy [J] of the best answer, its bound [J], and candidates tried."""
+
+    attempt: int
+    found: float | None = None
+    bound: float | None = None
+    solved: int = 0
+
+    def with_one_solved(self) -> Report:
+        """The report after one more candidate."""
+        return replace(self, solved=self.solved + 1)
+
+    def with_best(self, found: float, bound: float | None) -> Report:
+        """The report with another best answer."""
+        return replace(self, found=found, bound=bound)
 
 
 def counts_of(session: Session, job_ids: list[str]) -> dict[str, Counts]:
@@ -56,17 +75,28 @@ def conclude(session: Session, job: Job, now: datetime) -> None:
         JobRequest.job_id == job.id, JobRequest.state.in_(("waiting", "running"))
     )
     over = session.scalar(open_requests.limit(1)) is None
-    if not over and job.progressed is not None and now - job.progressed < PROGRESS_PERIOD:
+    if not over and not progress_is_due(job, now):
         return
-    counts = counts_of(session, [job.id])[job.id]
-    job.progressed = now
-    record(
-        session, job, "progress", {"counts": counts, "progress": progress(job, counts), "eta": eta(job, counts, now)}
-    )
+    counts = record_progress(session, job, now, {})
     if over:
         job.ended = now
         set_state(session, job, "cancelled" if job.state == "cancelling" else "done")
         record(session, job, "end", {"state": job.state, "counts": counts})
+
+
+def progress_is_due(job: Job, now: datetime) -> bool:
+    """Whether the last event `progress` of a job is old enough for another one."""
+    return job.progressed is None or now - job.progressed >= PROGRESS_PERIOD
+
+
+def record_progress(session: Session, job: Job, now: datetime, reports: Mapping[int, Report]) -> Counts:
+    """Records the progress of a job, and within its requests by their index; returns its counts."""
+    counts = counts_of(session, [job.id])[job.id]
+    job.progressed = now
+    requests = [{"index": index, **vars(report)} for index, report in sorted(reports.items())]
+    known = {"counts": counts, "progress": progress(job, counts), "eta": eta(job, counts, now)}
+    record(session, job, "progress", known | {"requests": requests})
+    return counts
 
 
 def progress(job: Job, counts: Counts) -> float:

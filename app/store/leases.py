@@ -6,7 +6,7 @@ of `jobs` never waits for rows of `job_requests`. So no two transactions wait fo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal
@@ -15,7 +15,7 @@ from sqlalchemy import select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
 from app.store import answers, jobs
-from app.store.job_events import conclude, request_ended, set_state
+from app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
 from app.store.tables import Job, JobRequest, new_id
 
 Key = tuple[str, int]
@@ -118,6 +118,22 @@ def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: date
     for job in locked.values():
         conclude(session, job, now)
     return set(locked)
+
+
+def report(session: Session, holder: str, reports: Mapping[Key, Report], now: datetime) -> set[str]:
+    """Records progress within requests that `holder` has leased; returns the jobs whose progress was due."""
+    keys = tuple_(JobRequest.job_id, JobRequest.number).in_(list(reports))
+    query = select(JobRequest.job_id, JobRequest.number, JobRequest.attempt)
+    held = session.execute(query.where(keys, JobRequest.state == "running", JobRequest.leased_by == holder)).all()
+    told: dict[str, dict[int, Report]] = {}
+    for job_id, number, attempt in held:
+        own = reports[job_id, number]
+        if own.attempt == attempt:
+            told.setdefault(job_id, {})[number] = own
+    due = [job for job in _locked(session, told).values() if job.ended is None and progress_is_due(job, now)]
+    for job in due:
+        record_progress(session, job, now, told[job.id])
+    return {job.id for job in due}
 
 
 def renew(session: Session, holder: str, until: datetime) -> None:

@@ -16,13 +16,14 @@ from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
 from models.robot import Robot
 from optimizer.exceptions import UnknownRobot
+from optimizer.progress import Tell, nobody
 
 
 class Runner(Protocol):
     """What runs a task: the engine, or a process that runs its tasks itself."""
 
-    async def run(self, task: Task, deadline: float) -> TaskResult:
-        """The result of a task, for which `deadline` [s] is left."""
+    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+        """The result of a task, for which `deadline` [s] is left. `tell` gets what it finds."""
         ...
 
 
@@ -52,17 +53,20 @@ class ArmEngine:
     engine: Runner
     store: Store
 
-    async def run(self, task: Task, deadline: float) -> TaskResult:
-        """The task's result. Raises UnknownRobot, and what the engine raises; StoreUnavailable only for a robot that
-        does not come with the service."""
+    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
+        """The task's result; `tell` gets what it finds.
+
+        Raises UnknownRobot, and what the engine raises; StoreUnavailable only for a robot that does not come with the
+        service.
+        """
         name = getattr(getattr(task, "request", None), "robot", None)
         if name is None or name in robot_names():
             try:
-                return await self.engine.run(task, deadline)
+                return await self.engine.run(task, deadline, tell)
             except UnknownRobot as error:
                 # only the worker reads the body of an upload, and the name in it
                 name = error.name
-        return await self.engine.run(WithOwnRobot(task, name, await own_figures(self.store, name)), deadline)
+        return await self.engine.run(WithOwnRobot(task, name, await own_figures(self.store, name)), deadline, tell)
 
 
 async def robot_in(store: Store, name: str) -> Robot:

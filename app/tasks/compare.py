@@ -9,6 +9,7 @@ import orjson
 from app.convert.comparison import to_compare_response, to_optimize_request
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
+from app.engine.listening import listener
 from app.engine.result import TaskResult, json_document
 from app.http.problem_details import problem_content
 from app.schemas.compare import CompareRequest
@@ -19,6 +20,7 @@ from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.methods import METHODS
 from optimizer.optimize import optimize
 from optimizer.problem.problem import MethodName
+from optimizer.progress import CandidatesFound, CandidateTried, Improved, forward
 from optimizer.solution import Solution
 
 
@@ -39,7 +41,9 @@ class CompareTask:
         answers: dict[MethodName, orjson.Fragment] = {}
         methods = [method for method in METHODS if method in self.request.methods]
         shares = DeadlineShares(Deadline.after(deadline), len(methods))
-        for method in methods:
+        tell = forward(listener())
+        tell(CandidatesFound(len(methods)))
+        for k, method in enumerate(methods):
             asked, share = to_optimize_request(self.request, method), shares.next()
             if shares.used_up:
                 errors[method] = DeadlineExceeded([])
@@ -48,7 +52,11 @@ class CompareTask:
                 solution = found[method] = certified(optimize(to_problem(asked, share)))
             except JoulepathError as error:
                 errors[method] = error
+                tell(CandidateTried(k, "failed", None, None))
             else:
+                energy, bound = solution.energy.of(asked.objective), solution.lower_bound
+                tell(CandidateTried(k, "solved", bound, energy))
+                tell(Improved(energy, solution.duration, bound, solution.goal.q))
                 if self.request.answers:
                     # encoded at once: the next method gets the time that is left then
                     answer = json_document(to_optimize_response(asked, self.request_id, solution))

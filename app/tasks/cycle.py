@@ -8,6 +8,7 @@ from typing import Literal
 from app.convert.cycle import to_cycle_response, to_work_round
 from app.convert.cycle_csv import to_cycle_csv
 from app.convert.solution import to_optimize_response
+from app.engine.listening import listener
 from app.engine.result import TaskResult
 from app.schemas.cycle import CycleRequest
 from app.tasks.answer_collector import AnswerCollector
@@ -26,7 +27,8 @@ class CycleTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /cycle`, within about `deadline` seconds."""
-        found, collector = optimize_round(to_work_round(self.request, deadline)), AnswerCollector()
+        found = optimize_round(to_work_round(self.request, deadline), tell=listener())
+        collector = AnswerCollector()
 
         def store(solution: Solution) -> str:
             return collector.add(to_optimize_response(self.request, self.request_id, certified(solution)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
+from app.engine.listening import listener
 from app.engine.result import TaskResult
 from app.schemas.request import OptimizeRequest
 from app.tasks.certified import certified
@@ -21,5 +22,5 @@ class OptimizeTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
-        solution = certified(optimize(to_problem(self.request, deadline)))
+        solution = certified(optimize(to_problem(self.request, deadline), tell=listener()))
         return TaskResult.of_kept_json(to_optimize_response(self.request, self.request_id, solution))

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from app.convert.fields import fields
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
+from app.engine.listening import listener
 from app.engine.result import TaskResult
 from app.schemas.pareto import ParetoRequest
 from app.tasks.answer_collector import AnswerCollector
@@ -27,7 +28,7 @@ class ParetoTask:
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /pareto`, within about `deadline` seconds."""
-        front = pareto(to_problem(self.request, deadline), self.request.points)
+        front = pareto(to_problem(self.request, deadline), self.request.points, tell=listener())
         collector = AnswerCollector()
         points = [self._point(point, collector) for point in front.points]
         if self.wanted == "csv":

@@ -155,6 +155,11 @@ class WorkRound:
             moves.append(PlannedMove(place, START, self.arms[-1], self.arms[-1]))
         return moves
 
+    @property
+    def any_time(self) -> bool:
+        """Whether the round may take as long as it does."""
+        return self.duration_min is None and self.duration_max is None
+
     def nearest_duration(self, duration: float) -> float:
         """The duration [s] within the bounds of the time that is nearest to another one."""
         most = np.inf if self.duration_max is None else self.duration_max

@@ -17,11 +17,12 @@ def explore(
     attempt: Callable[[Candidate], SolveResult],
     deadline: Deadline,
     most_solved: int | None = None,
+    ended: Callable[[Candidate], None] = lambda _: None,
 ) -> Candidate | None:
     """Solve candidates in order of lower bound until none is below the incumbent; returns it, None if there is none.
 
     After `most_solved` solved candidates the others are not solved. A candidate that is postponed comes again after the
-    one whose path was found instead.
+    one whose path was found instead. `ended` gets every candidate that was solved, or tried in vain.
     """
     best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
     queue = sorted(candidates, key=lambda e: (e.lower_bound, e.shortest))
@@ -50,4 +51,5 @@ def explore(
             candidate.energy = prepared.cost_of(result.spline)
             if best is None or best.energy is None or candidate.energy < best.energy:
                 best = candidate
+        ended(candidate)
     return best

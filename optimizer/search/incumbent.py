@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from optimizer.methods import method_of
 from optimizer.methods.method import Method, SolveResult
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, Problem, narrowed
+from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.reserve import reserve
 from optimizer.solution import CandidateStatus, Certificate, Energy
@@ -28,7 +30,7 @@ class Incumbent:
     `candidates` are all start and goal pairs, `iterations` and `solves` the effort over all attempts. `cut_short` says
     that the deadline ended a part of the search although there is a motion: with more time there might be a better one.
     `end` is the instant at which the answer is due, `longest` [s] the longest duration that the answer is known to
-    have, perhaps.
+    have, perhaps. `tell` gets what is found; `proven` [J] is what no motion goes below, None if that is not known yet.
     """
 
     prepared: PreparedProblem
@@ -38,6 +40,8 @@ class Incumbent:
     solves: int = 0
     cut_short: bool = False
     longest: float = 0.0
+    tell: Tell = nobody
+    proven: float | None = None
 
     @property
     def deadline(self) -> Deadline:
@@ -83,6 +87,7 @@ class Incumbent:
         if candidate.energy is None or objective < candidate.energy:
             candidate.attempt, candidate.energy = result, objective
             candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
+            self.tell_best()
 
     def reject(self, candidate: Candidate) -> None:
         """Drop a motion that the certificate did not confirm. Candidates that its energy pruned are open again."""
@@ -96,6 +101,25 @@ class Incumbent:
         """The certificate of a candidate's motion, checked against the targets of this candidate."""
         asked = narrowed(self.problem, candidate.start.target, candidate.goal.target)
         return certify(asked, spline, candidate.q_start, candidate.q_goal, energy)
+
+    def tell_candidates(self) -> None:
+        """Tell how many candidates there are."""
+        self.tell(CandidatesFound(len(self.candidates)))
+
+    def tell_tried(self, candidate: Candidate) -> None:
+        """Tell what became of a candidate, and what is the best now."""
+        if self.tell is nobody:
+            return
+        index = next(k for k, each in enumerate(self.candidates) if each is candidate)
+        status: Literal["solved", "failed"] = "failed" if candidate.energy is None else "solved"
+        self.tell(CandidateTried(index, status, candidate.lower_bound, candidate.energy))
+        self.tell_best()
+
+    def tell_best(self) -> None:
+        """Tell the best motion so far, if there is one."""
+        best = None if self.tell is nobody else self.best()
+        if best is not None and best.energy is not None:
+            self.tell(Improved(best.energy, best.duration, self.proven, best.q_goal))
 
     def allows(self, duration: float) -> bool:
         """Whether the problem allows a duration [s]; a baseline between equal ends has the duration 0."""

@@ -14,6 +14,7 @@ from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus
 from optimizer.problem.problem import Problem
+from optimizer.progress import Improved, Tell, nobody
 from optimizer.search import free_goal, self_motions
 from optimizer.search.attempts import solve, solve_from
 from optimizer.search.branch_and_bound import explore
@@ -44,12 +45,17 @@ OVERTIME = 0.1
 
 
 class Run:
-    """One search. `known` are motions between the problem's ends, of any duration, that warm-start it."""
+    """One search. `known` are motions between the problem's ends, of any duration, that warm-start it.
 
-    def __init__(self, problem: Problem, known: Sequence[Spline] = (), clock: Clock = time.perf_counter) -> None:
+    `tell` gets what is found.
+    """
+
+    def __init__(
+        self, problem: Problem, known: Sequence[Spline] = (), clock: Clock = time.perf_counter, tell: Tell = nobody
+    ) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.known = problem, known
-        self.incumbent = Incumbent(PreparedProblem.of(problem), Deadline.after(problem.deadline, clock))
+        self.incumbent = Incumbent(PreparedProblem.of(problem), Deadline.after(problem.deadline, clock), tell=tell)
         self.unreachable: list[UnreachableTarget] = []
 
     def prepare(self) -> None:
@@ -73,6 +79,15 @@ class Run:
         least = min(candidate.shortest for candidate in self.incumbent.candidates)
         self.incumbent.longest = max(least, problem.duration_min or 0.0)
         problem.arm.check_rating("payload.mass", problem.arm.payload.mass)
+        self.incumbent.proven = self._proven()
+        self.incumbent.tell_candidates()
+
+    def _proven(self) -> float | None:
+        """What no motion goes below [J]; None if candidates that are not known, or not solved, have to be bounded."""
+        candidates = self.incumbent.candidates
+        if self.problem.tool_path or any(each.sampled for each in candidates) or not all_known(self.problem):
+            return None
+        return min(each.lower_bound for each in candidates)
 
     def solution(self) -> Solution:
         """The motion of least energy that the certificate confirms. Raises the errors of `optimize`."""
@@ -92,6 +107,8 @@ class Run:
             find_fastest(incumbent)
         if incumbent.method.most_solved is None:
             incumbent.candidates += free_goal.refine_goals(incumbent) + self_motions.refine(incumbent)
+            incumbent.tell_candidates()
+            incumbent.tell_best()
         while (best := incumbent.best()) is not None:
             refine(incumbent, best)
             table = compare_with_baselines(incumbent, best)
@@ -134,6 +151,7 @@ class Run:
                 lambda candidate: solve(incumbent, candidate),
                 incumbent.deadline,
                 most_solved,
+                incumbent.tell_tried,
             )
             if incumbent.best() is not None or incumbent.deadline.passed or not activate_deferred(candidates):
                 break
@@ -227,13 +245,15 @@ class Run:
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
         done = done and all_known(self.problem)
         assert best.attempt is not None
+        least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])
+        incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
         return Solution(
             status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=trajectory,
             energy=energy,
-            lower_bound=min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)]),
+            lower_bound=least,
             complete=all_known(self.problem),
             baselines=table,
             candidates=[each.report() for each in candidates],

@@ -93,6 +93,11 @@ class LazySearch(ABC):
                     self.cut_short = True
                     return self._least_solved() or nodes
                 self.try_kind(*each)
+            self.chain_tried(nodes)
+
+    @abstractmethod
+    def chain_tried(self, nodes: list[int]) -> None:
+        """Takes note that every leg of a chain has been tried."""
 
     def _least_solved(self) -> list[int]:
         """The least chain of pairs that are all solved; no nodes if there is none."""

@@ -19,6 +19,7 @@ from optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
 from optimizer.problem.free_order import earlier_groups, groups_of
 from optimizer.problem.stops import PlannedMove, Stop, moves_over
 from optimizer.problem.work_round import START, WorkRound
+from optimizer.progress import Tell, nobody
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.proven_bound import bounded_costs
 from optimizer.sequence.round_search import RoundSearch
@@ -33,15 +34,15 @@ MOST_NODES = 2000
 class OrderSearch:
     """The search for the order of the stops of a round; `bound` [J] holds for every order once it has `run`.
 
-    `exact`: no other order can be better.
+    `exact`: no other order can be better. `tell` gets what is found of single moves.
     """
 
-    def __init__(self, asked: WorkRound, clock: Clock) -> None:
+    def __init__(self, asked: WorkRound, clock: Clock, tell: Tell = nobody) -> None:
         assert asked.order is not None
         self.asked, self.order = asked, asked.order
         self.groups = groups_of(asked.order, asked.stops)
         self.moves, self.blocks = _all_moves(asked, self.groups)
-        self.search = RoundSearch(replace(asked, deadline=SHARE * asked.deadline), clock, self.moves)
+        self.search = RoundSearch(replace(asked, deadline=SHARE * asked.deadline), clock, self.moves, tell)
         self.exact, self.bound, self.best = True, -np.inf, list[int]()
         count = sum(len(self.search.legs[self.blocks[None, k][-1]].goal.q) for k in range(len(self.groups)))
         if count > MOST_NODES:

@@ -80,6 +80,9 @@ class PricedSearch(LazySearch):
         self.motions[k, s, g] = found
         return found.energy + self.price * found.duration
 
+    def chain_tried(self, nodes: list[int]) -> None:
+        """Takes no note: at a price of time, what was found is no round of the time that is asked for."""
+
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         """The motion of a pair; None if none was found."""
         found = self.motions.get((k, s, g))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from optimizer.problem.problem import Problem
 from optimizer.problem.stops import PlannedMove
 from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import START, WorkRound
+from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
 from optimizer.sequence.layers import Layer, layer_of
@@ -35,9 +37,14 @@ SAME = 1e-9
 
 
 class RoundSearch(LazySearch):
-    """One search over `moves`, with the certified motions that it has found."""
+    """One search over `moves`, with the certified motions that it has found.
 
-    def __init__(self, asked: WorkRound, clock: Clock, moves: Sequence[PlannedMove] | None = None) -> None:
+    `tell` gets what is found: the candidates are the kinds of all legs.
+    """
+
+    def __init__(
+        self, asked: WorkRound, clock: Clock, moves: Sequence[PlannedMove] | None = None, tell: Tell = nobody
+    ) -> None:
         self.asked, self.clock = asked, clock
         self.moves = asked.moves if moves is None else moves
         self.end = Deadline.after(asked.deadline, clock)
@@ -51,6 +58,12 @@ class RoundSearch(LazySearch):
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
         super().__init__(legs, asked.closed, self.end.earlier_by(RESERVED * asked.deadline))
+        self._tell = tell
+        self._first = [0, *accumulate(len(leg.pair) for leg in legs)]
+        tell(CandidatesFound(self._first[-1]))
+        known = all(layer.complete and not layer.sampled for leg in legs for layer in (leg.start, leg.goal))
+        # before any leg is solved: the costs are proven bounds
+        self._proven = self._chain.find()[0] if known and tell is not nobody else None
 
     def _leg(self, move: PlannedMove, start: Layer, goal: Layer) -> Leg:
         prepared = PreparedProblem.of(self._problem(move, start.q[0], goal.q[0], self.asked.deadline))
@@ -75,6 +88,34 @@ class RoundSearch(LazySearch):
 
         None once the time is up.
         """
+        energy = self._attempt(k, s, g)
+        if energy is not None:
+            kind, solved = int(self.legs[k].kind[s, g]), bool(np.isfinite(energy))
+            self._tell(
+                CandidateTried(
+                    self._first[k] + kind,
+                    "solved" if solved else "failed",
+                    float(self.legs[k].bound[kind]),
+                    energy if solved else None,
+                )
+            )
+        return energy
+
+    def chain_tried(self, nodes: list[int]) -> None:
+        """Tells the round of this chain, if all of it is solved and it takes a time that is asked for."""
+        if self._tell is nobody:
+            return
+        energy, motions = self.cost(nodes), [self.motion(*each) for each in self.pairs(nodes)]
+        # of a leg that another pair of its kind was solved for, the duration is not known yet
+        durations = [motion.duration for motion in motions if motion is not None]
+        complete = len(durations) == len(motions)
+        own = sum(durations) + self.asked.dwelling if complete else None
+        if np.isfinite(energy) and (
+            self.asked.any_time or (own is not None and self.asked.nearest_duration(own) == own)
+        ):
+            self._tell(Improved(energy, own, self._proven))
+
+    def _attempt(self, k: int, s: int, g: int) -> float | None:
         leg = self.legs[k]
         time = SHARE_OF_A_LEG * self.search_end.left
         run = Run(self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], time), clock=self.clock)

@@ -7,7 +7,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.engine.listening import listener
 from app.engine.result import TaskResult
+from optimizer.progress import CandidatesFound
 
 
 def text(value: object) -> TaskResult:
@@ -67,6 +69,19 @@ class Fail:
 
     def run(self, deadline: float) -> TaskResult:
         raise self.error
+
+
+@dataclass(frozen=True)
+class Count:
+    """Tells numbers up to `total`, then its process id."""
+
+    total: int
+    request_id: str = "count"
+
+    def run(self, deadline: float) -> TaskResult:
+        for number in range(self.total):
+            listener()(CandidatesFound(number))
+        return text(os.getpid())
 
 
 def no_warm_up() -> None:

@@ -18,7 +18,8 @@ from app.engine.task import outcome
 from app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed, WorkerDied
 from app.settings import Settings
 from optimizer.exceptions import DeadlineExceeded, OutsideLimits
-from tests.app.engine.simple_tasks import Die, Fail, Hold, ProcessId, TimeLeft, failing_warm_up, no_warm_up
+from optimizer.progress import CandidatesFound, Event
+from tests.app.engine.simple_tasks import Count, Die, Fail, Hold, ProcessId, TimeLeft, failing_warm_up, no_warm_up
 from tests.app.live import alive
 
 # What a busy machine may take for anything below [s]; no test waits for it to pass.
@@ -275,3 +276,16 @@ def test_is_not_ready_without_a_warm_worker(tmp_path: Path, caplog: pytest.LogCa
             await waiting
 
     with_engine(tmp_path, test, warm=failing_warm_up)
+
+
+def test_what_a_task_finds_comes_before_its_result(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        for tells in (bench.engine.run, bench.engine.spare.run):
+            told: list[Event] = []
+            await tells(Count(1000), LONG, tell=told.append)
+            assert told == [CandidatesFound(number) for number in range(1000)]
+        await bench.engine.run(Count(1000), LONG)
+        await bench.engine.run(ProcessId(), LONG, tell=told.append)
+        assert len(told) == 1000, "nobody is told of a task that nobody listens to"
+
+    with_engine(tmp_path, test)

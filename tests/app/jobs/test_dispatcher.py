@@ -4,12 +4,14 @@ and move the clock of the leases."""
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import zlib
 from collections.abc import Awaitable, Callable
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from app.access.client import OPERATOR
 from app.engine.result import TaskResult
@@ -20,12 +22,13 @@ from app.jobs.dispatcher import LEASE, Dispatcher
 from app.jobs.holder import is_gone, new_holder
 from app.jobs.jobs import Jobs
 from app.settings import Settings
-from app.store import jobs
+from app.store import job_events, jobs
 from app.store.jobs import NewJob, NewRequest
 from app.store.leases import Figures
 from app.store.store import Store
 from app.store.tables import JobRequest, now
 from app.tasks.job_request import JobRequestTask, JobResult
+from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, Tell, nobody
 
 PATIENCE = 60.0
 BODY = zlib.compress(b"{}")
@@ -44,12 +47,14 @@ class Work:
         self.stopped: list[int] = []
         self.stoppable: list[bool] = []
         self.errors: list[Exception] = []
+        self.tell: Tell = nobody
 
-    async def run(self, task: Task, deadline: float, stoppable: bool) -> TaskResult:
+    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
         assert isinstance(task, JobRequestTask)
         index = int(task.request_id.rpartition(".")[2])
         self.begun.append(index)
         self.stoppable.append(stoppable)
+        self.tell = tell
         try:
             if self.errors:
                 raise self.errors.pop(0)
@@ -91,8 +96,8 @@ def with_store(folder: Path, test: Callable[[Store], Awaitable[None]]) -> None:
     asyncio.run(run())
 
 
-async def sent(service: Service, count: int = 1) -> str:
-    job_id, _ = await service.jobs.create(NewJob([NewRequest("optimize", BODY, 10.0)] * count, "x"), None, None)
+async def sent(service: Service, count: int = 1, kind: str = "optimize") -> str:
+    job_id, _ = await service.jobs.create(NewJob([NewRequest(kind, BODY, 10.0)] * count, "x"), None, None)
     return job_id
 
 
@@ -282,3 +287,50 @@ def test_a_holder_is_gone_once_its_process_is() -> None:
     assert is_gone(" ".join([*machine, pid, str(int(start) - 1), own])), "another process had this id"
     assert is_gone(" ".join([*machine, str(2**22 + 1), start, own]))
     assert not is_gone(" ".join(["elsewhere", *machine[1:], pid, "1", own])), "nobody here knows"
+
+
+def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        job_id = await sent(service, kind="cycle")
+
+        async def reports() -> list[dict[str, Any]]:
+            found, _ = await store.read(partial(job_events.after, job_id=job_id, number=0, limit=100))
+            told = [each.data["requests"] for each in found if each.name == "progress"]
+            return [only for each in told for only in each]
+
+        async def tells(report: dict[str, Any], *events: Event) -> None:
+            for event in events:
+                service.work.tell(event)
+            service.moved += timedelta(seconds=1)
+            await until(lambda: is_told(report))
+
+        async def is_told(report: dict[str, Any]) -> bool:
+            return report in await reports()
+
+        service.dispatcher.start()
+        await until(lambda: service.work.begun == [0])
+        first = {"index": 0, "attempt": 1, "found": None, "bound": None, "solved": 1}
+        await tells(first, CandidatesFound(3), CandidateTried(1, "solved", 1.0, 9.0))
+        best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, "solved": 1}
+        await tells(best, Improved(9.0, bound=-math.inf), Improved(9.5), CandidateTried(1, "solved", 1.0, 8.0))
+        await tells(best | {"found": 7.0, "bound": 5.0}, Improved(7.0, bound=5.0))
+        service.work.free.set()
+        await until(lambda: is_done(service, job_id))
+        found = await reports()
+        assert len(found) == 3, "what is no news is no event, and the end has none"
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_nobody_listens_to_short_requests(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        await sent(service)
+        service.dispatcher.start()
+        await until(lambda: service.work.begun == [0])
+        assert service.work.tell is nobody
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)

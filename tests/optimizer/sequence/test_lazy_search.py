@@ -58,6 +58,9 @@ class Known(LazySearch):
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         return spline(RANGE if self.near[k][s, g] else 0.0)
 
+    def chain_tried(self, nodes: list[int]) -> None:
+        assert all(self.legs[k].known(s, g) for k, s, g in self.pairs(nodes)) or self.cut_short
+
 
 def spline(q: float) -> Spline:
     """A motion that comes to q [rad]."""

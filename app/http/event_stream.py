@@ -1,0 +1,111 @@
+"""Answers one request by server-sent events: what its work tells while it runs, and at the end what it answers."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from collections import deque
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request
+from starlette.responses import StreamingResponse
+from starlette.types import Message, Receive, Scope, Send
+
+from app.convert.progress import to_event
+from app.engine.result import TaskResult, json_document
+from app.exceptions import ClientDisconnected, ServiceError, TooManyBytes, TooManyBytesOfClient
+from app.http.disconnect import disconnected
+from app.http.handlers import problem_response
+from optimizer.exceptions import JoulepathError
+from optimizer.progress import Event, Tell, forward
+
+logger = logging.getLogger(__name__)
+
+EVENT_STREAM = "text/event-stream"
+Work = Callable[[Tell], Coroutine[Any, Any, TaskResult]]
+_PAUSE = 15.0
+"""Time [s] without an event after which a comment tells proxies that the stream lives."""
+_MOST_WAITING = 1000
+"""Events that wait for a client who does not read them; then the oldest are left out."""
+_HEADERS = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
+_COMMENT = b": working\n\n"
+
+
+class EventStream(StreamingResponse):
+    """The events of `work`, which gets whom to tell, then `answer` with its result or `problem` with its error.
+
+    The stream begins with the first event. Work that fails before raises here, so that its problem is answered as to
+    any request. If the client closes the connection, the work is cancelled.
+    """
+
+    def __init__(self, request: Request, work: Work) -> None:
+        super().__init__((), headers=_HEADERS, media_type=EVENT_STREAM)
+        self._request, self._work = request, work
+        self._begun = False
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Sends the events. Raises ClientDisconnected, and what the work raises before the first event."""
+        waiting: deque[Event] = deque(maxlen=_MOST_WAITING)
+        bell = asyncio.Event()
+
+        def told(event: Event) -> None:
+            waiting.append(event)
+            bell.set()
+
+        # a request that gave its worker back begins again: its client need not know
+        working = asyncio.create_task(self._work(forward(told)))
+        leaving = asyncio.create_task(disconnected(self._request))
+        for task in (working, leaving):
+            task.add_done_callback(lambda _: bell.set())
+        try:
+            while not working.done() or waiting:
+                await self._rung(bell, send)
+                if leaving.done():
+                    raise ClientDisconnected
+                while waiting:
+                    name, content = to_event(waiting.popleft())
+                    await self._send(send, name, json_document(content))
+            await self._conclude(working, send)
+        finally:
+            working.cancel()
+            leaving.cancel()
+            await asyncio.gather(working, leaving, return_exceptions=True)
+
+    async def _rung(self, bell: asyncio.Event, send: Send) -> None:
+        """Waits until the bell rings, and silences it."""
+        while not bell.is_set():
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(_PAUSE):
+                    await bell.wait()
+            if not bell.is_set() and self._begun:
+                await send(_body(_COMMENT))
+        bell.clear()
+
+    async def _conclude(self, working: asyncio.Task[TaskResult], send: Send) -> None:
+        """Sends the last event."""
+        try:
+            await self._send(send, "answer", working.result().document)
+        except (TooManyBytes, TooManyBytesOfClient) as error:
+            await self._fail(error, send)
+        except Exception as error:
+            if not self._begun:
+                raise
+            if not isinstance(error, JoulepathError | ServiceError):
+                logger.exception("unforeseen error", extra={"request_id": self._request.state.id})
+            await self._fail(error, send)
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+    async def _fail(self, error: Exception, send: Send) -> None:
+        await self._send(send, "problem", bytes((await problem_response(self._request, error)).body))
+
+    async def _send(self, send: Send, name: str, document: bytes) -> None:
+        if not self._begun:
+            self._begun = True
+            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        await send(_body(b"event: %s\ndata: %s\n\n" % (name.encode(), document)))
+
+
+def _body(content: bytes) -> Message:
+    return {"type": "http.response.body", "body": content, "more_body": True}

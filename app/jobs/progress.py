@@ -1,0 +1,28 @@
+"""Progress within one request of a job, from the events of its search."""
+
+from __future__ import annotations
+
+import math
+
+from app.store.job_events import Report
+from optimizer.progress import CandidateTried, Event, Improved, forward
+
+HEARD = ("cycle", "pareto")
+"""Endpoints whose requests take long, so that their progress is worth an event."""
+
+
+class Found:
+    """What the work on a request has found so far. `is_news`: since it was last stored."""
+
+    def __init__(self, attempt: int) -> None:
+        self.report = Report(attempt)
+        self.is_news = False
+        self.tell = forward(self._note)
+
+    def _note(self, event: Event) -> None:
+        if isinstance(event, CandidateTried):
+            self.report = self.report.with_one_solved()
+        elif isinstance(event, Improved):
+            known = event.bound is not None and math.isfinite(event.bound)
+            self.report = self.report.with_best(event.energy, event.bound if known else None)
+        self.is_news = True

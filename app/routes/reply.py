@@ -1,0 +1,38 @@
+"""How a request is answered: at once when its work is done, or by events from the begin of the work on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fastapi import Depends, Request, Response
+
+from app.http.disconnect import unless_disconnected
+from app.http.event_stream import EVENT_STREAM, EventStream, Work
+from app.http.handlers import result_response
+from app.schemas.examples.progress import EVENTS
+from optimizer.progress import nobody
+
+BY_EVENTS: dict[str, Any] = {EVENT_STREAM: {"schema": {"type": "string"}, "example": EVENTS}}
+"""Content of the 200 of a route whose progress can be listened to."""
+
+
+@dataclass(frozen=True)
+class Reply:
+    """The answer that the client of a request wants."""
+
+    request: Request
+    by_events: bool
+
+    async def of(self, work: Work) -> Response:
+        """The response with what `work` returns. If the client closes the connection, the work is cancelled."""
+        if self.by_events:
+            return EventStream(self.request, work)
+        return result_response(await unless_disconnected(self.request, work(nobody)))
+
+
+async def _reply(request: Request) -> Reply:
+    return Reply(request, EVENT_STREAM in request.headers.get("accept", "").lower())
+
+
+ServiceReply = Annotated[Reply, Depends(_reply)]

@@ -1,0 +1,140 @@
+"""Progress of one request over a real socket: events, then the answer or the problem, and clients that leave."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+import httpx2
+import orjson
+import pytest
+
+from app.schemas.compare import CompareResponse
+from app.schemas.cycle import CycleResponse
+from app.schemas.errors import DurationTooShort, Internal, ProblemDetails, TooManyRequests, UnreachablePose, Validation
+from app.schemas.pareto import ParetoResponse
+from app.schemas.response import OptimizeResponse
+from tests.app.live import CLIENT, GRACE, Server, serving, until
+from tests.app.requests import HOME, NEAR, long_search, move
+
+Event = tuple[str, Any]
+LISTEN = {"Accept": "text/event-stream"}
+SHORT = {"method": "time_scaling"}
+
+
+@pytest.fixture(scope="module")
+def one() -> Iterator[Server]:
+    """A server with one worker, and room for a small answer only."""
+    with serving(workers=1, deadline_grace=GRACE, client_bytes_in_flight=150_000) as server:
+        yield server
+
+
+def parsed(text: str) -> Iterator[Event]:
+    """The events of a stream, whose comments mean nothing."""
+    for block in text.split("\n\n")[:-1]:
+        if not block.startswith(":"):
+            name, data = block.split("\n")
+            yield name.removeprefix("event: "), orjson.loads(data.removeprefix("data: "))
+
+
+def told(server: Server, path: str, body: Any) -> list[Event]:
+    answer = server.post(path, body, headers=LISTEN)
+    assert answer.status_code == 200, answer.text
+    assert answer.headers["content-type"].startswith("text/event-stream")
+    assert "content-length" not in answer.headers
+    return list(parsed(answer.text))
+
+
+def names(events: list[Event]) -> list[str]:
+    return list(dict.fromkeys(name for name, _ in events))
+
+
+def test_the_answer_is_that_of_a_request_without_progress(one: Server) -> None:
+    events = told(one, "/optimize", move(**SHORT))
+    assert names(events) == ["candidates", "candidate", "incumbent", "answer"]
+    assert set(events[1][1]) == {"index", "status", "bound", "energy"}
+    name, answer = events[-1]
+    OptimizeResponse.model_validate_json(orjson.dumps(answer))
+    incumbent = [content for name, content in events if name == "incumbent"][-1]
+    assert incumbent == {
+        "energy": answer["energy"]["electrical"]["total"],
+        "duration": answer["duration"],
+        "bound": answer["energy"]["lower_bound"],
+        "gap": answer["energy"]["optimality_gap"],
+        "q_goal": answer["branch"]["goal"]["q"],
+    }
+    plain = one.post("/optimize", move(**SHORT)).json()
+    for name in ("id", "answer", "solver"):
+        del plain[name]
+    assert plain == {name: answer[name] for name in plain}
+    assert one.get(answer["answer"]).json()["answer"] == answer, "it is kept"
+
+
+def test_other_paths_tell_too(one: Server) -> None:
+    start, goal = {"q": HOME}, {"q": NEAR}
+    front = told(one, "/pareto", move(**SHORT, points=2))
+    ParetoResponse.model_validate_json(orjson.dumps(front[-1][1]))
+    assert front[0] == ("candidates", {"total": 2})
+    compared = told(one, "/compare", move(methods=["time_scaling", "uniform_scaling"]))
+    CompareResponse.model_validate_json(orjson.dumps(compared[-1][1]))
+    assert [content["index"] for name, content in compared if name == "candidate"] == [0, 1]
+    cycle = told(one, "/cycle", {"start": start, "stops": [{"target": goal}], "windings": False, **SHORT})
+    CycleResponse.model_validate_json(orjson.dumps(cycle[-1][1]))
+    for events in (front, compared, cycle):
+        assert names(events) == ["candidates", "candidate", "incumbent", "answer"]
+
+
+def test_what_fails_before_its_search_is_answered_as_ever(one: Server) -> None:
+    far = move(goal={"pose": {"position": [5.0, 0.0, 0.0], "quaternion": [0.0, 1.0, 0.0, 0.0]}})
+    wrong: list[tuple[Any, type[ProblemDetails]]] = [({"start": 1}, Validation), (far, UnreachablePose)]
+    for body, problem in wrong:
+        answer = one.post("/optimize", body, headers=LISTEN)
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert answer.status_code == problem.model_validate(answer.json()).status
+
+
+def test_what_fails_in_its_search_is_an_event(one: Server) -> None:
+    name, content = told(one, "/optimize", move(duration=0.01))[-1]
+    assert name == "problem"
+    problem = DurationTooShort.model_validate(content)
+    assert one.request_logged("/optimize")["request_id"] == problem.instance
+
+
+def test_an_answer_without_room_is_a_problem(one: Server) -> None:
+    large = move(**SHORT, duration=4.0, sample_period=0.002)
+    TooManyRequests.model_validate(one.post("/optimize", large).json())
+    name, content = told(one, "/optimize", large)[-1]
+    assert name == "problem"
+    TooManyRequests.model_validate(content)
+    assert one.request_logged("/optimize")["problem"] == "too-many-requests"
+
+
+def open_stream(server: Server) -> Any:
+    return CLIENT.stream("POST", server.url + "/optimize", json=long_search(100.0), headers=LISTEN)
+
+
+def first_event(stream: httpx2.Response) -> str:
+    """Read by single lines: an event comes while the search runs."""
+    return next(stream.iter_lines())
+
+
+def test_a_search_that_dies_is_a_problem(one: Server) -> None:
+    with open_stream(one) as stream:
+        lines = stream.iter_lines()
+        assert next(lines) == "event: candidates"
+        (worker,) = one.workers()
+        os.kill(worker, signal.SIGKILL)
+        *_, (name, content) = parsed("event: candidates\n" + "".join(f"{line}\n" for line in lines))
+    assert name == "problem"
+    Internal.model_validate(content)
+    until(lambda: one.workers() not in ([], [worker]))
+
+
+def test_leaving_stops_the_work(one: Server) -> None:
+    (worker,) = one.workers()
+    with open_stream(one) as stream:
+        assert first_event(stream) == "event: candidates"
+    until(lambda: one.workers() not in ([], [worker]))
+    until(lambda: one.request_logged("/optimize")["status"] == 499)

@@ -1,0 +1,116 @@
+"""What a search tells while it runs: it changes nothing, goes forward only, and ends with the answer."""
+
+from __future__ import annotations
+
+import pickle
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from optimizer.optimize import optimize
+from optimizer.optimize_round import optimize_round
+from optimizer.pareto import pareto
+from optimizer.problem.problem import Problem
+from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
+from optimizer.solution import CandidateStatus
+from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
+from tests.optimizer.sequence.rounds import pick_and_place
+
+SAME = 1e-12
+
+
+def asked(bound: str) -> Problem:
+    return problem(HOME, tcp_pose(GOAL), method="time_scaling", bound=bound)
+
+
+def goes_forward(events: list[Event]) -> list[Improved]:
+    """The best answers told; each is better than the one before, or bounded better."""
+    assert isinstance(events[0], CandidatesFound)
+    totals = [each.total for each in events if isinstance(each, CandidatesFound)]
+    assert totals == sorted(set(totals))
+    tried = [each.index for each in events if isinstance(each, CandidateTried)]
+    assert len(set(tried)) == len(tried) and max(tried) < totals[-1]
+    best = [each for each in events if isinstance(each, Improved)]
+    for before, after in pairwise(best):
+        bounds = [-np.inf if each.bound is None else each.bound for each in (before, after)]
+        assert after.energy <= before.energy and bounds[0] <= bounds[1]
+        assert after.energy < before.energy or bounds[0] < bounds[1]
+    assert all(pickle.loads(pickle.dumps(each)) is not None for each in events), "they go through a pipe"
+    return best
+
+
+@pytest.mark.parametrize("bound", ["normal", "tight"])
+def test_a_search_ends_with_its_answer(bound: str) -> None:
+    events: list[Event] = []
+    answer = optimize(asked(bound), tell=events.append)
+    unheard = optimize(asked(bound))
+    assert (answer.trajectory.q == unheard.trajectory.q).all() and answer.lower_bound == unheard.lower_bound
+    last = goes_forward(events)[-1]
+    assert (last.energy, last.duration) == (answer.energy.electrical.total, answer.duration)
+    assert last.bound == answer.lower_bound
+    assert last.q_goal is not None and (last.q_goal == answer.goal.q).all()
+    assert events[0] == CandidatesFound(len(answer.candidates))
+    computed = (CandidateStatus.SOLVED, CandidateStatus.FAILED)
+    told = {each.index: each for each in events if isinstance(each, CandidateTried)}
+    assert set(told) == {k for k, each in enumerate(answer.candidates) if each.status in computed}
+    for index, each in told.items():
+        assert each.status == answer.candidates[index].status.value
+
+
+def test_no_bound_is_told_that_is_not_proven() -> None:
+    """Of an orientation that is free about an axis, only samples are solved: the bound comes at the end."""
+    events: list[Event] = []
+    start, goal = np.radians([0, -80, 90, -90, -85, 0]), np.radians([30, -70, 80, -90, -85, 10])
+    answer = optimize(problem(start, tcp_pose(goal), method="time_scaling"), tell=events.append)
+    for each in goes_forward(events):
+        assert each.bound is None or each.bound <= answer.lower_bound
+
+
+def test_a_round_ends_with_its_answer() -> None:
+    events: list[Event] = []
+    found = optimize_round(pick_and_place(1, 2, method="time_scaling"), tell=events.append)
+    last = goes_forward(events)[-1]
+    assert last.energy == pytest.approx(sum(each.energy for each in found.moves), rel=SAME)
+    assert last.duration == pytest.approx(found.duration, rel=SAME) and last.bound == found.lower_bound
+
+
+def test_a_round_of_another_time_tells_none_of_its_own() -> None:
+    """In its own time it needs less than in the time that is asked for: that is no answer."""
+    longer = 1.5 * optimize_round(pick_and_place(1, 2, method="time_scaling")).duration
+    events: list[Event] = []
+    asked = pick_and_place(1, 2, method="time_scaling", duration_min=longer, duration_max=longer)
+    found = optimize_round(asked, tell=events.append)
+    assert [each.energy for each in goes_forward(events)] == [pytest.approx(sum(each.energy for each in found.moves))]
+
+
+def test_a_front_tells_its_durations() -> None:
+    events: list[Event] = []
+    front = pareto(problem(HOME, GOAL, method="time_scaling"), 4, tell=events.append)
+    best = goes_forward(events)
+    assert events[0] == CandidatesFound(4)
+    assert best[-1].energy == pytest.approx(front.points[-1].energy.electrical.total, rel=2e-3)
+    assert best[-1].bound == pytest.approx(front.points[-1].lower_bound, rel=2e-3)
+
+
+def test_what_is_no_news_is_not_passed_on() -> None:
+    events: list[Event] = []
+    tell = forward(events.append)
+    news: list[Event] = [
+        CandidatesFound(5),
+        CandidateTried(3, "solved", 1.0, 9.0),
+        Improved(9.0, bound=1.0),
+        CandidatesFound(7),
+        CandidateTried(4, "failed", None, None),
+        Improved(8.0, bound=2.0),
+    ]
+    for each in (*news, *news):
+        tell(each)
+    assert list(map(repr, events)) == list(map(repr, news))
+    tell(Improved(8.5, bound=3.0))
+    assert isinstance(events[-1], Improved)
+    assert (events[-1].energy, events[-1].bound) == (8.0, 3.0), "a bound on a worse motion holds for the best one"
+    tell(Improved(7.0))
+    assert isinstance(events[-1], Improved)
+    assert (events[-1].energy, events[-1].bound) == (7.0, 3.0)
+    assert forward(nobody) is nobody
