@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
 import socket
+import subprocess
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
@@ -15,7 +18,7 @@ import pytest
 
 from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, MalformedHttp, ShuttingDown
 from app.schemas.response import OptimizeResponse
-from tests.app.live import CLIENT, EXIT, WARM_UP, Server, alive, processor_time, serving, until
+from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
 from tests.app.requests import EXAMPLES, long_search, move
 
 T = TypeVar("T")
@@ -67,6 +70,15 @@ def test_answers(server: Server) -> None:
     answer = server.post("/optimize", EXAMPLES["joint_to_pose"])
     assert answer.status_code == 200
     OptimizeResponse.model_validate_json(answer.content)
+
+
+def test_the_page_for_newcomers_shows_what_its_script_prints(server: Server) -> None:
+    page = (ROOT / "docs" / "first_saving.md").read_text()
+    (request,) = re.findall(r"```\n(\{.*?\})\n```", page, re.DOTALL)
+    assert json.loads(request) == json.loads((ROOT / "examples" / "first_saving" / "pick_to_place.json").read_text())
+    command = re.findall(r"```\npython3 (\S+) (\S+)\n```", page)
+    run = subprocess.run(["python3", *command[0], server.url], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert f"```\n{run.stdout}```" in page
 
 
 def test_long_requests_hold_up_nobody(server: Server) -> None:
