@@ -19,6 +19,9 @@ class ExportFormat(StrEnum):
     URSCRIPT = "urscript"
     ROS2 = "ros2"
     MOVEIT = "moveit"
+    FRANKA = "franka"
+    RAPID = "rapid"
+    KRL = "krl"
     CSV = "csv"
     JSON = "json"
     NPZ = "npz"
@@ -28,6 +31,9 @@ FORMATS: dict[ExportFormat, str] = {
     ExportFormat.URSCRIPT: "A program for Universal Robots controllers that follows the spline with servoj.",
     ExportFormat.ROS2: "A FollowJointTrajectory goal or a JointTrajectory for ros2_control, as YAML or for rosbridge.",
     ExportFormat.MOVEIT: "A RobotTrajectory for MoveIt, as YAML or JSON.",
+    ExportFormat.FRANKA: "A table at 1 kHz for robots of Franka, or a motion generator for libfranka.",
+    ExportFormat.RAPID: "A module for ABB controllers, which hold the times only roughly; the file says how far.",
+    ExportFormat.KRL: "A program for KUKA controllers, which hold the times only roughly; the file says how far.",
     ExportFormat.CSV: "A table of samples: t, q, v, a. `POST /evaluate` reads it.",
     ExportFormat.JSON: "The splines themselves, with payloads and rests.",
     ExportFormat.NPZ: "Arrays for NumPy: samples and splines.",
@@ -97,10 +103,73 @@ class Ros2Options(MoveitOptions):
     )
 
 
+class FrankaOptions(Request):
+    """Options of `franka`."""
+
+    form: Literal["csv", "cpp"] = described(
+        "`csv`: a table with t, q and v. `cpp`: a C++ header with a motion generator.", None, "cpp", default="csv"
+    )
+
+
+class PointsOptions(Request):
+    """Options that `rapid` and `krl` share."""
+
+    tolerance: float = described(
+        "Deviation from the spline that the number of points is chosen for. The file says what is reached.",
+        "rad",
+        0.002,
+        default=0.005,
+        ge=1e-4,
+        le=0.1,
+    )
+    signs: Annotated[list[Literal[1, -1]], Field(min_length=1, max_length=16)] | None = described(
+        "Sense of the controller's axes against the joints of the robot's model, one per joint. Null: the same.",
+        None,
+        [1, -1, 1, 1, 1, 1],
+        default=None,
+    )
+    offsets: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=16)] | None = (
+        described(
+            "Position of the controller's axes where the model's joints are at zero, one per joint. Null: zero.",
+            "deg",
+            [0.0, -90.0, 90.0, 0.0, 0.0, 0.0],
+            default=None,
+        )
+    )
+
+
+class RapidOptions(PointsOptions):
+    """Options of `rapid`."""
+
+    digital_output: str | None = described(
+        "Name of the output signal that is on from each grasp to the release. Null: none is switched.",
+        None,
+        "doGripper",
+        default=None,
+        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$",
+    )
+
+
+class KrlOptions(PointsOptions):
+    """Options of `krl`."""
+
+    digital_output: int | None = described(
+        "Number of the output that is on from each grasp to the release. Null: none is switched.",
+        None,
+        1,
+        default=None,
+        ge=1,
+        le=4096,
+    )
+
+
 OPTIONS_OF: dict[ExportFormat, str] = {
     ExportFormat.URSCRIPT: "urscript",
     ExportFormat.ROS2: "ros2",
     ExportFormat.MOVEIT: "moveit",
+    ExportFormat.FRANKA: "franka",
+    ExportFormat.RAPID: "rapid",
+    ExportFormat.KRL: "krl",
     ExportFormat.CSV: "table",
     ExportFormat.NPZ: "table",
 }
@@ -135,6 +204,10 @@ class ExportRequest(Request):
     urscript: UrscriptOptions | None = described("Options of `urscript`.", None, {"digital_output": 0}, default=None)
     ros2: Ros2Options | None = described("Options of `ros2`.", None, {"message": "trajectory"}, default=None)
     moveit: MoveitOptions | None = described("Options of `moveit`.", None, {"encoding": "json"}, default=None)
+
+    franka: FrankaOptions | None = described("Options of `franka`.", None, {"form": "cpp"}, default=None)
+    rapid: RapidOptions | None = described("Options of `rapid`.", None, {"tolerance": 0.002}, default=None)
+    krl: KrlOptions | None = described("Options of `krl`.", None, {"tolerance": 0.002}, default=None)
 
     @model_validator(mode="before")
     @classmethod

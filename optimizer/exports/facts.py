@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-import numpy as np
-
-from models.robot import Array
 from optimizer.exceptions import FormatUnsuitable
 from optimizer.exports.program import Program
 
@@ -52,6 +49,13 @@ def header(program: Program, title: str, notes: tuple[str, ...]) -> list[str]:
     return [comment(line) for line in lines]
 
 
+def output_note(program: Program, output: int | str | None) -> tuple[str, ...]:
+    """A note for the program of a round that switches no output."""
+    if output is not None or all(timed.payload is None for timed in program.timed):
+        return ()
+    return ("no output is switched where the payload changes: give digital_output, or add the gripper commands",)
+
+
 def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) -> None:
     """Raises FormatUnsuitable for a robot with other than `nq` joints, or one of another maker's that is known."""
     robot = program.robot
@@ -67,8 +71,3 @@ def check_joints(program: Program, format: str, nq: int, maker: str, arms: str) 
 
 
 _MAKERS = ("Universal Robots", "Franka", "KUKA", "UFACTORY", "ABB")
-
-
-def degrees(q: Array) -> list[str]:
-    """Joint positions [rad] as decimal numbers in degrees, to 1e-6."""
-    return [f"{x:.6f}" for x in np.rad2deg(q)]

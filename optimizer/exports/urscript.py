@@ -15,7 +15,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.exceptions import FormatUnsuitable
-from optimizer.exports.facts import ExportedFile, check_joints, comment, header
+from optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
 from optimizer.exports.pieces import pieces
 from optimizer.exports.program import Move, Program, Timed
 from optimizer.exports.urscript_parts import CHECKS, serving
@@ -93,12 +93,11 @@ def _check_size(program: Program, options: UrscriptOptions) -> None:
 
 
 def _output_notes(program: Program, options: UrscriptOptions) -> tuple[str, ...]:
-    if all(timed.payload is None for timed in program.timed):
-        return ()
-    if options.digital_output is None:
-        return ("no output is switched where the payload changes: give digital_output, or add the gripper's commands",)
+    output = options.digital_output
+    if output is None or all(timed.payload is None for timed in program.timed):
+        return output_note(program, output)
     return (
-        f"standard digital output {options.digital_output} is on from each grasp to the release",
+        f"standard digital output {output} is on from each grasp to the release",
         "the gripper has as long as the dwell at the stop",
     )
 

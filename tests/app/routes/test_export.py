@@ -11,6 +11,7 @@ import yaml
 from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
+from app.schemas.examples.own_arm import PUT_EXAMPLES
 from app.schemas.export import FORMATS, ExportFormat
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
@@ -61,6 +62,10 @@ def altered(answer: Json, *path: Any, value: Any) -> Json:
 def test_a_kept_answer_is_exported_as_it_is_when_sent_whole(client: TestClient, answer: Json, format: str) -> None:
     names = answer["answer"].removeprefix("/answers/"), answer["answer"], answer
     by_id, by_path, whole = (export(client, format, each) for each in names)
+    if format in ("franka", "rapid", "krl"):
+        # other makers
+        assert refused(by_id, problems.FormatUnsuitable)["format"] == format
+        return
     assert by_id.status_code == 200, by_id.text
     if format != "npz":  # its archive holds the time
         assert by_id.content == by_path.content == whole.content
@@ -246,3 +251,32 @@ def test_accept_chooses_json_where_no_option_says(client: TestClient, answer: Js
     yaml_wanted = body | {"ros2": {"encoding": "yaml"}}
     told = client.post("/export/ros2", json=yaml_wanted, headers=headers)
     assert told.headers["content-type"].startswith("application/yaml")
+
+
+def test_arms_of_the_other_makers_get_their_programs(client: TestClient) -> None:
+    q = [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8]
+    franka = client.post("/optimize", json=move(robot="panda", start={"q": q}, goal={"q": [0.2, *q[1:]]})).json()
+    table = export(client, "franka", franka)
+    assert table.headers["content-type"].startswith("text/csv") and len(table.text.splitlines()) > 100
+    header = export(client, "franka", franka, franka={"form": "cpp"})
+    assert "franka::MotionFinished" in header.text and '.hpp"' in header.headers["content-disposition"]
+    q = [0.0, -1.2, 1.2, 0.0, 0.5, 0.0]
+    kuka = client.post("/optimize", json=move(robot="kr10_r1100", start={"q": q}, goal={"q": [0.4, *q[1:]]})).json()
+    program = export(client, "krl", kuka, krl={"tolerance": 0.002, "digital_output": 1})
+    assert program.text.startswith("&ACCESS RVP\r\nDEF joulepath( )") and "PTP_SPLINE" in program.text
+    assert "rad of the spline" in program.headers["joulepath-notes"]
+
+
+def test_an_arm_of_a_users_own_gets_programs_of_any_maker(client: TestClient) -> None:
+    assert client.put("/robots/irb", json=PUT_EXAMPLES["makers_figures"]["value"]).is_success
+    nq = len(client.get("/robots/irb").json()["joints"])
+    start, goal = [0.1] * nq, [0.3] * nq
+    body = move(robot="irb", start={"q": start}, goal={"q": goal}, collisions=False)
+    found = client.post("/optimize", json=body).json()
+    exported = export(client, "rapid", found["answer"], rapid={"signs": [1] * nq, "offsets": [0.0] * nq})
+    if nq == 6:
+        assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), exported.text
+    else:
+        refused(exported, problems.FormatUnsuitable)
+    client.delete("/robots/irb")
+    refused(export(client, "csv", found), problems.UnknownRobot)
