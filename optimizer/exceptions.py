@@ -21,6 +21,8 @@ JoulepathError
 ├── NoSequence              no chain of configurations through a round
 ├── NoTrajectory            every candidate failed
 │   └── NoCollisionFreeTrajectory
+├── NotCertified            a motion to export failed its certificate
+├── FormatUnsuitable        a motion cannot be written in a format
 └── DeadlineExceeded        no motion certified in time
 """
 
@@ -311,3 +313,22 @@ class DeadlineExceeded(JoulepathError):
     def __init__(self, candidates: Sequence[CandidateReport]) -> None:
         super().__init__("The deadline passed before any motion was certified: allow a longer deadline.")
         self.candidates = list(candidates)
+
+
+class NotCertified(JoulepathError):
+    """A motion that is to be exported failed its certificate: move `move`, from 0, of a round; the largest value /
+    limit is in `worst_ratio`."""
+
+    def __init__(self, move: int, reason: str, worst_ratio: dict[str, float]) -> None:
+        super().__init__(
+            f"The motion is not certified: {reason}. Export an answer as the service gave it, for the robot as it is."
+        )
+        self.move, self.worst_ratio = move, {name: ratio for name, ratio in worst_ratio.items() if ratio == ratio}
+
+
+class FormatUnsuitable(JoulepathError):
+    """The motion cannot be written in the format. `format` names it."""
+
+    def __init__(self, format: str, message: str) -> None:
+        super().__init__(message)
+        self.format = format

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from app.convert.arm_fields import arm_fields
 from app.convert.fields import fields
 from app.convert.motion_csv import MotionCsv
 from app.convert.solution import energy_fields
 from app.convert.warnings import sampled_warnings
+from app.schemas.arm import ArmRequest
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateSettings, SampledClearance
 from optimizer.csv_table import FIRST_ROW
 from optimizer.exceptions import InvalidProblem
@@ -52,12 +54,13 @@ def _to_waypoints(settings: EvaluateSettings, q: Any, first_row: int) -> Waypoin
     return Waypoints(q, np.array(settings.time_per_segment), settings.interpolation, first_row)
 
 
-def to_evaluate_response(request_id: str, robot: str, result: Evaluation) -> dict[str, Any]:
-    """The answer of `POST /evaluate`."""
+def to_evaluate_response(request_id: str, asked: ArmRequest, result: Evaluation) -> dict[str, Any]:
+    """The answer of `POST /evaluate`, for the motion of the arm asked about."""
     samples, nearest = result.samples, result.nearest
     return {
         "id": request_id,
-        "robot": robot,
+        "robot": asked.robot,
+        "arm": arm_fields(asked),
         "duration": result.total.duration,
         "total": _interval_fields(result.total),
         "segments": [_interval_fields(segment) for segment in result.segments],

@@ -26,15 +26,18 @@ class Asked(Protocol):
         ...
 
 
-def to_optimize_response(request: Asked, request_id: str, solution: Solution) -> dict[str, Any]:
+def to_optimize_response(
+    request: Asked, request_id: str, solution: Solution, arm: dict[str, Any] | None
+) -> dict[str, Any]:
     """The answer of `POST /optimize`: numbers, strings, lists, dicts, and arrays in C order.
 
-    Its last field, `answer`, is None: who keeps the answer sets it.
+    `arm` is that of `arm_fields`. Its last field, `answer`, is None: who keeps the answer sets it.
     """
     trajectory = solution.trajectory
     return {
         "id": request_id,
         "robot": request.robot,
+        "arm": arm,
         "method": request.method,
         "objective": request.objective,
         "duration": solution.duration,

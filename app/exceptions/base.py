@@ -13,6 +13,7 @@ ServiceError
 ├── TaskFailed          the task raised an unforeseen exception
 ├── StoreUnavailable    the database cannot be reached, read or written
 ├── UnknownAnswer       no stored answer has that id
+│   └── PartsNeeded         an export refers to answers that are not at hand
 ├── UnknownStudy        no study has that id
 │   └── UnknownIteration
 ├── UnknownJob          no job has that id

@@ -35,6 +35,16 @@ class UnknownAnswer(ServiceError):
     MESSAGE = "No stored answer has this id: send the request that produced the answer again."
 
 
+class PartsNeeded(UnknownAnswer):
+    """An export refers to kept answers, by their ids or paths `names`, that are not at hand."""
+
+    MESSAGE = "The answer refers to kept answers that are not at hand: export it where the service keeps them."
+
+    def __init__(self, names: list[str]) -> None:
+        super().__init__()
+        self.names = names
+
+
 class UnknownStudy(ServiceError):
     """No study has that id."""
 

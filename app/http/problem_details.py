@@ -67,6 +67,8 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.TorqueInfeasible: problems.TorqueInfeasible,
     optimizer_errors.NoCollisionFreeTrajectory: problems.NoCollisionFreeTrajectory,
     optimizer_errors.NoTrajectory: problems.NoTrajectory,
+    optimizer_errors.NotCertified: problems.NotCertified,
+    optimizer_errors.FormatUnsuitable: problems.FormatUnsuitable,
     optimizer_errors.DeadlineExceeded: problems.DeadlineExceeded,
     Busy: problems.Busy,
     TooManyRequests: problems.TooManyRequests,

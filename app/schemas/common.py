@@ -88,6 +88,17 @@ class Answer(Response):
     robot: str = described("Name of the robot.", None, "ur5e")
 
 
+class MotionAnswer(Answer):
+    """The fields of an answer that is a motion."""
+
+    arm: dict[str, Any] | None = described(
+        "What the request says of the arm beside its robot: payload, limits, scene, ... as it was sent. Null if that "
+        "is larger than 64 KiB of JSON.",
+        None,
+        {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
+    )
+
+
 def by_field(*names: str, beside: str | None = None) -> Discriminator:
     """Discriminator of a union whose members are tagged `by <name>`: the object has exactly one field of `names`.
 

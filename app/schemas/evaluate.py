@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest, one_or_each
-from app.schemas.common import Answer, JointPositions, Request, Response, described, part
+from app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
 from app.schemas.examples.values import PAPER_HOME as _HOME
 from app.schemas.examples.values import PAPER_POSE as _THERE
 from app.schemas.request import Seconds
@@ -194,7 +194,7 @@ class SampledClearance(Response):
     spacing: float = described("Largest time between two samples.", "s", 0.01)
 
 
-class EvaluateResponse(Answer):
+class EvaluateResponse(MotionAnswer):
     """The energy of a given motion, and the limits that it violates."""
 
     duration: float = described("Duration of the motion.", "s", 3.0)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.schemas.common import Answer, Response, described, part
+from app.schemas.common import MotionAnswer, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH, HOME, LABEL, STANDING_STILL
 from optimizer.collision.close_pass import CLOSE
 from optimizer.problem.problem import MethodName
@@ -309,7 +309,7 @@ class Solver(Response):
     )
 
 
-class OptimizeResponse(Answer):
+class OptimizeResponse(MotionAnswer):
     """The motion of least energy, its energy with all parts, and a certificate."""
 
     method: MethodName = described("How the motion is parametrised.", None, "bspline")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import orjson
 
+from app.convert.arm_fields import arm_fields
 from app.convert.comparison import to_compare_response, to_optimize_request
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
@@ -59,7 +60,7 @@ class CompareTask:
                 tell(Improved(energy, solution.duration, bound, solution.goal.q))
                 if self.request.answers:
                     # encoded at once: the next method gets the time that is left then
-                    answer = json_document(to_optimize_response(asked, self.request_id, solution))
+                    answer = json_document(to_optimize_response(asked, self.request_id, solution, arm_fields(asked)))
                     answers[method] = orjson.Fragment(answer)
         if not found:
             raise errors[self.request.methods[0]]

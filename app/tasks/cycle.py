@@ -7,6 +7,7 @@ from typing import Literal
 
 from app.convert.cycle import to_cycle_response, to_work_round
 from app.convert.cycle_csv import to_cycle_csv
+from app.convert.round_arms import arms_of_moves
 from app.convert.solution import to_optimize_response
 from app.engine.listening import listener
 from app.engine.result import TaskResult
@@ -29,10 +30,12 @@ class CycleTask:
         """The answer of `POST /cycle`, within about `deadline` seconds."""
         found = optimize_round(to_work_round(self.request, deadline), tell=listener())
         collector = AnswerCollector()
-
-        def store(solution: Solution) -> str:
-            return collector.add(to_optimize_response(self.request, self.request_id, certified(solution)))
-
         if self.wanted == "csv":
             return TaskResult.of_csv(to_cycle_csv(found))
+        arms = iter(arms_of_moves(self.request, found))
+
+        def store(solution: Solution) -> str:
+            answer = to_optimize_response(self.request, self.request_id, certified(solution), next(arms))
+            return collector.add(answer)
+
         return TaskResult.of_json(to_cycle_response(self.request, self.request_id, found, store), collector.stored)

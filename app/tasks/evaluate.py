@@ -44,12 +44,12 @@ class EvaluateTask:
         """The answer of `POST /evaluate`, within about `deadline` seconds. Raises InvalidRequest."""
         # when the request began to wait for a worker
         began = Deadline.after(deadline - self.longest)
-        robot, result = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
+        asked, result = self._evaluate_csv(began) if self.kind == "csv" else self._evaluate_json(began)
         if self.wanted == "csv":
             return TaskResult.of_csv(to_csv_table(result))
-        return TaskResult.of_json(to_evaluate_response(self.request_id, robot, result))
+        return TaskResult.of_json(to_evaluate_response(self.request_id, asked, result))
 
-    def _evaluate_csv(self, began: Deadline) -> tuple[str, Evaluation]:
+    def _evaluate_csv(self, began: Deadline) -> tuple[EvaluateSettings, Evaluation]:
         settings = csv_settings(self.query)
         end = self._end(settings, began, "query")
         try:
@@ -61,15 +61,15 @@ class EvaluateTask:
             if isinstance(error, InvalidTable | OutsideLimits):
                 raise  # about the motion
             raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
-        return settings.robot, result
+        return settings, result
 
-    def _evaluate_json(self, began: Deadline) -> tuple[str, Evaluation]:
+    def _evaluate_json(self, began: Deadline) -> tuple[EvaluateSettings, Evaluation]:
         if self.query:
             raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
-        return request.robot, evaluated(request, self._end(request, began, "body"))
+        return request, evaluated(request, self._end(request, began, "body"))
 
     def _end(self, asked: EvaluateSettings, began: Deadline, where: str) -> Deadline:
         """Raises InvalidRequest, with the part `where` of the request, if it asks for more than it may."""

@@ -65,7 +65,7 @@ class JobRequestTask:
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
     request = EvaluateRequest.model_validate_json(body)
     evaluation = evaluated(request, Deadline.after(deadline))
-    return TaskResult.of_json(to_evaluate_response(request_id, request.robot, evaluation))
+    return TaskResult.of_json(to_evaluate_response(request_id, request, evaluation))
 
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.convert.arm_fields import arm_fields
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
 from app.engine.listening import listener
@@ -23,4 +24,5 @@ class OptimizeTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
         solution = certified(optimize(to_problem(self.request, deadline), tell=listener()))
-        return TaskResult.of_kept_json(to_optimize_response(self.request, self.request_id, solution))
+        arm = arm_fields(self.request)
+        return TaskResult.of_kept_json(to_optimize_response(self.request, self.request_id, solution, arm))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import Any, Literal
 
+from app.convert.arm_fields import arm_fields
 from app.convert.fields import fields
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
@@ -30,7 +31,8 @@ class ParetoTask:
         """The answer of `POST /pareto`, within about `deadline` seconds."""
         front = pareto(to_problem(self.request, deadline), self.request.points, tell=listener())
         collector = AnswerCollector()
-        points = [self._point(point, collector) for point in front.points]
+        arm = arm_fields(self.request)
+        points = [self._point(point, collector, arm) for point in front.points]
         if self.wanted == "csv":
             return TaskResult.of_csv(_table(points), collector.stored)
         return TaskResult.of_json(self._content(front, points), collector.stored)
@@ -45,7 +47,7 @@ class ParetoTask:
             "solver": fields(front, "wall_time", "nlp_solves"),
         }
 
-    def _point(self, point: Solution, collector: AnswerCollector) -> dict[str, Any]:
+    def _point(self, point: Solution, collector: AnswerCollector, arm: dict[str, Any] | None) -> dict[str, Any]:
         energy = point.energy
         totals = {"electrical": energy.electrical.total, "mechanical": energy.mechanical.total}
         return {
@@ -58,7 +60,7 @@ class ParetoTask:
             **fields(point, "lower_bound", "status"),
             "certified": point.certificate.valid,
             "worst_ratio": max(point.certificate.worst_ratio.values()),
-            "answer": collector.add(to_optimize_response(self.request, self.request_id, point)),
+            "answer": collector.add(to_optimize_response(self.request, self.request_id, point, arm)),
         }
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from app.convert.arm import to_arm
+from app.convert.arm_fields import arm_fields
 from app.convert.evaluation import to_evaluate_response, to_motion
 from app.convert.request import to_problem
 from app.convert.solution import certificate_fields, to_optimize_response
@@ -89,7 +90,7 @@ class _Optimized(_Work):
         problems = [self._problem(asked, k) for k in range(len(self.request.changes))]
         base = certified(_located(lambda: optimize(first), "optimize"))
         content = {
-            "answer": self.collector.add(to_optimize_response(asked, self.request_id, base)),
+            "answer": self.collector.add(to_optimize_response(asked, self.request_id, base, arm_fields(asked))),
             "status": base.status,
             "holds": True,
             **quantities(base.energy, base.duration),
@@ -132,8 +133,9 @@ class _Optimized(_Work):
         self, asked: OptimizeRequest, change: Change, content: dict[str, Any], found: Changed, best: Solution
     ) -> dict[str, Any]:
         change_of_energy = best.energy.of(asked.objective) - found.same_motion.of(asked.objective)
+        changed = _changed(asked, change)
         outcome = {
-            "answer": self.collector.add(to_optimize_response(_changed(asked, change), self.request_id, best)),
+            "answer": self.collector.add(to_optimize_response(changed, self.request_id, best, arm_fields(changed))),
             "status": best.status,
             **differences(content, best.energy, best.duration),
         }
@@ -151,7 +153,7 @@ class _Evaluated(_Work):
         arms = [self._arm(asked, k) for k in range(len(self.request.changes))]
         base = _located(lambda: self._evaluate(arm, asked), "evaluate")
         content = {
-            "answer": self.collector.add(to_evaluate_response(self.request_id, asked.robot, base)),
+            "answer": self.collector.add(to_evaluate_response(self.request_id, asked, base)),
             "status": None,
             "holds": _holds(base),
             **quantities(base.total.energy, base.total.duration),
@@ -178,7 +180,7 @@ class _Evaluated(_Work):
         same = {
             "holds": _holds(found),
             "certificate": None,
-            "answer": self.collector.add(to_evaluate_response(self.request_id, asked.robot, found)),
+            "answer": self.collector.add(to_evaluate_response(self.request_id, _changed(asked, change), found)),
             **differences(content, found.total.energy, found.total.duration),
         }
         return self.row(change, same_motion=same)

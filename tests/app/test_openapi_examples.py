@@ -111,7 +111,7 @@ def robot(client: TestClient) -> str:
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES])
 def test_body_is_answered(name: str, client: TestClient, study: str, robot: str) -> None:
     operation, media_type, example = BODIES[name]
-    content, url = example["value"], operation.path.format(id=study, name=robot)
+    content, url = example["value"], operation.path.format(id=study, name=robot, format=name.split()[-1])
     if media_type == "text/csv":
         # the settings of a CSV file are query parameters, which the example's summary names
         query = re.search(r"\?\S+", example["summary"])

@@ -8,6 +8,7 @@ import numpy as np
 import orjson
 import pytest
 
+from app.convert.arm_fields import arm_fields
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
 from app.schemas.request import OptimizeRequest
@@ -30,7 +31,7 @@ def task() -> RequestTask:
 @pytest.fixture(scope="module")
 def answered(task: RequestTask) -> Json:
     request = OptimizeRequest.model_validate(task.body)
-    content = to_optimize_response(request, "id", optimize(to_problem(request, 10.0)))
+    content = to_optimize_response(request, "id", optimize(to_problem(request, 10.0)), arm_fields(request))
     answer: Json = orjson.loads(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY))
     return answer
 

@@ -277,3 +277,28 @@ class DeadlineExceeded(_SearchError):
     type: Literal["/problems/deadline-exceeded"] = fixed("type", "/problems/deadline-exceeded")
     title: Literal["Deadline exceeded"] = fixed("title", "Deadline exceeded")
     status: Literal[504] = fixed("status", 504)
+
+
+class NotCertified(ProblemDetails):
+    """The motion of an answer that is to be exported failed its certificate, which is computed again: it exceeds a
+    limit of the arm, touches something, does not stand still at its ends, or its samples are not those of its spline
+    on this arm. Export the answer as the service gave it, with the arm that it was computed for. If the robot's figures
+    have changed since, optimise again. A motion that `POST /evaluate` finds beyond a limit cannot be exported."""
+
+    type: Literal["/problems/not-certified"] = fixed("type", "/problems/not-certified")
+    title: Literal["Motion not certified"] = fixed("title", "Motion not certified")
+    status: Literal[422] = fixed("status", 422)
+    move: int = described("Index of the move, from 0; 0 for an answer that is one move.", None, 0)
+    worst_ratio: dict[str, float] = described(
+        "Largest value / limit, for each limit; empty if the certificate was not reached.", "1", {"velocity": 1.31}
+    )
+
+
+class FormatUnsuitable(ProblemDetails):
+    """The motion cannot be written in this format: the robot has another number of joints or another maker's
+    controller, or the file would be too large. `detail` says which formats or options remain."""
+
+    type: Literal["/problems/format-unsuitable"] = fixed("type", "/problems/format-unsuitable")
+    title: Literal["Format unsuitable"] = fixed("title", "Format unsuitable")
+    status: Literal[422] = fixed("status", 422)
+    format: str = described("The format.", None, "urscript")

@@ -7,6 +7,7 @@ from fastapi.openapi.models import Example
 from app.schemas.examples.compare import COMPARE_EXAMPLES
 from app.schemas.examples.cycle import CYCLE_EXAMPLES
 from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
+from app.schemas.examples.export import EXPORT_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
@@ -23,6 +24,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/cycle": {JSON: CYCLE_EXAMPLES},
     "/whatif": {JSON: WHATIF_EXAMPLES},
     "/evaluate": {JSON: EVALUATE_EXAMPLES, CSV: CSV_EXAMPLES},
+    "/export/{format}": {JSON: EXPORT_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},

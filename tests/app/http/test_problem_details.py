@@ -40,6 +40,8 @@ ERRORS: list[JoulepathError] = [
     exceptions.StopInCollision("stops/pick", [COLLIDING]),
     exceptions.NoSequence("stops/place", ["left/up/flip"], ["left/up/no_flip"]),
     exceptions.RoundTooShort(5.5, 0.9),
+    exceptions.NotCertified(2, "its velocity is at 1.2 of the limit", {"velocity": 1.2, "torque": np.nan}),
+    exceptions.FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
     exceptions.PathInfeasible(0.5, [exceptions.PathAttempt("left/up/flip", 0.6, "singular")]),
 ]
 
@@ -61,6 +63,7 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.TooManyBytes, service.TooManyBytesOfClient)),
     *(service.HeadTooLarge(32_768), service.RequestTimeout(10.0)),
     *(kind() for kind in (service.TooManyWaiting, service.UnknownJob)),
+    service.PartsNeeded(["/answers/7b5f3a52"]),
     *(kind() for kind in (service.JobNotCancellable, service.TooManyDeaths)),
 ]
 

@@ -1,0 +1,20 @@
+"""The arm of a request, for its answer: whoever gets the answer can compute with the same arm."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import orjson
+
+from app.schemas.arm import ArmRequest
+
+LARGEST = 1 << 16
+"""Largest arm [byte of JSON] that is repeated: a front repeats it a hundred times."""
+_NAMES = set(ArmRequest.model_fields) - {"robot"}
+
+
+def arm_fields(request: ArmRequest, **instead: Any) -> dict[str, Any] | None:
+    """The fields of the arm that the request sets, without its robot; None if they are large. `instead` replaces
+    some."""
+    content = request.model_dump(mode="json", exclude_unset=True, include=_NAMES) | instead
+    return content if len(orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)) <= LARGEST else None

@@ -1,0 +1,194 @@
+"""From an answer to the program that is exported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.convert.arm import to_arm
+from app.exceptions import InvalidRequest
+from app.schemas.arm import ArmRequest
+from app.schemas.common import RobotName
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+from optimizer.exports.certified import check_samples
+from optimizer.exports.program import Move, Program, Rest
+from optimizer.problem.arm import Arm
+from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
+from optimizer.replay.sampler import MOST_SAMPLES
+from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.through_samples import spline_through
+
+MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
+# of a stop: a move, two lines, a dwell and a wait
+MOST_LEGS = 5 * MOST_STOPS + 5
+_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Row = Annotated[list[_Number], Field(min_length=1, max_length=16)]
+
+
+class _Part(BaseModel):
+    """A part of an answer. Other fields are not looked at."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class _Spline(_Part):
+    degree: Annotated[int, Field(ge=1, le=HIGHEST_DEGREE)]
+    knots: Annotated[list[_Number], Field(min_length=4, max_length=MOST_KNOTS)]
+    control_points: Annotated[list[_Row], Field(min_length=2, max_length=MOST_KNOTS)]
+
+
+class _Samples(_Part):
+    t: Annotated[list[_Number], Field(min_length=2, max_length=MOST_SAMPLES)]
+    q: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
+    v: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
+    a: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
+    tau: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
+
+    def arrays(self) -> tuple[Array, Array, Array, Array]:
+        """q, v, a, tau (k, nq)."""
+        return tuple(_array(rows, "samples") for rows in (self.q, self.v, self.a, self.tau))  # type: ignore[return-value]
+
+
+class _Trajectory(_Samples):
+    spline: _Spline
+
+
+class _Planned(_Part):
+    """An answer of `POST /optimize`."""
+
+    robot: RobotName
+    trajectory: _Trajectory
+    arm: dict[str, Any] | None = None
+
+
+class _Given(_Part):
+    """An answer of `POST /evaluate`."""
+
+    robot: RobotName
+    samples: _Samples | None
+    arm: dict[str, Any] | None = None
+
+
+class _Stop(_Part):
+    stop: Annotated[str, Field(max_length=256)]
+
+
+class _Leg(_Part):
+    kind: Literal["move", "line", "dwell", "wait"]
+    start: _Stop
+    goal: _Stop
+    duration: Annotated[float, Field(ge=0, le=LONGEST_REST)]
+    answer: str | None
+
+
+class _Round(_Part):
+    """An answer of `POST /cycle`."""
+
+    robot: RobotName
+    legs: Annotated[list[_Leg], Field(min_length=1, max_length=MOST_LEGS)]
+
+
+_A_FRONT = "points"
+_MOTION = "answer must be one of POST /optimize, of POST /cycle, or of POST /evaluate with sample_period"
+
+
+def to_program(answer: dict[str, Any], arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
+    """The motion of an answer at full speed, its samples checked.
+
+    `kept` gives the kept answers of paths: those of the moves of a round. Raises ValidationError (of pydantic),
+    InvalidRequest, InvalidProblem, NotCertified or UnknownRobot.
+    """
+    if "legs" in answer:
+        return _round(_Round.model_validate(answer), arm, kept)
+    if "trajectory" in answer or "samples" in answer:
+        return Program((_move(answer, arm, "move"),))
+    if _A_FRONT in answer:
+        raise InvalidProblem("answer", "The answer is a front: export one of its points, by its `answer`.")
+    raise InvalidProblem("answer", f"{_MOTION}: it has no `trajectory`, `legs` or `samples`.")
+
+
+def paths_of_moves(answer: dict[str, Any]) -> list[str]:
+    """The paths of the answers of a round's moves; empty for another answer. Raises ValidationError or
+    InvalidProblem."""
+    if "legs" not in answer:
+        return []
+    legs = [leg for leg in _Round.model_validate(answer).legs if leg.kind in ("move", "line")]
+    if any(leg.answer is None for leg in legs):
+        raise InvalidProblem("answer", "The moves of the round are not kept: send the round to POST /cycle again.")
+    return [leg.answer for leg in legs if leg.answer is not None]
+
+
+def _round(found: _Round, arm: ArmRequest | None, kept: Callable[[list[str]], list[Any]]) -> Program:
+    if arm is not None:
+        raise InvalidProblem("arm", "The moves of a round have arms of their own: leave `arm` out.")
+    moves = iter(kept([leg.answer for leg in found.legs if leg.answer is not None]))
+    steps = list[Move | Rest]()
+    for leg in found.legs:
+        if leg.kind in ("move", "line"):
+            steps.append(_move(next(moves), None, f"{leg.start.stop} to {leg.goal.stop}"))
+        else:
+            steps.append(Rest(leg.duration, f"{leg.kind} at {leg.goal.stop}"))
+    return Program(tuple(steps))
+
+
+def _move(answer: dict[str, Any], arm: ArmRequest | None, label: str) -> Move:
+    if "trajectory" in answer:
+        planned = _Planned.model_validate(answer)
+        made = _arm(planned.robot, planned.arm, arm)
+        return _checked(Move(_spline(planned.trajectory.spline, made.robot.nq), made, label), planned.trajectory)
+    given = _Given.model_validate(answer)
+    if given.samples is None:
+        raise InvalidProblem("answer", "The answer has no samples: ask POST /evaluate for them by sample_period.")
+    made = _arm(given.robot, given.arm, arm)
+    return _checked(Move(_through(given.samples, made.robot.nq), made, label), given.samples)
+
+
+def _checked(move: Move, samples: _Samples) -> Move:
+    """The move. Raises NotCertified unless the samples are its own."""
+    check_samples(move, np.array(samples.t), samples.arrays())
+    return move
+
+
+def _arm(robot: str, own: dict[str, Any] | None, instead: ArmRequest | None) -> Arm:
+    if instead is not None:
+        if "robot" in instead.model_fields_set and instead.robot != robot:
+            raise InvalidProblem("arm.robot", f"The answer is of the robot {robot}: leave arm.robot out.")
+        return to_arm(instead.model_copy(update={"robot": robot}))
+    if own is None:
+        raise InvalidProblem("arm", "The answer does not say which arm it is of: give `arm`, as in its request.")
+    return to_arm(ArmRequest.model_validate({**own, "robot": robot}))
+
+
+def _spline(given: _Spline, nq: int) -> Spline:
+    """Raises InvalidRequest unless it is a clamped B-spline of the robot's joints."""
+    knots, points, ends = np.array(given.knots), _array(given.control_points, "control_points"), given.degree + 1
+    if points.shape[1] != nq:
+        raise _wrong("control_points", f"Every row must have {nq} numbers, one per joint of the robot")
+    if len(knots) != len(points) + ends or len(points) < ends:
+        raise _wrong("knots", "There must be degree + 1 more knots than control points")
+    inner = knots[ends:-ends]
+    clamped = (knots[:ends] == 0).all() and (knots[-ends:] == knots[-1]).all()
+    if not clamped or (np.diff(knots) < 0).any() or ((inner <= 0) | (inner >= knots[-1])).any():
+        raise _wrong("knots", "The knots must increase from degree + 1 zeros to degree + 1 times the duration")
+    return Spline(given.degree, knots, points)
+
+
+def _through(samples: _Samples, nq: int) -> Spline:
+    t, (q, v, a, _) = np.array(samples.t), samples.arrays()
+    if any(rows.shape != (len(t), nq) for rows in (q, v, a)) or t[0] != 0 or (np.diff(t) < 1e-6).any():
+        raise InvalidProblem("answer", f"samples must have {nq} joints, as many rows as times, and times from 0 on.")
+    return spline_through(t, q, v, a)
+
+
+def _array(rows: list[list[float]], name: str) -> Array:
+    if any(len(row) != len(rows[0]) for row in rows):
+        raise _wrong(name, "Every row must have one number per joint")
+    return np.array(rows, dtype=float)
+
+
+def _wrong(name: str, message: str) -> InvalidRequest:
+    return InvalidRequest([{"loc": ["body", "answer", name], "msg": message}])

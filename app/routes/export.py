@@ -1,0 +1,105 @@
+"""POST /export/{format}."""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Request, Response
+
+from app.exceptions import PartsNeeded
+from app.http.disconnect import unless_disconnected
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
+from app.routes.problem_lists import WORKER_PROBLEMS
+from app.schemas import errors as problems
+from app.schemas.export import FORMATS, ExportFormat, ExportRequest
+from app.store import answers
+from app.store.store import Store
+from app.tasks.arm_engine import ArmEngine
+from app.tasks.export import ExportResult, ExportTask
+
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
+
+_PREFIX = "/answers/"
+# an id, then the moves of a round
+_LOOK_UPS = 2
+_NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9._-]")
+_FORMAT = Path(
+    description="The format. " + " ".join(f"`{name}`: {text}" for name, text in FORMATS.items()),
+    examples=["urscript"],
+    json_schema_extra={"x-enum-descriptions": {str(name): text for name, text in FORMATS.items()}},
+)
+_MEDIA_TYPES = ("text/plain", "application/yaml", "application/json", "text/csv", "application/octet-stream")
+_HEADERS = {
+    "Content-Disposition": "`attachment`, with a name for the file.",
+    "Joulepath-Speed-Scale": "Fraction of the speed: `speed_scale` of the request.",
+    "Joulepath-Worst-Ratio": "Largest value / limit of the exported motion, by its certificate, computed anew.",
+    "Joulepath-Notes": "Sentences on the file, separated by `; `: how far it deviates, and what it leaves out.",
+}
+_FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The file.",
+        "content": {
+            media: {"schema": {} if media == "application/json" else {"type": "string"}} for media in _MEDIA_TYPES
+        },
+        "headers": {name: {"description": text, "schema": {"type": "string"}} for name, text in _HEADERS.items()},
+    }
+}
+
+
+@router.post(
+    "/export/{format}",
+    summary="A motion as a program or file for a controller",
+    response_class=Response,
+    responses={
+        **_FILE,
+        **problem_responses(*WORKER_PROBLEMS, problems.UnknownAnswer, problems.NotCertified, problems.FormatUnsuitable),
+    },
+)
+async def export(
+    request: Request,
+    format: Annotated[ExportFormat, _FORMAT],
+    body: ExportRequest,
+    settings: ServiceSettings,
+    engine: ServiceArmEngine,
+    store: ServiceStore,
+) -> Response:
+    """Writes the motion of an answer as a file for a robot controller. The certificate of the motion is computed again,
+    for the speed asked for: what fails it is not exported. No format was run on hardware."""
+    as_json = "application/json" in request.headers.get("accept", "").lower()
+    task = ExportTask(body, format, as_json, request.state.id)
+    work = _with_parts(task, engine, store, settings.max_deadline)
+    return _response(await unless_disconnected(request, work))
+
+
+async def _with_parts(task: ExportTask, engine: ArmEngine, store: Store, deadline: float) -> ExportResult:
+    """The task's result, once it has the kept answers that it needs. Raises what it raises, and UnknownAnswer."""
+    for _ in range(_LOOK_UPS + 1):
+        try:
+            result = await engine.run(task, deadline)
+        except PartsNeeded as needed:
+            found = {name: await _kept(store, name) for name in dict.fromkeys(needed.names)}
+            task = task.with_kept(found)
+        else:
+            assert isinstance(result, ExportResult)
+            return result
+    raise AssertionError("an answer needs its own parts only")
+
+
+async def _kept(store: Store, name: str) -> bytes:
+    _, body = await store.read(partial(answers.get, answer_id=name.removeprefix(_PREFIX)))
+    return body
+
+
+def _response(result: ExportResult) -> Response:
+    name = _NOT_IN_A_NAME.sub("_", result.name)
+    values = (
+        f'attachment; filename="{name}"',
+        f"{result.speed_scale:g}",
+        f"{result.worst_ratio:.6f}",
+        "; ".join(result.notes),
+    )
+    return Response(result.document, headers=dict(zip(_HEADERS, values, strict=True)), media_type=result.media_type)

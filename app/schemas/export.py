@@ -1,0 +1,217 @@
+"""What `POST /export/{format}` takes."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from app.schemas.arm import ArmRequest
+from app.schemas.common import Request, described
+from app.schemas.examples.values import ANSWER_ID
+
+
+class ExportFormat(StrEnum):
+    """Formats of `POST /export/{format}`."""
+
+    URSCRIPT = "urscript"
+    ROS2 = "ros2"
+    MOVEIT = "moveit"
+    FRANKA = "franka"
+    RAPID = "rapid"
+    KRL = "krl"
+    CSV = "csv"
+    JSON = "json"
+    NPZ = "npz"
+
+
+FORMATS: dict[ExportFormat, str] = {
+    ExportFormat.URSCRIPT: "A program for Universal Robots controllers that follows the spline with servoj.",
+    ExportFormat.ROS2: "A FollowJointTrajectory goal or a JointTrajectory for ros2_control, as YAML or for rosbridge.",
+    ExportFormat.MOVEIT: "A RobotTrajectory for MoveIt, as YAML or JSON.",
+    ExportFormat.FRANKA: "A table at 1 kHz for robots of Franka, or a motion generator for libfranka.",
+    ExportFormat.RAPID: "A module for ABB controllers, which hold the times only roughly; the file says how far.",
+    ExportFormat.KRL: "A program for KUKA controllers, which hold the times only roughly; the file says how far.",
+    ExportFormat.CSV: "A table of samples: t, q, v, a. `POST /evaluate` reads it.",
+    ExportFormat.JSON: "The splines themselves, with payloads and rests.",
+    ExportFormat.NPZ: "Arrays for NumPy: samples and splines.",
+}
+"""What each format is: the OpenAPI document has it as `x-enum-descriptions`."""
+
+Period = Annotated[float, Field(ge=1e-4, le=1.0)]
+Encoding = Literal["yaml", "json"]
+ENCODING = "`yaml` or `json`. Null: `json` if the header `Accept` asks for it, else `yaml`."
+
+
+class TableOptions(Request):
+    """Options of `csv` and `npz`."""
+
+    period: Period = described("Time between two rows.", "s", 0.004, default=0.008)
+
+
+class UrscriptOptions(Request):
+    """Options of `urscript`."""
+
+    rate: Literal[500, 125] = described(
+        "Rate of the controller: 500 for e-series and later, 125 for CB3.", "Hz", 125, default=500
+    )
+    form: Literal["polynomials", "points"] = described(
+        "`polynomials`: the controller evaluates the spline. `points`: the program has every set point.",
+        None,
+        "points",
+        default="polynomials",
+    )
+    lookahead_time: float = described(
+        "servoj's `lookahead_time`: larger is smoother and later.", "s", 0.05, default=0.1, ge=0.03, le=0.2
+    )
+    gain: float = described("servoj's `gain`.", "1", 500.0, default=300.0, ge=100, le=2000)
+    digital_output: int | None = described(
+        "Standard digital output that is on from each grasp to the release. Null: none is switched.",
+        None,
+        0,
+        default=None,
+        ge=0,
+        le=7,
+    )
+
+
+class MoveitOptions(Request):
+    """Options of `moveit`."""
+
+    encoding: Encoding | None = described(ENCODING, None, "json", default=None)
+
+
+class Ros2Options(MoveitOptions):
+    """Options of `ros2`. As JSON, it is the whole operation for rosbridge."""
+
+    message: Literal["goal", "trajectory"] = described(
+        "`goal`: of control_msgs/action/FollowJointTrajectory. `trajectory`: trajectory_msgs/msg/JointTrajectory.",
+        None,
+        "trajectory",
+        default="goal",
+    )
+    controller: str = described(
+        "Name of the controller's node.",
+        None,
+        "scaled_joint_trajectory_controller",
+        default="joint_trajectory_controller",
+        min_length=1,
+        max_length=128,
+        pattern=r"^[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*$",
+    )
+
+
+class FrankaOptions(Request):
+    """Options of `franka`."""
+
+    form: Literal["csv", "cpp"] = described(
+        "`csv`: a table with t, q and v. `cpp`: a C++ header with a motion generator.", None, "cpp", default="csv"
+    )
+
+
+class PointsOptions(Request):
+    """Options that `rapid` and `krl` share."""
+
+    tolerance: float = described(
+        "Deviation from the spline that the number of points is chosen for. The file says what is reached.",
+        "rad",
+        0.002,
+        default=0.005,
+        ge=1e-4,
+        le=0.1,
+    )
+    signs: Annotated[list[Literal[1, -1]], Field(min_length=1, max_length=16)] | None = described(
+        "Sense of the controller's axes against the joints of the robot's model, one per joint. Null: the same.",
+        None,
+        [1, -1, 1, 1, 1, 1],
+        default=None,
+    )
+    offsets: Annotated[list[Annotated[float, Field(ge=-360, le=360)]], Field(min_length=1, max_length=16)] | None = (
+        described(
+            "Position of the controller's axes where the model's joints are at zero, one per joint. Null: zero.",
+            "deg",
+            [0.0, -90.0, 90.0, 0.0, 0.0, 0.0],
+            default=None,
+        )
+    )
+
+
+class RapidOptions(PointsOptions):
+    """Options of `rapid`."""
+
+    digital_output: str | None = described(
+        "Name of the output signal that is on from each grasp to the release. Null: none is switched.",
+        None,
+        "doGripper",
+        default=None,
+        pattern=r"^[A-Za-z][A-Za-z0-9_]{0,31}$",
+    )
+
+
+class KrlOptions(PointsOptions):
+    """Options of `krl`."""
+
+    digital_output: int | None = described(
+        "Number of the output that is on from each grasp to the release. Null: none is switched.",
+        None,
+        1,
+        default=None,
+        ge=1,
+        le=4096,
+    )
+
+
+OPTIONS_OF: dict[ExportFormat, str] = {
+    ExportFormat.URSCRIPT: "urscript",
+    ExportFormat.ROS2: "ros2",
+    ExportFormat.MOVEIT: "moveit",
+    ExportFormat.FRANKA: "franka",
+    ExportFormat.RAPID: "rapid",
+    ExportFormat.KRL: "krl",
+    ExportFormat.CSV: "table",
+    ExportFormat.NPZ: "table",
+}
+"""Field with the options of each format that has any."""
+
+
+class ExportRequest(Request):
+    """An answer, and how to export it. Options of other formats than the one in the path are refused."""
+
+    answer: str | dict[str, Any] = described(
+        "A motion: the id (or the path) of a kept answer, or a whole answer, of `POST /optimize`, `POST /cycle` or "
+        "`POST /evaluate` with `sample_period`; a point of a front and a study's iteration by their `answer`.",
+        None,
+        ANSWER_ID,
+    )
+    speed_scale: float = described(
+        "Fraction of the speed: every move is slowed down uniformly and certified again. Rests stay as they are.",
+        "1",
+        0.1,
+        default=1.0,
+        ge=0.01,
+        le=1.0,
+    )
+    arm: ArmRequest | None = described(
+        "The arm of the answer: payload, limits, scene, ... as in its request. Null: what the answer says in `arm`. "
+        "Needed if that is null. Its `robot` is that of the answer. Not for a round.",
+        None,
+        {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
+        default=None,
+    )
+    table: TableOptions | None = described("Options of `csv` and `npz`.", None, {"period": 0.004}, default=None)
+    urscript: UrscriptOptions | None = described("Options of `urscript`.", None, {"digital_output": 0}, default=None)
+    ros2: Ros2Options | None = described("Options of `ros2`.", None, {"message": "trajectory"}, default=None)
+    moveit: MoveitOptions | None = described("Options of `moveit`.", None, {"encoding": "json"}, default=None)
+
+    franka: FrankaOptions | None = described("Options of `franka`.", None, {"form": "cpp"}, default=None)
+    rapid: RapidOptions | None = described("Options of `rapid`.", None, {"tolerance": 0.002}, default=None)
+    krl: KrlOptions | None = described("Options of `krl`.", None, {"tolerance": 0.002}, default=None)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _answer_is_one(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "answer" in data and not isinstance(data["answer"], str | dict):
+            raise PydanticCustomError("answer", "answer must be the id of a kept answer, or a whole answer")
+        return data

@@ -1,0 +1,96 @@
+"""POST /export/{format} in a worker: reads the answer, certifies its motion again, writes the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import orjson
+from pydantic import ValidationError
+
+from app.convert.exported_answer import paths_of_moves, to_program
+from app.convert.exported_file import to_file
+from app.engine.result import TaskResult
+from app.exceptions import InvalidRequest, PartsNeeded
+from app.http.problem_details import invalid_request
+from app.schemas.export import ExportFormat, ExportRequest
+from optimizer.deadline import Deadline, DeadlinePassed, watch
+from optimizer.exceptions import DeadlineExceeded
+from optimizer.exports.certified import certified
+from optimizer.exports.facts import NOT_RUN, ExportedFile
+from optimizer.exports.program import Program
+
+
+@dataclass(frozen=True)
+class ExportResult(TaskResult):
+    """A file, its name, and what its response's headers say: largest ratio to a limit, speed scale, notes."""
+
+    name: str = field(kw_only=True)
+    speed_scale: float = field(kw_only=True)
+    worst_ratio: float = field(kw_only=True)
+    notes: tuple[str, ...] = field(kw_only=True)
+
+
+@dataclass(frozen=True)
+class ExportTask:
+    """A validated request, its format, and its id. `kept` holds kept answers (JSON) by their ids or paths.
+
+    `as_json`: the client accepts JSON.
+    """
+
+    asked: ExportRequest
+    format: ExportFormat
+    as_json: bool
+    request_id: str
+    kept: dict[str, bytes] = field(default_factory=dict)
+
+    def run(self, deadline: float) -> ExportResult:
+        """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise."""
+        try:
+            with watch(Deadline.after(deadline)):
+                program = self._program()
+                certificates = certified(program)
+                file = to_file(self.asked, self.format, self.as_json, program)
+        except DeadlinePassed:
+            raise DeadlineExceeded([]) from None
+        except ValidationError as error:
+            raise invalid_request(error, "body", "answer") from None
+        worst = max(ratio for each in certificates for ratio in each.worst_ratio.values())
+        return _result(program, file, worst)
+
+    def with_kept(self, found: dict[str, bytes]) -> ExportTask:
+        """The same task with more kept answers at hand."""
+        return replace(self, kept=self.kept | found)
+
+    def _program(self) -> Program:
+        given = self.asked.answer
+        answer = self._kept([given])[0] if isinstance(given, str) else given
+        self._kept(paths_of_moves(answer))
+        program = to_program(answer, self.asked.arm, self._kept)
+        return program if self.asked.speed_scale == 1 else program.slowed(self.asked.speed_scale)
+
+    def _kept(self, names: list[str]) -> list[Any]:
+        missing = [name for name in names if name not in self.kept]
+        if missing:
+            raise PartsNeeded(missing)
+        return [_document(self.kept[name]) for name in names]
+
+
+def _document(body: bytes) -> Any:
+    content = orjson.loads(body)
+    if not isinstance(content, dict):
+        raise InvalidRequest([{"loc": ["body", "answer"], "msg": "This kept answer is no motion"}])
+    return content
+
+
+def _result(program: Program, file: ExportedFile, worst: float) -> ExportResult:
+    scale = program.speed_scale
+    name = f"joulepath-{program.robot.name}{'' if scale == 1 else f'-speed-{scale:g}'}.{file.extension}"
+    return ExportResult(
+        file.content,
+        file.media_type,
+        name=name,
+        speed_scale=scale,
+        worst_ratio=worst,
+        notes=(*file.notes, NOT_RUN),
+    )

@@ -1,0 +1,167 @@
+"""`urscript`: a program for the controllers of Universal Robots that follows the spline with servoj.
+
+Syntax and functions are those of the maker's script manual (PolyScope 5, e-series; CB3 has the same):
+https://www.universal-robots.com/manuals/EN/HTML/SW5_20/Content/prod-scriptmanual/G5/servoj_qavt0-008lookahead_time.htm
+servoj controls the arm for `t` seconds and then returns; with t = 0.002 s (CB3: 0.008 s) one call is one period of the
+controller.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.exceptions import FormatUnsuitable
+from optimizer.exports.facts import ExportedFile, check_joints, comment, header, output_note
+from optimizer.exports.pieces import pieces
+from optimizer.exports.program import Move, Program, Timed
+from optimizer.exports.urscript_parts import CHECKS, serving
+from optimizer.problem.arm import Payload
+
+MOST_PIECES = 2_000
+"""Most polynomials of a program: about a megabyte."""
+MOST_POINTS = 20_000
+"""Most set points of a program: about two megabytes."""
+# rounding of the coefficients, 5e-13 rad each, and of the controller's own sums
+SET_POINT_ERROR = 1e-9
+# the arm follows a set point by about `lookahead_time`; further away [rad] it is stopped
+LEAST_TRACKING, TRACKING_TIME = 0.05, 0.1
+
+
+@dataclass(frozen=True)
+class UrscriptOptions:
+    """`rate` [Hz] of the controller: 500 for e-series, 125 for CB3. `form`: the polynomials, which the controller
+    evaluates, or all set points. `lookahead_time` [s] and `gain` are servoj's. `digital_output`, a standard output, is
+    on while the arm carries more than at the start; None switches nothing.
+    """
+
+    rate: Literal[500, 125] = 500
+    form: Literal["polynomials", "points"] = "polynomials"
+    lookahead_time: float = 0.1
+    gain: float = 300.0
+    digital_output: int | None = None
+
+
+def to_urscript(program: Program, options: UrscriptOptions | None = None) -> ExportedFile:
+    """The program. Raises FormatUnsuitable for another kind of robot, and if it were too large."""
+    options = options or UrscriptOptions()
+    check_joints(program, "urscript", 6, "Universal Robots", "robots of Universal Robots, with six joints")
+    _check_size(program, options)
+    fastest = max(
+        float(np.abs(move.spline.curve(np.linspace(0, move.duration, 201), 1)).max()) for move in program.moves
+    )
+    tracking = LEAST_TRACKING + fastest * (options.lookahead_time + TRACKING_TIME)
+    notes = (
+        f"set points every {1000 / options.rate:g} ms by servoj, within {SET_POINT_ERROR:.0e} rad of the spline",
+        f"the arm follows them later by about lookahead_time = {options.lookahead_time:g} s",
+        f"it stops if a joint is more than {tracking:.3f} rad away from its set point",
+        "at the end of a move it waits up to 1 s until every joint is within 0.001 rad",
+        "the speed slider does not slow servoj down: export with a smaller speed_scale for a slow run",
+        *_output_notes(program, options),
+    )
+    degree = max(move.spline.degree for move in program.moves)
+    lines = ["def joulepath():"]
+    lines += [f"  # {line}" for line in header(program, "program for Universal Robots controllers", notes)]
+    lines += [*CHECKS, *serving(options.rate, options.lookahead_time, options.gain, tracking, degree)]
+    lines += ["", *_beginning(program), *_body(program, options, degree), "  stopj(2.0)", "end"]
+    return ExportedFile.of_text("\n".join(lines) + "\n", "text/plain", "script", notes)
+
+
+def numbers(values: Array) -> str:
+    """A list of numbers in positional notation, to 1e-12."""
+    return "[" + ", ".join(_number(x) for x in values) + "]"
+
+
+def _number(x: float) -> str:
+    whole, _, rest = f"{x + 0.0:.12f}".partition(".")
+    return f"{whole}.{rest.rstrip('0') or '0'}"
+
+
+def _check_size(program: Program, options: UrscriptOptions) -> None:
+    if options.form == "points":
+        count, most, what = sum(int(m.duration * options.rate) + 1 for m in program.moves), MOST_POINTS, "set points"
+    else:
+        count, most, what = sum(len(pieces(m.spline)[0]) - 1 for m in program.moves), MOST_PIECES, "polynomials"
+    if count > most:
+        raise FormatUnsuitable(
+            "urscript",
+            f"The program would have {count} {what}, and has at most {most}: export it move by move, or as ros2.",
+        )
+
+
+def _output_notes(program: Program, options: UrscriptOptions) -> tuple[str, ...]:
+    output = options.digital_output
+    if output is None or all(timed.payload is None for timed in program.timed):
+        return output_note(program, output)
+    return (
+        f"standard digital output {output} is on from each grasp to the release",
+        "the gripper has as long as the dwell at the stop",
+    )
+
+
+def _beginning(program: Program) -> list[str]:
+    """Checks, payload, and the slow way to the start."""
+    start = numbers(program.start)
+    return [
+        f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
+        f"  local jp_start = {start}",
+        *_payload(program.payload),
+        "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",
+        '    popup("The arm is not at the start of the motion. Continue moves it there slowly, with no check for '
+        'obstacles.", "joulepath", True, False, blocking=True)',
+        "    movej(jp_start, a=0.3, v=0.2)",
+        "  end",
+        "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",
+        '    jp_stop("The arm did not reach the start of the motion.")',
+        "  end",
+    ]
+
+
+def _payload(payload: Payload) -> list[str]:
+    return [f"  jp_payload({payload.mass:.6f}, {numbers(payload.com)})"]
+
+
+def _body(program: Program, options: UrscriptOptions, degree: int) -> list[str]:
+    lines = list[str]()
+    for timed in program.timed:
+        lines += ["", f"  # {comment(timed.step.label)}, {timed.step.duration:.4f} s"]
+        lines += _switch(timed, options)
+        if not isinstance(timed.step, Move):
+            lines.append(f"  sleep({timed.step.duration:.6f})")
+        elif options.form == "points":
+            lines += _points(timed.step, options.rate)
+        else:
+            lines += _polynomials(timed.step, degree)
+    return lines
+
+
+def _switch(timed: Timed, options: UrscriptOptions) -> list[str]:
+    """Lines for what the arm takes up or puts down before a step."""
+    if timed.payload is None:
+        return []
+    output = (
+        []
+        if options.digital_output is None
+        else [f"  set_standard_digital_out({options.digital_output}, {timed.grasps})"]
+    )
+    return [*output, *_payload(timed.payload)]
+
+
+def _polynomials(move: Move, degree: int) -> list[str]:
+    edges, coefficients = pieces(move.spline)
+    padded = np.zeros((len(coefficients), degree + 1, coefficients.shape[2]))
+    padded[:, : coefficients.shape[1]] = coefficients
+    calls = [
+        f"  jp_piece({begin:.12f}, {end:.12f}, {numbers(each.ravel())})"
+        for begin, end, each in zip(edges[:-1], edges[1:], padded, strict=True)
+    ]
+    return ["  jp_tick = 1", *calls, f"  jp_arrive({numbers(move.spline.control_points[-1])})"]
+
+
+def _points(move: Move, rate: int) -> list[str]:
+    ticks = np.arange(1, int(np.ceil(move.duration * rate - 1e-6)) + 1) / rate
+    q = move.spline.curve(np.minimum(ticks, move.duration))
+    return [*(f"  jp_servo({numbers(row)})" for row in q), f"  jp_arrive({numbers(move.spline.control_points[-1])})"]
