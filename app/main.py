@@ -13,6 +13,7 @@ from starlette.middleware.cors import CORSMiddleware
 from app import __version__
 from app.access.key_ring import KeyRing
 from app.access.start import key_ring
+from app.cluster.link import Cluster
 from app.engine.pool import Engine
 from app.engine.warm_up import warm
 from app.http.authentication import authenticated
@@ -29,10 +30,11 @@ from app.http.request_context import RequestContext
 from app.http.sites import known_host, same_site
 from app.http.transfers import Answers, Bodies, BytesInFlight
 from app.jobs.dispatcher import Dispatcher
-from app.jobs.executor import LocalExecutor
+from app.jobs.executor import ClusterExecutor, Executor, LocalExecutor
 from app.jobs.jobs import Jobs
 from app.routes import (
     answers,
+    cluster,
     compare,
     cycle,
     docs,
@@ -73,6 +75,7 @@ ROUTES = (
     robots,
     health,
     metrics,
+    cluster,
     problems,
     docs,
 )
@@ -113,7 +116,13 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     settings: Settings = app.state.settings
     app.state.engine = engine = Engine(settings, partial(warm, settings.robots))
     app.state.store = store = Store(settings.database_url)
-    dispatcher = Dispatcher(store, LocalExecutor(engine, store), settings)
+    link = None if settings.cluster is None else Cluster(settings.cluster)
+    app.state.cluster = link
+    executor: Executor = LocalExecutor(engine, store, settings.workers_for_jobs)
+    if link is not None:
+        executor = ClusterExecutor(link, store)
+        link.start()
+    dispatcher = Dispatcher(store, executor, settings)
     app.state.jobs = Jobs(store, dispatcher, settings)
     engine.start()
     dispatcher.start()
@@ -121,6 +130,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     opening = asyncio.create_task(store.open())
     yield
     await dispatcher.stop()
+    if link is not None:
+        await link.stop()
     await engine.stop()
     await opening
     await store.close()

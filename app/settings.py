@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Mapping
+from importlib.util import find_spec
 from ipaddress import IPv4Network, IPv6Network
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,6 +15,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 _HOST_NAME = re.compile(r"[A-Za-z0-9._-]+")
 _ORIGIN = re.compile(r"https?://([A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\])(:[0-9]{1,5})?")
+_SCHEDULER = re.compile(r"(tcp|tls)://[A-Za-z0-9._:\[\]-]+:[0-9]{1,5}")
 LONGEST_DEADLINE = 3600.0
 """Longest deadline [s] that any setting allows."""
 
@@ -121,6 +124,11 @@ class Settings(BaseSettings):
         ge=1,
         description="Workers that jobs may use at the same time. Default: one less than there are, at least 1.",
     )
+    cluster: str | None = Field(
+        default=None,
+        description="Scheduler of a Dask cluster that works on jobs, e.g. `tcp://scheduler:8786`. Without one, the "
+        "service's own workers do.",
+    )
     max_waiting: int = Field(
         default=100_000, ge=1, description="Requests of jobs that may wait in the database; further jobs are `busy`."
     )
@@ -187,6 +195,16 @@ class Settings(BaseSettings):
                 )
         return tuple(origin.lower() for origin in origins)
 
+    @field_validator("cluster")
+    @classmethod
+    def _scheduler(cls, address: str | None) -> str | None:
+        if address is not None:
+            if not _SCHEDULER.fullmatch(address):
+                raise ValueError(f"{address!r} is no address of a scheduler: give one as `tcp://scheduler:8786`")
+            if find_spec("distributed") is None:
+                raise ValueError("a cluster needs Dask: install `joulepath[cluster]`")
+        return address
+
     @field_validator("robots")
     @classmethod
     def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -202,10 +220,10 @@ class WrongSettings(Exception):
     """Environment variables that are no settings; the message has a line for each."""
 
 
-def read_settings() -> Settings:
-    """The settings of this environment. Raises WrongSettings."""
+def read_settings(given: Mapping[str, Any] | None = None) -> Settings:
+    """The settings of this environment, and those that are `given`. Raises WrongSettings."""
     try:
-        return Settings()
+        return Settings(**(given or {}))
     except ValidationError as error:
         prefix = Settings.model_config["env_prefix"]
         lines = []

@@ -8,6 +8,7 @@ import click
 
 from app import __version__
 from app.cli.answer import Refused
+from app.cli.cluster_worker import cluster_worker
 from app.cli.cycle import cycle
 from app.cli.evaluate import evaluate
 from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
@@ -41,7 +42,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, cycle, evaluate, robots, keys):
+for command in (serve, optimize, cycle, evaluate, robots, keys, cluster_worker):
     joulepath.add_command(command)
 
 

@@ -67,6 +67,11 @@ class Engine:
         """Whether all workers have been warm once, one is now, and the service is not stopping."""
         return self._was_ready and self.warm_workers > 0 and not self._draining.is_set()
 
+    @property
+    def draining(self) -> bool:
+        """Whether it is stopping."""
+        return self._draining.is_set()
+
     def start(self) -> None:
         """Starts the workers in the background."""
         start_forkserver()

@@ -7,6 +7,7 @@ from app.exceptions.base import InvalidRequest, ServiceError
 from app.exceptions.queue import (
     Busy,
     ClientDisconnected,
+    ClusterUnavailable,
     NotReady,
     Preempted,
     ShuttingDown,
@@ -52,6 +53,7 @@ __all__ = [
     "BodyTooLarge",
     "Busy",
     "ClientDisconnected",
+    "ClusterUnavailable",
     "CrossSite",
     "EmptyStudy",
     "HeadTooLarge",

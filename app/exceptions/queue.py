@@ -56,6 +56,15 @@ class TooManyWaiting(Busy):
     MESSAGE = "Too many requests of jobs wait: send this job again when others have ended, or send a smaller one."
 
 
+class ClusterUnavailable(ServiceError):
+    """The scheduler of the cluster cannot be reached."""
+
+    MESSAGE = (
+        "The scheduler of the cluster does not answer: jobs wait until it does. Requests that are answered at once are "
+        "computed by this service meanwhile."
+    )
+
+
 class NotReady(ServiceError):
     """No worker is warm."""
 

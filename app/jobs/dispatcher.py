@@ -68,7 +68,7 @@ class _Times:
 
 
 class Dispatcher:
-    """Works on jobs with up to `settings.workers_for_jobs` requests at a time.
+    """Works on jobs with as many requests at a time as its executor has slots.
 
     It leases some requests ahead of time, so that no worker waits for the database. Its loop alone reads and writes the
     queue. `now` is the clock of the leases.
@@ -97,8 +97,7 @@ class Dispatcher:
 
     def start(self) -> None:
         """Begins to work in the background."""
-        runners = [self._run() for _ in range(self._settings.workers_for_jobs)]
-        self._tasks = [asyncio.create_task(each) for each in (self._dispatch(), *runners)]
+        self._tasks = [asyncio.create_task(self._dispatch())]
 
     def drain(self) -> None:
         """Stops all work. What was begun waits again."""
@@ -175,7 +174,7 @@ class Dispatcher:
                     logger.exception("unforeseen error")
                 pause = min(2 * pause, _LONGEST_PAUSE)
             await self._rung(pause)
-            if self._ready.qsize() >= self._settings.workers_for_jobs and not self._draining:
+            if self._ready.qsize() >= self._executor.slots and not self._draining:
                 await asyncio.sleep(GATHER)
 
     async def _rung(self, longest: float) -> None:
@@ -191,6 +190,8 @@ class Dispatcher:
         await self._store_outcomes()
         await self._watch()
         await self._report()
+        # one of them dispatches; those beyond the slots find nothing to do
+        self._tasks += [asyncio.create_task(self._run()) for _ in range(self._executor.slots + 1 - len(self._tasks))]
         want = self._most_held - len(self._held)
         if want <= 0 or self._draining:
             return
@@ -208,7 +209,7 @@ class Dispatcher:
     def _most_held(self) -> int:
         """Requests that it may have leased: one for each worker, and some ahead."""
         ahead = max(1, round(AHEAD / max(self._mean_work, AHEAD / MOST_AHEAD)))
-        return self._settings.workers_for_jobs * (1 + ahead)
+        return self._executor.slots * (1 + ahead)
 
     @staticmethod
     def _clock() -> float:

@@ -10,6 +10,7 @@ import orjson
 
 from app.engine.result import json_document
 from app.exceptions import (
+    ClusterUnavailable,
     Preempted,
     ServiceError,
     ShuttingDown,
@@ -41,7 +42,7 @@ async def outcome_of(lease: Lease, executor: Executor, tell: Tell) -> Outcome:
         result = await executor.run(task, lease.deadline, lease.preempted < MOST_PREEMPTIONS, tell)
     except Preempted:
         return Outcome(lease, "waiting", preempted=True)
-    except (ShuttingDown, StoreUnavailable):
+    except (ShuttingDown, StoreUnavailable, ClusterUnavailable):
         return Outcome(lease, "waiting")
     except WorkerDied:
         if lease.deaths + 1 < MOST_DEATHS:

@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from app.access.client import Client
+from app.cluster.link import Cluster
 from app.engine.pool import ClientEngine, Engine
 from app.http.client import client_of
 from app.http.metrics import Metrics
@@ -55,6 +56,13 @@ async def _jobs(request: Request) -> Jobs:
     return jobs
 
 
+async def _cluster(request: Request) -> Cluster | None:
+    cluster: Cluster | None = request.app.state.cluster
+    return cluster
+
+
+ServiceCluster = Annotated[Cluster | None, Depends(_cluster)]
+"""The cluster that works on jobs; None without one."""
 ServiceJobs = Annotated[Jobs, Depends(_jobs)]
 ServiceSettings = Annotated[Settings, Depends(_settings)]
 ServiceMetrics = Annotated[Metrics, Depends(_metrics)]

@@ -104,6 +104,17 @@ class UnknownStudy(ProblemDetails):
     status: Literal[404] = fixed("status", 404)
 
 
+class ClusterUnavailable(ProblemDetails):
+    """The scheduler of the cluster that works on jobs cannot be reached. Jobs are accepted, and wait until it can.
+    Requests that are answered at once are computed by the service itself. Try again after the time [s] in the header
+    `Retry-After`."""
+
+    retry_after: ClassVar[int | None] = 5
+    type: Literal["/problems/cluster-unavailable"] = fixed("type", "/problems/cluster-unavailable")
+    title: Literal["Cluster unavailable"] = fixed("title", "Cluster unavailable")
+    status: Literal[503] = fixed("status", 503)
+
+
 class UnknownJob(ProblemDetails):
     """No job has this id. It never existed, it was deleted, or it ended longer ago than jobs are kept. `GET /jobs`
     lists all jobs."""

@@ -16,7 +16,7 @@ from typing import Any
 from app.access.client import OPERATOR
 from app.engine.result import TaskResult
 from app.engine.task import Task
-from app.exceptions import Preempted, WorkerDied
+from app.exceptions import ClusterUnavailable, Preempted, WorkerDied
 from app.jobs import dispatcher as module
 from app.jobs.dispatcher import LEASE, Dispatcher
 from app.jobs.holder import is_gone, new_holder
@@ -41,8 +41,8 @@ def answer(name: str) -> TaskResult:
 class Work:
     """An executor whose work the test ends."""
 
-    def __init__(self, name: str) -> None:
-        self.name, self.free = name, asyncio.Event()
+    def __init__(self, name: str, slots: int) -> None:
+        self.name, self.slots, self.free = name, slots, asyncio.Event()
         self.begun: list[int] = []
         self.stopped: list[int] = []
         self.stoppable: list[bool] = []
@@ -71,7 +71,7 @@ class Service:
     def __init__(self, name: str, store: Store, workers: int = 1) -> None:
         settings = Settings(workers=workers, job_workers=workers)
         self.moved = timedelta(0)
-        self.work = Work(name)
+        self.work = Work(name, workers)
         self.dispatcher = Dispatcher(store, self.work, settings, lambda: now() + self.moved)
         self.jobs = Jobs(store, self.dispatcher, settings)
 
@@ -319,6 +319,38 @@ def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
         await until(lambda: is_done(service, job_id))
         found = await reports()
         assert len(found) == 3, "what is no news is no event, and the end has none"
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_jobs_wait_until_there_is_a_slot(tmp_path: Path) -> None:
+    """As for a cluster that cannot be reached, and for machines that come and go."""
+
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        service.work.slots = 0
+        job_id = await sent(service, 3)
+        service.dispatcher.start()
+        exchanged = service.dispatcher._exchange
+        rounds = 0
+
+        async def counted() -> None:
+            nonlocal rounds
+            await exchanged()
+            rounds += 1
+
+        service.dispatcher._exchange = counted  # type: ignore[method-assign]
+        service.dispatcher.wake()
+        await until(lambda: rounds >= 2)
+        assert [each.state for each in await requests(store, job_id)] == ["waiting"] * 3
+        service.work.slots = 3
+        service.work.errors = [ClusterUnavailable()]
+        await until(lambda: len(service.work.begun) == 4)
+        service.work.free.set()
+        await until(lambda: is_done(service, job_id))
+        states = [(each.state, each.problem) for each in await requests(store, job_id)]
+        assert states == [("done", None)] * 3, "a lost cluster is no failure"
         await service.dispatcher.stop()
 
     with_store(tmp_path, test)
