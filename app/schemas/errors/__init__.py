@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.schemas.errors.logs import EffortNotUsable, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
     CycleTooShort,
@@ -89,6 +90,10 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     WorkerDied,
     RobotExists,
     TooManyRobots,
+    UnknownLog,
+    LogTooLarge,
+    TooManyLogs,
+    EffortNotUsable,
     KeyReused,
     Unauthenticated,
     RoleTooLow,
@@ -118,6 +123,7 @@ __all__ = [
     "CycleTooShort",
     "DeadlineExceeded",
     "DurationTooShort",
+    "EffortNotUsable",
     "EmptyStudy",
     "GoalInCollision",
     "HeadTooLarge",
@@ -125,6 +131,7 @@ __all__ = [
     "InvalidTable",
     "JobNotCancellable",
     "KeyReused",
+    "LogTooLarge",
     "MalformedHttp",
     "MethodNotAllowed",
     "NoCollisionFreeTrajectory",
@@ -145,12 +152,14 @@ __all__ = [
     "StartInCollision",
     "StopInCollision",
     "StoreUnavailable",
+    "TooManyLogs",
     "TooManyRequests",
     "TooManyRobots",
     "TorqueInfeasible",
     "Unauthenticated",
     "UnknownAnswer",
     "UnknownJob",
+    "UnknownLog",
     "UnknownRobot",
     "UnknownStudy",
     "UnreachablePose",
