@@ -45,6 +45,7 @@ from app.routes import (
     ik_path,
     iterations,
     jobs,
+    logs,
     metrics,
     optimize,
     pareto,
@@ -70,6 +71,7 @@ ROUTES = (
     studies,
     iterations,
     suggest,
+    logs,
     answers,
     export,
     robots,
@@ -140,7 +142,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> None:
     """Adds the middleware, the innermost first."""
     uploads = {
-        "/evaluate|/robots|/robots/[^/]+": settings.max_upload_bytes,
+        "/evaluate|/logs|/robots|/robots/[^/]+": settings.max_upload_bytes,
         "/jobs": settings.max_job_bytes,
         "/studies/[^/]+/iterations|/whatif": settings.max_iteration_bytes,
     }

@@ -111,7 +111,9 @@ class Settings(BaseSettings):
     )
     max_body_bytes: int = Field(default=8_388_608, ge=1024, description="Largest request body [byte].")
     max_upload_bytes: int = Field(
-        default=67_108_864, ge=1024, description="Largest body of `POST /evaluate` [byte]; it goes to a file."
+        default=67_108_864,
+        ge=1024,
+        description="Largest body of `POST /evaluate` and `POST /logs` [byte]; it goes to a file.",
     )
     max_iteration_bytes: int = Field(
         default=1 << 20,
@@ -160,6 +162,11 @@ class Settings(BaseSettings):
         ge=0,
         description="Largest total size [byte], compressed, of stored answers that belong to no study; the oldest are "
         "deleted.",
+    )
+    logs_max_bytes: int = Field(
+        default=1 << 30,
+        ge=0,
+        description="Largest total size of the stored logs [byte], compressed; a further one is `too-many-logs`.",
     )
     answers_max_age: float = Field(
         default=30.0, gt=0, le=36500, description="Age at which an answer that belongs to no study is deleted [days]."

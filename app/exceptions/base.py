@@ -23,6 +23,8 @@ ServiceError
 ├── EmptyStudy          the study has no iteration yet
 ├── RobotExists         the name of a robot is taken
 ├── TooManyRobots       the service holds as many robots of users as it may
+├── UnknownLog          no log has that id
+├── TooManyLogs         the service holds as many bytes of logs as it may
 ├── KeyReused           the Idempotency-Key was used for a different request
 ├── NoKey               the request needs an API key
 │   └── WrongKey        its API key is not valid

@@ -90,6 +90,22 @@ class TooManyRobots(ServiceError):
     MESSAGE = "The service holds as many added robots as it may: delete one that is not used."
 
 
+class UnknownLog(ServiceError):
+    """No log has that id."""
+
+    MESSAGE = "No log has this id: GET /logs lists all logs."
+
+
+class TooManyLogs(ServiceError):
+    """The stored logs and a new one would exceed `limit` bytes."""
+
+    def __init__(self, limit: int) -> None:
+        Exception.__init__(
+            self, f"The stored logs would exceed {limit} bytes, compressed: delete some that are not needed."
+        )
+        self.limit = limit
+
+
 class KeyReused(ServiceError):
     """The Idempotency-Key was used for a different request."""
 

@@ -51,7 +51,8 @@ class UnsupportedMediaType(ServiceError):
 
     MESSAGE = (
         "The header Content-Type declares something else than this path takes: send JSON as application/json, and to "
-        "POST /evaluate also CSV as text/csv. The body is the document itself, not a form with a file."
+        "POST /evaluate also CSV as text/csv, to POST /logs CSV only. The body is the document itself, not a form with "
+        "a file."
     )
 
 

@@ -10,12 +10,13 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 FORM = "application/x-www-form-urlencoded"
 TEXT = "text/plain"
+_CSV_PATHS = ("/evaluate", "/logs")
 
 
 class JsonBody:
     """ASGI middleware: declares a body as JSON if it is declared as a form, as plain text, or not at all.
 
-    `POST /evaluate` looks at such a body itself: it takes CSV, too.
+    `POST /evaluate` and `POST /logs` look at such a body themselves: they take CSV.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -26,7 +27,7 @@ class JsonBody:
         if scope["type"] == "http":
             headers = MutableHeaders(raw=list(scope["headers"]))
             declared = headers.get("content-type", FORM).partition(";")[0].strip().lower()
-            if declared in (FORM, TEXT) and scope["path"] != "/evaluate":
+            if declared in (FORM, TEXT) and scope["path"] not in _CSV_PATHS:
                 headers["content-type"] = "application/json"
                 scope = {**scope, "headers": headers.raw}
         await self._app(scope, receive, send)

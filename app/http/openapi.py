@@ -28,6 +28,7 @@ from app.schemas.errors import (
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest
 from app.schemas.examples import BODY_EXAMPLES
 from app.schemas.jobs import NewJob
+from app.schemas.logs import LogSettings
 from app.settings import Settings
 
 _SECURITY = "apiKey"
@@ -96,7 +97,7 @@ def _document(app: FastAPI, settings: Settings, with_keys: bool) -> dict[str, An
     _, others = models_json_schema(
         [(problem, "serialization") for problem in PROBLEMS]
         # the routes read these bodies themselves, so that FastAPI does not know their schemas
-        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings, NewJob)],
+        + [(model, "validation") for model in (EvaluateRequest, EvaluateCsvSettings, LogSettings, NewJob)],
         ref_template=_REF,
     )
     schemas.update(others["$defs"])

@@ -15,6 +15,7 @@ from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.later import ACCEPTED, ServiceLater, deadlines
 from app.routes.parameters import WantedFormat
 from app.routes.problem_lists import WORKER_PROBLEMS
+from app.routes.query_settings import query_parameters
 from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
@@ -34,19 +35,8 @@ _REF = "#/components/schemas/{model}"
 
 def _openapi() -> dict[str, Any]:
     """The bodies, and the settings of a CSV. FastAPI does not know them, because the body goes to a file unread."""
-    schema = EvaluateCsvSettings.model_json_schema(ref_template=_REF)
-    parameters = [
-        {
-            "name": name,
-            "in": "query",
-            "required": False,
-            "description": f"With a CSV body only, as JSON or a bare word. {content['description']}",
-            "content": {"application/json": {"schema": content}},
-        }
-        for name, content in schema["properties"].items()
-    ]
     return {
-        "parameters": parameters,
+        "parameters": query_parameters(EvaluateCsvSettings, "With a CSV body only. "),
         "requestBody": {
             "required": True,
             "content": {

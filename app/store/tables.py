@@ -85,6 +85,25 @@ class OwnRobot(Table):
     warnings: Mapped[list[str]] = mapped_column(JSON)
 
 
+class StoredLog(Table):
+    """A log of one arm: the file as it was sent, packed with gzip, and the `settings` with which it is read."""
+
+    __tablename__ = "logs"
+    __table_args__ = (Index(None, "created", "id"),)
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    name: Mapped[str | None] = mapped_column(String(NAME_LENGTH))
+    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    created: Mapped[datetime] = mapped_column(Instant)
+    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    settings: Mapped[dict[str, Any]] = mapped_column(JSON)
+    report: Mapped[dict[str, Any]] = mapped_column(JSON)
+    """What was seen in it: the fields of the answer that no column has."""
+    size: Mapped[int]
+    """Size of the body [byte]."""
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
 class Answer(Table):
     """A complete answer of an endpoint: JSON, compressed. An answer of a study or job is deleted with it, any other by
     age and total size."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
 
-import orjson
 from pydantic import ValidationError
 
 from app.convert.arm import to_arm
@@ -15,6 +14,7 @@ from app.convert.evaluation import to_csv_motion, to_csv_table, to_evaluate_resp
 from app.convert.fields import location
 from app.convert.json_text import parsed_json
 from app.convert.motion_csv import MotionCsv
+from app.convert.query import query_values
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.problem_details import invalid_request
@@ -86,13 +86,7 @@ def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluation:
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:
     """Settings from query parameters: each is JSON, or a bare word. Raises InvalidRequest."""
-    given = {}
-    for name, text in query.items():
-        try:
-            given[name] = orjson.loads(text)
-        except orjson.JSONDecodeError:
-            given[name] = text
-    return _validated(lambda: EvaluateCsvSettings.model_validate(given), "query")
+    return _validated(lambda: EvaluateCsvSettings.model_validate(query_values(query)), "query")
 
 
 def _validated(validate: Callable[[], M], where: str) -> M:

@@ -64,7 +64,7 @@ BODIES = {
     for operation in OPERATIONS
     for media_type, name, example in operation.bodies()
 }
-EVALUATE = next(operation for operation in OPERATIONS if operation.path == "/evaluate")
+EVALUATE, LOGS = (next(each for each in OPERATIONS if each.path == path) for path in ("/evaluate", "/logs"))
 
 
 @pytest.fixture
@@ -155,6 +155,16 @@ def test_setting_of_a_csv_file_is_answered(name: str, client: TestClient) -> Non
     answer = client.post("/evaluate", content=CSV, headers={"Content-Type": "text/csv"}, params=query)
     assert answer.status_code == 200, answer.text
     EVALUATE.check(answer)
+
+
+@pytest.mark.parametrize("name", LOGS.parameters("query"))
+def test_setting_of_a_log_is_answered(name: str, client: TestClient) -> None:
+    example = LOGS.parameters("query")[name]
+    query = {name: example if isinstance(example, str) else json.dumps(example)}
+    (_, _, body) = next(LOGS.bodies())
+    answer = client.post("/logs", content=body["value"], headers={"Content-Type": "text/csv"}, params=query)
+    assert answer.status_code == 201, answer.text
+    LOGS.check(answer)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.schemas.errors.logs import EffortNotUsable, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
     CycleTooShort,
@@ -95,6 +96,10 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     WorkerDied,
     RobotExists,
     TooManyRobots,
+    UnknownLog,
+    LogTooLarge,
+    TooManyLogs,
+    EffortNotUsable,
     KeyReused,
     Unauthenticated,
     RoleTooLow,
@@ -125,6 +130,7 @@ __all__ = [
     "CycleTooShort",
     "DeadlineExceeded",
     "DurationTooShort",
+    "EffortNotUsable",
     "EmptyStudy",
     "FormatUnsuitable",
     "GoalInCollision",
@@ -133,6 +139,7 @@ __all__ = [
     "InvalidTable",
     "JobNotCancellable",
     "KeyReused",
+    "LogTooLarge",
     "MalformedHttp",
     "MethodNotAllowed",
     "NoCollisionFreeTrajectory",
@@ -154,12 +161,14 @@ __all__ = [
     "StartInCollision",
     "StopInCollision",
     "StoreUnavailable",
+    "TooManyLogs",
     "TooManyRequests",
     "TooManyRobots",
     "TorqueInfeasible",
     "Unauthenticated",
     "UnknownAnswer",
     "UnknownJob",
+    "UnknownLog",
     "UnknownRobot",
     "UnknownStudy",
     "UnreachablePose",

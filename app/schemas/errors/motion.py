@@ -82,9 +82,9 @@ class OutsideLimits(ProblemDetails):
 
 
 class InvalidTable(ProblemDetails):
-    """The samples of a given motion cannot be read. Possible causes: a value is no finite number, or looks like
-    degrees; the times do not increase; a line has too few or too many columns; the header is missing or unknown; the
-    file is no CSV. Correct the place that `row` and `column` name."""
+    """The samples of a given motion or of a log cannot be read. Possible causes: a value is no finite number, or looks
+    like degrees; the times do not increase; a line has too few or too many columns; the header is missing or unknown;
+    the file is no CSV. Correct the place that `row` and `column` name."""
 
     type: Literal["/problems/invalid-table"] = fixed("type", "/problems/invalid-table")
     title: Literal["Invalid motion table"] = fixed("title", "Invalid motion table")

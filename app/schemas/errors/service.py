@@ -284,8 +284,8 @@ class RequestTimeout(ProblemDetails):
 
 class UnsupportedMediaType(ProblemDetails):
     """The header `Content-Type` declares a body that this path does not take. JSON is `application/json`; the CSV of
-    `POST /evaluate` is `text/csv`. `text/plain`, a form, and no header at all are read as JSON, too. The body is the
-    document itself: `curl --data-binary @file`, not `curl -F file=@file`."""
+    `POST /evaluate` and `POST /logs` is `text/csv`. `text/plain`, a form, and no header at all are read as JSON, too,
+    where a path takes JSON. The body is the document itself: `curl --data-binary @file`, not `curl -F file=@file`."""
 
     type: Literal["/problems/unsupported-media-type"] = fixed("type", "/problems/unsupported-media-type")
     title: Literal["Unsupported media type"] = fixed("title", "Unsupported media type")

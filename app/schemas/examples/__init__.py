@@ -10,6 +10,7 @@ from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.export import EXPORT_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
+from app.schemas.examples.logs import LOG_EXAMPLES
 from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
 from app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from app.schemas.examples.pareto import PARETO_EXAMPLES
@@ -27,6 +28,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/export/{format}": {JSON: EXPORT_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
+    "/logs": {CSV: LOG_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
     "/jobs": {JSON: NEW_JOB_EXAMPLES},

@@ -1,0 +1,20 @@
+"""Settings of a request whose body is a file: query parameters, each JSON or a bare word."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import orjson
+
+
+def query_values(query: Mapping[str, str]) -> dict[str, Any]:
+    """The values of query parameters."""
+    return {name: _value(text) for name, text in query.items()}
+
+
+def _value(text: str) -> Any:
+    try:
+        return orjson.loads(text)
+    except orjson.JSONDecodeError:
+        return text

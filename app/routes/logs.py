@@ -1,0 +1,140 @@
+"""POST /logs, GET /logs, GET and DELETE /logs/{id}."""
+
+from __future__ import annotations
+
+import gzip
+from functools import partial
+from typing import IO, Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from app.exceptions import UnsupportedMediaType
+from app.http.disconnect import unless_disconnected
+from app.http.json_body import FORM, TEXT
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.parameters import LOCATION_HEADER, set_location
+from app.routes.problem_lists import WORKER_PROBLEMS
+from app.routes.query_settings import query_parameters, settings_of
+from app.routes.uploads import upload
+from app.schemas import errors as problems
+from app.schemas.examples.values import LOG_ID
+from app.schemas.logs import LogDetail, LogList, LogPage, LogSettings, LogSummary
+from app.store import logs
+from app.store.tables import StoredLog, new_id, now
+from app.tasks.read_log import ReadLogTask
+
+router = APIRouter(prefix="/logs", tags=["logs"])
+
+LogId = Annotated[str, Path(description="The log's id.", examples=[LOG_ID])]
+_TAKEN = ("text/csv", "application/octet-stream", "application/gzip", "application/x-gzip", "", FORM, TEXT)
+_GZIP = b"\x1f\x8b"
+_SHOWN = tuple(name for name in LogSummary.model_fields if name not in ("tags", "rows", "duration"))
+
+
+@router.post(
+    "",
+    summary="Add a log",
+    status_code=201,
+    response_model=LogDetail,
+    responses={
+        201: {"headers": LOCATION_HEADER},
+        **problem_responses(
+            *WORKER_PROBLEMS,
+            problems.InvalidTable,
+            problems.EffortNotUsable,
+            problems.LogTooLarge,
+            problems.TooManyLogs,
+            problems.UnsupportedMediaType,
+        ),
+    },
+    openapi_extra={
+        "parameters": query_parameters(LogSettings),
+        "requestBody": {"required": True, "content": {"text/csv": {"schema": {"type": "string"}}}},
+    },
+)
+async def add(
+    request: Request,
+    response: Response,
+    settings: ServiceSettings,
+    engine: ServiceArmEngine,
+    store: ServiceStore,
+    client: ServiceClient,
+) -> LogDetail:
+    """Adds a log of one arm, from which its friction, rotors and powers can be identified: a CSV file, plain or packed
+    with gzip. The columns are those of RTDE, of ROS `JointState`, of this service, or what `columns` says."""
+    declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if declared not in _TAKEN:
+        raise UnsupportedMediaType
+    asked = settings_of(LogSettings, request)
+    with upload() as (file, path):
+        async for chunk in request.stream():
+            file.write(chunk)
+        task = ReadLogTask(path, asked, settings.max_upload_bytes, request.state.id)
+        result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+        body = await run_in_threadpool(_packed, file)
+    log = StoredLog(
+        id=new_id(),
+        name=asked.name,
+        robot=asked.robot,
+        created=now(),
+        owner=client.owner,
+        settings=asked.model_dump(mode="json"),
+        report=orjson.loads(result.document),
+        size=len(body),
+        body=body,
+    )
+    detail = _detail(log)
+    await store.write(partial(logs.add, log=log, most=settings.logs_max_bytes))
+    set_location(request, response, f"/logs/{detail.id}", again=False)
+    return detail
+
+
+@router.get(
+    "",
+    summary="List logs",
+    response_model=LogList,
+    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+)
+async def list_logs(page: Annotated[LogPage, Query()], store: ServiceStore) -> LogList:
+    """All logs, newest first, page by page."""
+    found, following = await store.read(partial(logs.page, limit=page.limit, after=page.after))
+    shown = [_detail(log).model_dump(include=set(LogSummary.model_fields)) for log in found]
+    return LogList(logs=[LogSummary(**each) for each in shown], next=following)
+
+
+@router.get(
+    "/{id}",
+    summary="A log",
+    response_model=LogDetail,
+    responses=problem_responses(problems.UnknownLog, problems.StoreUnavailable),
+)
+async def show(id: LogId, store: ServiceStore) -> LogDetail:
+    """What is known of a log: its channels, moves, efforts, and what is odd in it. Not its samples."""
+    return _detail(await store.read(partial(logs.about, log_id=id)))
+
+
+@router.delete(
+    "/{id}",
+    summary="Delete a log",
+    status_code=204,
+    responses=problem_responses(problems.UnknownLog, problems.NotOwner, problems.StoreUnavailable),
+)
+async def delete(id: LogId, store: ServiceStore, client: ServiceClient) -> None:
+    """Deletes a log. What was identified from it stays."""
+    await store.write(partial(logs.delete, log_id=id, client=client), frees=True)
+
+
+def _detail(log: StoredLog) -> LogDetail:
+    own: dict[str, Any] = {name: getattr(log, name) for name in _SHOWN}
+    return LogDetail(**own, tags=log.settings["tags"], **log.report)
+
+
+def _packed(file: IO[bytes]) -> bytes:
+    """What was received, packed with gzip."""
+    file.seek(0)
+    body = file.read()
+    # the fastest level: a client waits
+    return body if body.startswith(_GZIP) else gzip.compress(body, compresslevel=1)

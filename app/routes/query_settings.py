@@ -1,0 +1,45 @@
+"""Settings of a request whose body is a file: query parameters, each JSON or a bare word."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, TypeVar
+
+from fastapi import Request
+from pydantic import ValidationError
+
+from app.convert.query import query_values
+from app.exceptions import InvalidRequest
+from app.http.problem_details import invalid_request
+from app.schemas.common import Request as RequestModel
+
+M = TypeVar("M", bound=RequestModel)
+_REF = "#/components/schemas/{model}"
+
+
+def query_parameters(model: type[RequestModel], condition: str = "") -> list[dict[str, Any]]:
+    """The parameters of an OpenAPI operation whose query has the fields of the model, under a condition in words."""
+    schema = model.model_json_schema(ref_template=_REF)
+    return [
+        {
+            "name": name,
+            "in": "query",
+            "required": False,
+            "description": f"{condition}As JSON or a bare word. {content['description']}",
+            "content": {"application/json": {"schema": content}},
+        }
+        for name, content in schema["properties"].items()
+    ]
+
+
+def settings_of(model: type[M], request: Request) -> M:
+    """The settings in a query. Raises InvalidRequest, also for one that is given twice."""
+    counted = Counter(name for name, _ in request.query_params.multi_items())
+    twice = next((name for name, count in counted.items() if count > 1), None)
+    if twice is not None:
+        loc = twice if twice in model.model_fields else "query"
+        raise InvalidRequest([{"loc": ["query", loc], "msg": "Given more than once: give it once"}])
+    try:
+        return model.model_validate(query_values(request.query_params))
+    except ValidationError as error:
+        raise invalid_request(error, "query") from None

@@ -1,0 +1,160 @@
+"""What the routes under `/logs` take and answer."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from app.schemas.arm import Payload
+from app.schemas.common import NO_CONTROLS, PLAIN, Request, Response, RobotName, Vector3, described, part
+from app.schemas.examples.values import CREATED, LOG_ID
+from app.schemas.lengths import NAME_LENGTH
+from app.schemas.studies import PAGE_PATTERN, Name, Query
+
+EffortMeaning = Literal["current", "torque", "external"]
+_Column = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS)]
+_Columns = Annotated[list[_Column], Field(min_length=1, max_length=16)]
+Tag = Annotated[str, Field(min_length=1, max_length=32, pattern=NO_CONTROLS), PLAIN]
+
+
+class LogColumns(Request):
+    """Names of the columns of a log, as in its header; of joints one each, from base to flange. Null: none."""
+
+    time: _Column = described("Times [s].", None, "time_s")
+    q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
+    v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
+    a: _Columns | None = described("Joint accelerations.", None, ["acc_1", "acc_2"], default=None)
+    current: _Columns | None = described("Motor currents.", None, ["amps_1", "amps_2"], default=None)
+    torque: _Columns | None = described("Motor torques at the joints.", None, ["nm_1", "nm_2"], default=None)
+    effort: _Columns | None = described("Efforts of unknown meaning.", None, ["eff_1", "eff_2"], default=None)
+    temperature: _Columns | None = described("Temperatures of the joints [°C].", None, ["t_1", "t_2"], default=None)
+    power: _Column | None = described("Power drawn from the bus of the arm [W].", None, "watts", default=None)
+
+
+class LogSettings(Request):
+    """The query parameters of a log."""
+
+    robot: RobotName = described("Name of the robot, from `GET /robots`.", None, "ur5e", default="ur5e")
+    name: Name | None = described("A name of your own.", None, "Palletiser, morning", default=None)
+    tags: Annotated[list[Tag], Field(max_length=16)] = described("Tags of your own.", None, ["cold"], default=[])
+    payload: Payload | None = described(
+        "What the arm carried. Null: what the log says (`payload`, `payload_cog_0` …), else nothing.",
+        None,
+        {"mass": 2.0, "com": [0.0, 0.0, 0.06]},
+        default=None,
+    )
+    gravity: Vector3 = described(
+        "Acceleration of gravity in the base frame.", "m/s²", [0.0, 0.0, -9.81], default=[0.0, 0.0, -9.81]
+    )
+    columns: LogColumns | None = described(
+        "Which columns hold what, where their names are not known.",
+        None,
+        {"time": "t", "q": ["q1", "q2", "q3", "q4", "q5", "q6"]},
+        default=None,
+    )
+    units: Literal["rad", "deg"] = described(
+        "Angular unit of positions, velocities and accelerations.", None, "rad", default="rad"
+    )
+    current_units: Literal["A", "mA"] = described("Unit of currents.", None, "A", default="A")
+    effort: Literal["auto", "current", "torque", "external"] = described(
+        "What the efforts are: motor currents, motor torques at the joints, or torques from outside, without gravity. "
+        "`auto` finds it out.",
+        None,
+        "auto",
+        default="auto",
+    )
+
+
+class LogChannel(Response):
+    """A channel of a log."""
+
+    name: str = described("`q1`, `v1`, `a1`, `effort1`, `temperature1`, … or `power`.", None, "effort2")
+    column: str | None = described("Its column in the file; null if it was made from another.", None, "i2")
+    unit: str = described("Its unit.", None, "A")
+    min: float = described("Least value, in this unit.", "SI", -3.2)
+    max: float = described("Greatest value.", "SI", 6.5)
+    noise: float = described("Robust standard deviation of what is above the filter's band.", "SI", 0.03)
+
+
+class LogEffort(Response):
+    """What the efforts of a log are."""
+
+    meaning: EffortMeaning = described("What they are taken for.", None, "current")
+    confidence: float = described(
+        "1 if the slopes are exactly those of this meaning, 0 if they could be another's or do not tell.", "1", 0.9
+    )
+    slope: dict[str, float | None] = described(
+        "Slope of the effort against the torque of the rigid model, with friction beside it, at the two joints next to "
+        "the base that carry most. About 1 / torque constant: current; 1: torque; 0: without gravity. Null: the motion "
+        "does not tell.",
+        "1/A or 1",
+        {"shoulder_lift_joint": 0.1, "elbow_joint": 0.1},
+    )
+
+
+class LogMove(Response):
+    """A part of a log."""
+
+    start: float = described("Time at which it starts, from the start of the log.", "s", 0.5)
+    end: float = described("Time at which it ends.", "s", 2.1)
+    at_rest: bool = described("Whether every joint rests.", None, False)
+
+
+class LogSummary(Response):
+    """A stored log."""
+
+    id: str = described("Id of the log.", None, LOG_ID)
+    name: str | None = described("Its name; null without one.", None, "Palletiser, morning")
+    robot: str = described("Name of the robot.", None, "ur5e")
+    tags: list[str] = described("Its tags.", None, ["cold"])
+    created: datetime = described("Time at which it was added, in UTC.", None, CREATED)
+    owner: str | None = described("Name of the API key that added it; null without one.", None, "press_shop")
+    size: int = described("Its size in the database, compressed.", "byte", 1_200_000)
+    rows: int = described("Rows that were read.", "1", 15_000)
+    duration: float = described("Time from the first row to the last.", "s", 30.0)
+
+
+class LogDetail(LogSummary):
+    """A stored log, and what was seen in it. The samples themselves are not returned."""
+
+    dropped: int = described("Lines that were dropped, because they have too few or too many cells.", "1", 0)
+    rate: float = described("Rows per second of the uniform grid on which the log is used.", "Hz", 500.0)
+    jitter: list[float] = described(
+        "5th and 95th percentile of the deviation of a time step from 1 / rate.", "s", [-1e-4, 1e-4]
+    )
+    payload: float = described("Mass that the arm is taken to have carried.", "kg", 2.0)
+    channels: list[LogChannel] = part("All channels.")
+    effort: LogEffort | None = part("What the efforts are; null if none were logged.")
+    moves: list[LogMove] = part(
+        "Moves and rests, in order. A move of more than 8 s is divided into blocks of about 5 s, with 0.5 s between "
+        "them left out."
+    )
+    warnings: list[str] = described(
+        "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown payload.",
+        None,
+        ["No payload is given or logged: the arm is taken to have carried nothing."],
+    )
+
+
+class LogPage(Query):
+    """The part of the list of logs that is returned."""
+
+    limit: int = described("Largest number of logs in the answer.", "1", 50, default=50, ge=1, le=200)
+    after: str | None = described(
+        "Value of `next` on the previous page. Null: the first page.",
+        None,
+        f"1741944413589793_{LOG_ID}",
+        default=None,
+        pattern=PAGE_PATTERN,
+    )
+
+
+class LogList(Response):
+    """Logs, newest first."""
+
+    logs: list[LogSummary] = part("The logs.")
+    next: str | None = described(
+        "Value of `after` for the next page; null on the last page.", None, f"1741944413589793_{LOG_ID}"
+    )

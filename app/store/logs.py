@@ -1,0 +1,58 @@
+"""Logs of arms. Each function works on a session: `await store.write(partial(add, …))`."""
+
+from __future__ import annotations
+
+from sqlalchemy import and_, func, or_, select
+from sqlalchemy import delete as delete_from
+from sqlalchemy.orm import Session, defer
+
+from app.access.client import Client
+from app.access.rules import check_owner
+from app.exceptions import TooManyLogs, UnknownLog
+from app.store.paging import position_after, position_of
+from app.store.tables import StoredLog, is_id
+
+_LIGHT = defer(StoredLog.body, raiseload=True)
+"""Leaves out the file of a log."""
+
+
+def add(session: Session, log: StoredLog, most: int) -> None:
+    """Adds a log. Raises TooManyLogs if all logs together would exceed `most` bytes."""
+    stored = session.scalar(select(func.sum(StoredLog.size))) or 0
+    if stored + log.size > most:
+        raise TooManyLogs(most)
+    session.add(log)
+
+
+def get(session: Session, log_id: str) -> StoredLog:
+    """A log with its file. Raises UnknownLog."""
+    log = session.get(StoredLog, log_id) if is_id(log_id) else None
+    if log is None:
+        raise UnknownLog
+    return log
+
+
+def about(session: Session, log_id: str) -> StoredLog:
+    """A log without its file. Raises UnknownLog."""
+    log = session.get(StoredLog, log_id, options=[_LIGHT]) if is_id(log_id) else None
+    if log is None:
+        raise UnknownLog
+    return log
+
+
+def page(session: Session, limit: int, after: str | None) -> tuple[list[StoredLog], str | None]:
+    """Up to `limit` logs without their files, newest first, and the `after` of the next page; None on the last page."""
+    query = select(StoredLog).options(_LIGHT).order_by(StoredLog.created.desc(), StoredLog.id.desc()).limit(limit + 1)
+    if after is not None:
+        created, log_id = position_after(after)
+        query = query.where(or_(StoredLog.created < created, and_(StoredLog.created == created, StoredLog.id < log_id)))
+    found = list(session.scalars(query))
+    more, found = len(found) > limit, found[:limit]
+    return found, position_of(found[-1]) if more else None
+
+
+def delete(session: Session, log_id: str, client: Client) -> None:
+    """Deletes a log. Raises UnknownLog or NotOwner."""
+    log = about(session, log_id)
+    check_owner(client, log.owner)
+    session.execute(delete_from(StoredLog).where(StoredLog.id == log.id))

@@ -1,0 +1,39 @@
+"""POST /logs in a worker: reads the file of the received body, and says what is in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.convert.arm import robot_named
+from app.convert.fields import location
+from app.convert.logs import report_fields, to_log_options
+from app.engine.result import TaskResult
+from app.exceptions import InvalidRequest
+from app.schemas.logs import LogSettings
+from optimizer.exceptions import InvalidProblem, InvalidTable
+from optimizer.identification.reading import read
+
+
+@dataclass(frozen=True)
+class ReadLogTask:
+    """A received body in `file`, of at most `most_bytes` after unpacking, and the settings of its request."""
+
+    file: str
+    request: LogSettings
+    most_bytes: int
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The report on the log. `deadline` is not watched: the size of a body bounds the time.
+
+        Raises UnknownRobot, InvalidTable, LogTooLarge, EffortNotUsable or InvalidRequest.
+        """
+        try:
+            robot = robot_named(self.request.robot)
+            reading = read(Path(self.file), robot, to_log_options(self.request, self.most_bytes))
+        except InvalidProblem as error:
+            if isinstance(error, InvalidTable):
+                raise  # about the log
+            raise InvalidRequest([{"loc": location(error, "query"), "msg": str(error)}]) from None
+        return TaskResult.of_json(report_fields(reading))

@@ -1,0 +1,197 @@
+"""Logs of arms over HTTP: added, listed, shown, deleted; broken, too large, too many, and not one's own."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.access.client import Role
+from app.convert.logs import stored_log
+from app.main import create_app
+from app.schemas import errors as problems
+from app.schemas.examples.logs import LOG_EXAMPLES
+from app.schemas.examples.own_arm import ARM
+from app.schemas.logs import LogDetail, LogList
+from app.settings import Settings
+from models.registry import load_robot
+from tests.app.access.test_key_file import add
+from tests.app.live import LOCAL
+from tests.app.routes.test_problems import refused
+from tests.identification_logs import Recording, csv_of, recorded, rigid_torques, truth_of, with_current
+
+ROBOT = load_robot("ur5e")
+TRUTH = truth_of(ROBOT)
+CSV = {"Content-Type": "text/csv"}
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return recorded(ROBOT, TRUTH, moves=3)
+
+
+def test_a_log_is_added_listed_shown_and_deleted(client: TestClient, recording: Recording) -> None:
+    query = {"name": "morning", "tags": '["cold"]', "payload": '{"mass": 0.0, "com": [0, 0, 0]}'}
+    answer = client.post("/logs", content=csv_of(recording), params=query, headers=CSV)
+    assert answer.status_code == 201, answer.text
+    made = LogDetail.model_validate_json(answer.content)
+    assert answer.headers["location"] == f"/logs/{made.id}"
+    assert (made.robot, made.name, made.tags, made.owner) == ("ur5e", "morning", ["cold"], None)
+    assert (made.rows, made.dropped, made.warnings) == (len(recording.time), 0, [])
+    assert made.rate == pytest.approx(125.0) and made.duration == pytest.approx(recording.time[-1])
+    assert made.effort is not None and made.effort.meaning == "current"
+    assert [move.at_rest for move in made.moves] == [move.at_rest for move in recording.moves]
+    by_name = {channel.name: channel for channel in made.channels}
+    assert len(by_name) == 4 * 6 + 1
+    assert (by_name["effort2"].column, by_name["effort2"].unit) == ("i2", "A")
+    # the simulated sensor's
+    assert by_name["effort2"].noise == pytest.approx(0.02, rel=0.2)
+    assert client.get(f"/logs/{made.id}").json() == answer.json()
+    listed = LogList.model_validate_json(client.get("/logs", params={"limit": 1}).content)
+    assert [each.id for each in listed.logs] == [made.id]
+    assert client.delete(f"/logs/{made.id}").status_code == 204
+    refused(client.get(f"/logs/{made.id}"), problems.UnknownLog)
+    refused(client.delete(f"/logs/{made.id}"), problems.UnknownLog)
+    refused(client.get("/logs/no-id"), problems.UnknownLog)
+
+
+def test_what_is_stored_is_read_again_as_it_was(recording: Recording) -> None:
+    log = stored_log({"robot": "ur5e", "tags": [], "effort": "auto"}, gzip.compress(csv_of(recording)))
+    assert np.abs(log.q - recording.q).max() < 1e-7 and log.effort_meaning == "current"
+
+
+def test_pages(client: TestClient) -> None:
+    body = LOG_EXAMPLES["positions"]["value"]
+    made = [client.post("/logs", content=body, headers=CSV).json()["id"] for _ in range(3)]
+    first = client.get("/logs", params={"limit": 2}).json()
+    assert [each["id"] for each in first["logs"]] == made[:0:-1]
+    second = client.get("/logs", params={"limit": 2, "after": first["next"]}).json()
+    assert second["logs"][0]["id"] == made[0]
+    refused(client.get("/logs", params={"after": "nowhere"}), problems.Validation)
+    for each in made:
+        client.delete(f"/logs/{each}")
+
+
+@pytest.mark.parametrize("how", ["Content-Encoding", "Content-Type", "nothing"])
+def test_packed_bodies(client: TestClient, recording: Recording, how: str) -> None:
+    headers = {
+        "Content-Encoding": {"Content-Encoding": "gzip", **CSV},
+        "Content-Type": {"Content-Type": "application/gzip"},
+    }
+    body = gzip.compress(csv_of(recording))
+    answer = client.post("/logs", content=body, headers=headers.get(how, {}))
+    assert answer.status_code == 201, answer.text
+    assert answer.json()["rows"] == len(recording.time)
+    client.delete(answer.headers["location"])
+
+
+def test_an_own_robot(client: TestClient) -> None:
+    assert client.put("/robots/logged", json=ARM).status_code == 201
+    rows = "".join(f"{k / 50},{0.5 * np.sin(k / 20):.6f},{0.3 * np.cos(k / 20):.6f}\n" for k in range(100))
+    answer = client.post("/logs", content="t,q1,q2\n" + rows, params={"robot": "logged"}, headers=CSV)
+    assert answer.status_code == 201 and answer.json()["robot"] == "logged", answer.text
+    client.delete(answer.headers["location"])
+    client.delete("/robots/logged")
+    refused(client.post("/logs", content=rows, params={"robot": "logged"}, headers=CSV), problems.UnknownRobot)
+
+
+def test_broken_logs_name_the_place_and_leave_nothing(client: TestClient, recording: Recording) -> None:
+    before = client.get("/logs").json()
+    lines = csv_of(recording, without="vaP").split(b"\n")
+    lines[9] = lines[9].replace(b",", b",nan,", 1).rpartition(b",")[0]
+    content = refused(client.post("/logs", content=b"\n".join(lines), headers=CSV), problems.InvalidTable)
+    assert (content["row"], content["column"]) == (10, "q1")
+    for body in (b"", b"\x00" * 1000, b"PK\x03\x04", b"{}", gzip.compress(b"no,log")):
+        refused(client.post("/logs", content=body, headers=CSV), problems.InvalidTable)
+    assert client.get("/logs").json() == before
+
+
+WRONG: list[tuple[str, list[str]]] = [
+    ("units=grad", ["query", "units"]),
+    ("robot=ur5e&robot=ur3e", ["query", "robot"]),
+    ("robots=ur5e", ["query", "robots"]),
+    ("gravity=[0,0]", ["query", "gravity"]),
+    ("tags=cold", ["query", "tags"]),
+    ("columns=%7B%22time%22:%22t%22%7D", ["query", "columns", "q"]),
+    ("payload=%7B%22mass%22:-1,%22com%22:[0,0,0]%7D", ["query", "payload", "mass"]),
+]
+
+
+@pytest.mark.parametrize(("query", "loc"), WRONG, ids=[query for query, _ in WRONG])
+def test_wrong_settings(client: TestClient, query: str, loc: list[str]) -> None:
+    content = refused(client.post(f"/logs?{query}", content="t,q1\n", headers=CSV), problems.Validation)
+    assert [error["loc"] for error in content["errors"]] == [loc]
+
+
+def test_efforts_without_gravity(client: TestClient, recording: Recording) -> None:
+    rigid = rigid_torques(ROBOT, TRUTH, recording.exact_q, recording.exact_v, recording.a)
+    body = csv_of(with_current(recording, recording.current - rigid / TRUTH.torque_constant))
+    content = refused(client.post("/logs", content=body, headers=CSV), problems.EffortNotUsable)
+    assert content["meaning"] == "external" and set(content["slope"]) == {"shoulder_lift_joint", "elbow_joint"}
+    answer = client.post("/logs", content=body, params={"effort": "external"}, headers=CSV)
+    assert answer.status_code == 201 and answer.json()["effort"]["meaning"] == "external"
+    client.delete(answer.headers["location"])
+
+
+def test_other_media_types(client: TestClient) -> None:
+    refused(
+        client.post("/logs", content="{}", headers={"Content-Type": "application/json"}), problems.UnsupportedMediaType
+    )
+
+
+def test_limits_of_size_and_number(recording: Recording) -> None:
+    body = csv_of(recording)
+    packed = gzip.compress(body)
+    most = len(body) // 2
+    settings = Settings(workers=1, max_upload_bytes=most, logs_max_bytes=10_000)
+    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as client:
+        refused(client.post("/logs", content=body, headers=CSV), problems.BodyTooLarge)
+        refused(client.post("/logs", content=packed, headers={"Content-Encoding": "gzip"}), problems.BodyTooLarge)
+        # packed without saying so: unpacked by the worker
+        content = refused(client.post("/logs", content=packed, headers=CSV), problems.LogTooLarge)
+        assert content["limit"] == most
+        short = LOG_EXAMPLES["positions"]["value"]
+        made = 0
+        while (answer := client.post("/logs", content=short, headers=CSV)).status_code == 201:
+            made += 1
+        assert 1 <= made < 20
+        assert refused(answer, problems.TooManyLogs)["limit"] == 10_000
+        client.delete(f"/logs/{client.get('/logs').json()['logs'][0]['id']}")
+        assert client.post("/logs", content=short, headers=CSV).status_code == 201
+        for each in client.get("/logs", params={"limit": 200}).json()["logs"]:
+            client.delete(f"/logs/{each['id']}")
+
+
+def test_only_owners_and_admins_delete(tmp_path: Path) -> None:
+    file = tmp_path / "keys.yaml"
+    roles: tuple[tuple[str, Role], ...] = (
+        ("mine", "compute"),
+        ("other", "compute"),
+        ("reader", "read"),
+        ("boss", "admin"),
+    )
+    keys = {name: add(file, name, role) for name, role in roles}
+    settings = Settings(workers=1, api_keys_file=file, database_url=f"sqlite:///{tmp_path / 'logs.db'}")
+    with TestClient(create_app(settings), base_url=LOCAL, raise_server_exceptions=False) as client:
+
+        def as_(name: str) -> dict[str, str]:
+            return CSV | {"Authorization": f"Bearer {keys[name]}"}
+
+        body = LOG_EXAMPLES["positions"]["value"]
+        refused(client.post("/logs", content=body, headers=CSV), problems.Unauthenticated)
+        refused(client.post("/logs", content=body, headers=as_("reader")), problems.RoleTooLow)
+        paths = [client.post("/logs", content=body, headers=as_("mine")).headers["location"] for _ in range(2)]
+        assert client.get(paths[0], headers=as_("reader")).json()["owner"] == "mine"
+        assert refused(client.delete(paths[0], headers=as_("other")), problems.NotOwner)["owner"] == "mine"
+        assert client.delete(paths[0], headers=as_("mine")).status_code == 204
+        assert client.delete(paths[1], headers=as_("boss")).status_code == 204
+
+
+def test_unknown_columns_are_not_echoed(client: TestClient, recording: Recording) -> None:
+    body = csv_of(recording).replace(b"q1", b"SECRET", 1)
+    answer = client.post("/logs", content=body, headers=CSV)
+    refused(answer, problems.InvalidTable)
+    assert b"SECRET" not in answer.content
