@@ -9,10 +9,12 @@ RUN apt-get update \
         binutils ca-certificates gcc libc6-dev libgomp1 python3-venv
 WORKDIR /opt/joulepath
 ENV PATH=/opt/joulepath/venv/bin:$PATH
-COPY requirements.lock scripts/slim.py /tmp/
+# requirements-cluster.lock has what JOULEPATH_CLUSTER needs, too
+ARG LOCK=requirements.lock
+COPY ${LOCK} scripts/slim.py /tmp/
 RUN python3 -m venv venv \
     && pip install --no-cache-dir --no-compile --disable-pip-version-check --require-hashes --no-deps \
-        -r /tmp/requirements.lock \
+        -r /tmp/${LOCK} \
     && pip uninstall --yes --quiet pip setuptools \
     && python /tmp/slim.py venv
 COPY LICENSE ./

@@ -91,6 +91,8 @@ lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml --group dev --constraints requirements.lock --output-file requirements-dev.lock
 	$(LOCK) pyproject.toml --group benchmarks --constraints requirements-dev.lock \
 		--output-file requirements-benchmarks.lock
+	$(LOCK) pyproject.toml --extra cluster --constraints requirements-dev.lock \
+		--output-file requirements-cluster.lock
 	$(LOCK) --group compiler --output-file requirements-compiler.lock
 
 clean:

@@ -10,6 +10,7 @@
 - interactive: wall time of requests that a client waits for, one after another, without and beside a running job.
 - kills: `kill -9` of the service at random instants of a job. Every request must be answered once, and no event may be
   lost or come twice.
+- cluster: overhead of small and of random requests through Dask, with a scheduler and one machine beside the service.
 - cancel: time from a cancel to the end of the process that works on the job.
 """
 
@@ -29,11 +30,12 @@ import numpy as np
 
 from app.schemas.examples.values import HOME, NEAR
 from benchmarks.command import parser, write_json
-from benchmarks.service import START, Client, Service, running
+from benchmarks.service import START, Client, Service, a_cluster, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
 
 MOST_OVERHEAD = 3e-3  # [s] per request
+MOST_CLUSTER_OVERHEAD = 10e-3  # [s] per request
 MOST_BYTES = 60_000  # per request
 MOST_SLOWDOWN = 1.5  # of the 95th percentile
 MOST_CANCEL = 1.0  # [s]
@@ -82,11 +84,12 @@ def processor_time(pid: int) -> float:
     return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
 
 
-def overhead_of(requests: list[Results], workers_for_jobs: int) -> Results:
+def overhead_of(requests: list[Results], workers_for_jobs: int, **environment: str) -> Results:
     """Overhead [s], processor time of the service's own process [s], and bytes on the disk, each per request."""
     with tempfile.TemporaryDirectory() as folder:
         url = f"sqlite:///{folder}/jobs.db"
         settings: dict[str, Any] = {"JOULEPATH_WORKERS": f"{WORKERS}", "JOULEPATH_JOB_WORKERS": f"{workers_for_jobs}"}
+        settings |= environment
         with running(JOULEPATH_DATABASE_URL=url, **settings) as service, closing(service.client()) as client:
             wait(client, send(client, requests[:4]))  # kernels and caches are warm
             empty, used = _size(folder), processor_time(service.process.pid)
@@ -122,19 +125,36 @@ def _seconds(start: str, end: str) -> float:
     return float((np.datetime64(end.rstrip("Z")) - np.datetime64(start.rstrip("Z"))) / np.timedelta64(1, "s"))
 
 
-def overhead(given: Any) -> tuple[Results, bool]:
+def _overheads(given: Any, workers_for_random: int, **environment: str) -> list[Results]:
     """Prints and returns the overhead of small and of random requests."""
     print(f"{'requests':16} {'workers':>8} {'work':>9} {'overhead':>9} {'service':>9} {'on disk':>9}   accepted in")
-    cases = [("small", small(given.small), 1), ("small", small(given.small), WORKERS)]
     rows = []
-    for name, requests, workers in [*cases, ("random", random(given.seed, given.count), 1)]:
-        row = overhead_of(requests, workers)
+    small_ones, random_ones = small(given.small), random(given.seed, given.count)
+    cases = [] if environment else [("small", small_ones, 1)]
+    cases += [("small", small_ones, WORKERS), ("random", random_ones, workers_for_random)]
+    for name, requests, workers in cases:
+        row = overhead_of(requests, workers, **environment)
         rows.append(row)
         times = " ".join(f"{1e3 * row[key]:6.2f} ms" for key in ("work", "overhead", "service_processor_time"))
         end = f"{1e-3 * row['bytes']:6.1f} kB   {row['accepted']:.2f} s"
         print(f"{len(requests)} {name}".ljust(16), f"{workers:8} {times} {end}", flush=True)
+    return rows
+
+
+def overhead(given: Any) -> tuple[Results, bool]:
+    """Prints and returns the overhead of requests in the service's own workers."""
+    rows = _overheads(given, 1)
     held = all(row["overhead"] <= MOST_OVERHEAD and row["bytes"] <= MOST_BYTES for row in rows)
     print(f"goals: overhead at most {1e3 * MOST_OVERHEAD:g} ms, at most {1e-3 * MOST_BYTES:g} kB on the disk")
+    return {"rows": rows}, held
+
+
+def cluster(given: Any) -> tuple[Results, bool]:
+    """Prints and returns the overhead of requests on a cluster of one machine, whose workers are as many."""
+    with a_cluster(WORKERS) as address:
+        rows = _overheads(given, WORKERS, JOULEPATH_CLUSTER=address)
+    held = all(row["overhead"] <= MOST_CLUSTER_OVERHEAD for row in rows)
+    print(f"goal: overhead at most {1e3 * MOST_CLUSTER_OVERHEAD:g} ms")
     return {"rows": rows}, held
 
 
@@ -252,6 +272,7 @@ def _runs(pid: int) -> bool:
 
 SECTIONS: dict[str, Callable[[Any], tuple[Results, bool]]] = {
     "overhead": overhead,
+    "cluster": cluster,
     "interactive": interactive,
     "kills": kills,
     "cancel": cancel,

@@ -149,6 +149,24 @@ def running(ready: bool = True, **environment: str) -> Iterator[Service]:
                 process.wait()
 
 
+@contextlib.contextmanager
+def a_cluster(workers: int) -> Iterator[str]:
+    """A Dask scheduler, whose address this is, and one machine with that many workers."""
+    port = _free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    commands = [
+        ["distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", f"{port}", "--no-dashboard"],
+        ["app.cli", "cluster-worker", address],
+    ]
+    given = os.environ | {"JOULEPATH_WORKERS": f"{workers}", "JOULEPATH_LOG_LEVEL": "error"}
+    with contextlib.ExitStack() as stack:
+        for command in commands:
+            process = subprocess.Popen([sys.executable, "-m", *command], cwd=ROOT, env=given, stderr=subprocess.DEVNULL)
+            stack.callback(process.wait)
+            stack.callback(process.terminate)
+        yield address
+
+
 def _free_port() -> int:
     """A port that no connection of a client gets by chance: Linux gives them ports from 32768 on."""
     for port in random.sample(range(20_000, 32_000), 100):

@@ -80,7 +80,8 @@ class Cluster:
             ended: Ended = await future.result()
         except KilledWorker:
             raise WorkerDied from None
-        except (Cancelled, OSError):
+        except (Cancelled, OSError) as error:
+            logger.warning("the cluster lost a task", extra={"request_id": task.request_id, "reason": str(error)})
             raise ClusterUnavailable from None
         finally:
             del self._tells[key]

@@ -12,6 +12,7 @@ import crossplane
 import pytest
 import yaml
 
+from app.cli.cluster_worker import cluster_worker
 from app.settings import Settings
 from tests.app.live import ROOT
 
@@ -90,6 +91,19 @@ def test_compose_is_not_open(compose: dict[str, Any]) -> None:
             assert "./keys:/etc/joulepath:ro" in service["volumes"]
             subnet = compose["networks"]["front"]["ipam"]["config"][0]["subnet"]
             assert service["environment"]["JOULEPATH_TRUSTED_PROXIES"] == subnet
+
+
+def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
+    """Whoever reaches it can run any code there."""
+    assert compose["networks"]["cluster"] == {"internal": True}
+    members = {name: each for name, each in compose["services"].items() if "cluster" in each.get("networks", ())}
+    assert set(members) == {"joulepath-1", "joulepath-2", "scheduler", "machine-1", "machine-2"}
+    for name, member in members.items():
+        if name.startswith("machine"):
+            assert member["command"][:4] == ["python", "-m", "app.cli", cluster_worker.name]
+            assert member["command"][4] == members["joulepath-1"]["environment"]["JOULEPATH_CLUSTER"]
+            assert member["networks"] == ["cluster"]
+        assert (ROOT / member["build"]["args"]["LOCK"]).exists()
 
 
 def test_the_unit_sets_what_there_is() -> None:

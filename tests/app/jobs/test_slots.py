@@ -1,0 +1,94 @@
+"""The dispatcher and its executor: progress within requests, and slots that come and go."""
+
+from __future__ import annotations
+
+import math
+from datetime import timedelta
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from app.exceptions import ClusterUnavailable
+from app.store import job_events
+from app.store.store import Store
+from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, nobody
+from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until, with_store
+
+
+def test_progress_within_a_long_request_is_an_event(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        job_id = await sent(service, kind="cycle")
+
+        async def reports() -> list[dict[str, Any]]:
+            found, _ = await store.read(partial(job_events.after, job_id=job_id, number=0, limit=100))
+            told = [each.data["requests"] for each in found if each.name == "progress"]
+            return [only for each in told for only in each]
+
+        async def tells(report: dict[str, Any], *events: Event) -> None:
+            for event in events:
+                service.work.tell(event)
+            service.moved += timedelta(seconds=1)
+            await until(lambda: is_told(report))
+
+        async def is_told(report: dict[str, Any]) -> bool:
+            return report in await reports()
+
+        service.dispatcher.start()
+        await until(lambda: service.work.begun == [0])
+        first = {"index": 0, "attempt": 1, "found": None, "bound": None, "solved": 1}
+        await tells(first, CandidatesFound(3), CandidateTried(1, "solved", 1.0, 9.0))
+        best = {"index": 0, "attempt": 1, "found": 9.0, "bound": None, "solved": 1}
+        await tells(best, Improved(9.0, bound=-math.inf), Improved(9.5), CandidateTried(1, "solved", 1.0, 8.0))
+        await tells(best | {"found": 7.0, "bound": 5.0}, Improved(7.0, bound=5.0))
+        service.work.free.set()
+        await until(lambda: is_done(service, job_id))
+        found = await reports()
+        assert len(found) == 3, "what is no news is no event, and the end has none"
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_jobs_wait_until_there_is_a_slot(tmp_path: Path) -> None:
+    """As for a cluster that cannot be reached, and for machines that come and go."""
+
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        service.work.slots = 0
+        job_id = await sent(service, 3)
+        service.dispatcher.start()
+        exchanged = service.dispatcher._exchange
+        rounds = 0
+
+        async def counted() -> None:
+            nonlocal rounds
+            await exchanged()
+            rounds += 1
+
+        service.dispatcher._exchange = counted  # type: ignore[method-assign]
+        service.dispatcher.wake()
+        await until(lambda: rounds >= 2)
+        assert [each.state for each in await requests(store, job_id)] == ["waiting"] * 3
+        service.work.slots = 3
+        service.work.errors = [ClusterUnavailable()]
+        await until(lambda: len(service.work.begun) == 4)
+        service.work.free.set()
+        await until(lambda: is_done(service, job_id))
+        states = [(each.state, each.problem) for each in await requests(store, job_id)]
+        assert states == [("done", None)] * 3, "a lost cluster is no failure"
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_nobody_listens_to_short_requests(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = Service("only", store)
+        await sent(service)
+        service.dispatcher.start()
+        await until(lambda: service.work.begun == [0])
+        assert service.work.tell is nobody
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
