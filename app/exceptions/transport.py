@@ -59,7 +59,7 @@ class UnsupportedMediaType(ServiceError):
 class UnsupportedCoding(ServiceError):
     """The body is packed in a way that the service cannot unpack."""
 
-    MESSAGE = "The header Content-Encoding names something else than gzip or deflate: use one of them, or none."
+    MESSAGE = "The header Content-Encoding names something else than gzip, deflate or zstd: use one of them, or none."
 
 
 class MalformedHttp(ServiceError):

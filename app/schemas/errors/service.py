@@ -294,7 +294,7 @@ class UnsupportedMediaType(ProblemDetails):
 
 class UnsupportedCoding(ProblemDetails):
     """The header `Content-Encoding` names a coding that the service cannot unpack, or several at once. Pack the body
-    with `gzip` or `deflate`, or send it as it is, without this header."""
+    with `gzip`, `deflate` or `zstd`, or send it as it is, without this header."""
 
     type: Literal["/problems/unsupported-coding"] = fixed("type", "/problems/unsupported-coding")
     title: Literal["Unsupported content coding"] = fixed("title", "Unsupported content coding")

@@ -153,6 +153,8 @@ def test_a_strong_etag_becomes_weak_and_a_packed_body_is_left_alone() -> None:
         ("x-gzip", gzip.compress),
         ("deflate", zlib.compress),
         ("identity", bytes),
+        ("zstd", zstandard.compress),
+        ("zstd", lambda body: zstandard.compress(body[:7]) + zstandard.compress(body[7:])),
         ("GZip", lambda body: gzip.compress(body[:7]) + gzip.compress(body[7:])),
     ],
 )
@@ -163,7 +165,7 @@ def test_packed_bodies_are_taken(server: Server, coding: str, pack: Any, path: s
     assert answer.status == 200, content
 
 
-@pytest.mark.parametrize("coding", ["br", "zstd", "gzip, gzip", "compress", "x" * 100])
+@pytest.mark.parametrize("coding", ["br", "zstd, zstd", "gzip, gzip", "compress", "x" * 100])
 def test_other_codings_are_told_so(server: Server, coding: str) -> None:
     answer, content = sent(server, "/ik", b"{}", Content_Encoding=coding)
     assert answer.status == 415
@@ -171,28 +173,46 @@ def test_other_codings_are_told_so(server: Server, coding: str) -> None:
 
 
 WHOLE = gzip.compress(json.dumps(POSE).encode(), mtime=0)
+WHOLE_ZSTD = zstandard.ZstdCompressor(write_checksum=True).compress(json.dumps(POSE).encode())
+# a frame that asks for a window of 128 MiB
+LARGE_WINDOW = b"\x28\xb5\x2f\xfd\x00\x88" + b"\x01\x00\x00"
 
 
 @pytest.mark.parametrize(
-    "body", [WHOLE[:-1], WHOLE[:20], b"", b"{}", WHOLE + b"more", WHOLE[:-8] + b"\0" * 8], ids=range(6)
+    ("coding", "body"),
+    [
+        *(
+            (coding, body)
+            for coding, whole in (("gzip", WHOLE), ("zstd", WHOLE_ZSTD))
+            for body in (whole[:-1], whole[:20], b"", b"{}", whole + b"more", whole[:-4] + b"\0" * 4)
+        ),
+        ("zstd", WHOLE),
+        ("zstd", LARGE_WINDOW),
+    ],
+    ids=range(14),
 )
-def test_damaged_bodies_are_told_so(server: Server, body: bytes) -> None:
-    answer, content = sent(server, "/ik", body, Content_Encoding="gzip")
+def test_damaged_bodies_are_told_so(server: Server, coding: str, body: bytes) -> None:
+    answer, content = sent(server, "/ik", body, Content_Encoding=coding)
     assert answer.status == 422
     assert problems.Validation.model_validate_json(content).errors[0].loc == ["body"]
 
 
+PACKS: dict[str, Any] = {"gzip": gzip.compress, "zstd": zstandard.compress}
+
+
+@pytest.mark.parametrize("coding", PACKS)
 @pytest.mark.parametrize("path", ["/ik", "/evaluate", "/whatif"])
-def test_a_bomb_is_refused(server: Server, path: str) -> None:
-    # a hundred kilobytes that unpack to more than any path takes
-    bomb = gzip.compress(b" " * 80_000_000)
-    answer, content = sent(server, path, bomb, Content_Encoding="gzip")
+def test_a_bomb_is_refused(server: Server, path: str, coding: str) -> None:
+    # a hundred kilobytes at most that unpack to more than any path takes
+    bomb = PACKS[coding](b" " * 80_000_000)
+    answer, content = sent(server, path, bomb, Content_Encoding=coding)
     assert answer.status == 413
     problems.BodyTooLarge.model_validate_json(content)
 
 
-def test_a_bomb_is_never_whole_in_memory() -> None:
-    bomb = gzip.compress(b"\0" * 50_000_000)
+@pytest.mark.parametrize(("coding", "most"), [("gzip", content_coding._PIECE), ("zstd", 5_000_000)])
+def test_a_bomb_is_never_whole_in_memory(coding: str, most: int) -> None:
+    bomb = PACKS[coding](b"\0" * 50_000_000)
     pieces: list[int] = []
 
     class Enough(Exception):
@@ -208,16 +228,17 @@ def test_a_bomb_is_never_whole_in_memory() -> None:
 
     async def send(_: Message) -> None: ...
 
-    scope = {"type": "http", "headers": [(b"content-encoding", b"gzip"), (b"content-length", b"7")]}
+    scope = {"type": "http", "headers": [(b"content-encoding", coding.encode()), (b"content-length", b"7")]}
     with pytest.raises(Enough):
         asyncio.run(ContentCoding(app)(scope, receive, send))
-    assert max(pieces) <= content_coding._PIECE
+    assert max(pieces) <= most
 
 
-def test_the_messages_of_an_unpacked_body_end() -> None:
+@pytest.mark.parametrize(("coding", "whole"), [("gzip", WHOLE), ("zstd", WHOLE_ZSTD)])
+def test_the_messages_of_an_unpacked_body_end(coding: str, whole: bytes) -> None:
     """Routes wait for the end of the connection after the body: it must come through."""
     arriving: list[Message] = [
-        {"type": "http.request", "body": WHOLE[k : k + 1], "more_body": True} for k in range(len(WHOLE))
+        {"type": "http.request", "body": whole[k : k + 1], "more_body": True} for k in range(len(whole))
     ]
     arriving += [{"type": "http.request", "body": b"", "more_body": False}, {"type": "http.disconnect"}]
     seen: list[Message] = []
@@ -232,7 +253,9 @@ def test_the_messages_of_an_unpacked_body_end() -> None:
 
     async def send(_: Message) -> None: ...
 
-    asyncio.run(ContentCoding(app)({"type": "http", "headers": [(b"content-encoding", b"gzip")]}, receive, send))
+    asyncio.run(
+        ContentCoding(app)({"type": "http", "headers": [(b"content-encoding", coding.encode())]}, receive, send)
+    )
     body = b"".join(message["body"] for message in seen[:-1])
     assert json.loads(body) == POSE
     assert [message["more_body"] for message in seen[:-1]] == [True] * (len(seen) - 2) + [False]
