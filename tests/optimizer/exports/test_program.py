@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
 from optimizer.energy.plant import Plant
 from optimizer.exceptions import InvalidProblem, NotCertified
 from optimizer.exports.certified import certified, check_samples
@@ -18,7 +19,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.solution import Trajectory
 from optimizer.trajectories.spline import Spline, retimed
 from optimizer.trajectories.through_samples import spline_through
-from tests.optimizer.exports.programs import arm_of, one_move, random_spline, round_with_payload
+from tests.optimizer.exports.programs import round_with_payload
 from tests.optimizer.moves import AMPLE, GOAL, START
 
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_lsq_spline
 
+from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
+from benchmarks.read_back.urscript_machine import Controller, Halt, translated
 from models.robot import Array
 from optimizer.exceptions import FormatUnsuitable
 from optimizer.exports.program import Move, Program
 from optimizer.exports.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
 from optimizer.trajectories.spline import retimed
-from tests.optimizer.exports.programs import LOAD, arm_of, one_move, random_spline, round_with_payload
-from tests.optimizer.exports.urscript_machine import Controller, Halt, translated
+from tests.optimizer.exports.programs import LOAD, round_with_payload
 
 EVIL = 'pick"\n  set_standard_digital_out(7, True)\r# \u2028 end'
 
@@ -90,6 +91,13 @@ def test_text_of_a_user_cannot_leave_its_comment() -> None:
         line for line in plain.splitlines() if not line.strip().startswith("#")
     ]
     assert text.isascii()
+
+
+def test_the_text_has_the_form_that_the_controller_takes_over_a_socket() -> None:
+    for form in ("polynomials", "points"):
+        first, *inner, last = text_of(round_with_payload(), form=form, digital_output=0).splitlines()
+        assert (first, last) == ("def joulepath():", "end")
+        assert all(line.startswith("  ") and line.strip() and line.isascii() for line in inner)
 
 
 def test_splines_of_other_degrees_are_served_too() -> None:
