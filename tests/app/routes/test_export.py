@@ -278,3 +278,15 @@ def test_an_arm_of_a_users_own_gets_programs_of_any_maker(client: TestClient) ->
     assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), exported.text
     client.delete("/robots/irb")
     refused(export(client, "csv", found), problems.UnknownRobot)
+
+
+@pytest.mark.parametrize("factor", [1e-300, 1e-9, 1e4])
+def test_absurd_durations_are_refused(client: TestClient, answer: Json, factor: float) -> None:
+    knots = [factor * each for each in answer["trajectory"]["spline"]["knots"]]
+    absurd = altered(answer, *SPLINE, "knots", value=knots)
+    refused(export(client, "urscript", absurd), problems.NotCertified)
+
+
+def test_a_slow_table_has_a_bounded_number_of_rows(client: TestClient, answer: Json) -> None:
+    told = export(client, "csv", answer["answer"], speed_scale=0.01, table={"period": 1e-4})
+    assert refused(told, problems.FormatUnsuitable)["format"] == "csv"
