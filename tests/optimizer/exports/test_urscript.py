@@ -25,9 +25,9 @@ def text_of(program: Program, **options: object) -> str:
 
 
 def run(
-    program: Program, at: Array | None = None, lag: float = 0.0, takes: bool = True, **options: object
+    program: Program, at: Array | None = None, lag: float = 0.0, carries: float = 0.0, **options: object
 ) -> Controller:
-    controller = Controller(program.start if at is None else at, lag, takes)
+    controller = Controller(program.start if at is None else at, lag, carries)
     controller.run(text_of(program, **options))
     return controller
 
@@ -71,11 +71,19 @@ def test_an_arm_elsewhere_is_asked_for_and_moved_slowly() -> None:
     assert moved[1] <= 0.25 and np.allclose(moved[2], program.start)
 
 
+def test_another_payload_in_force_is_asked_about() -> None:
+    assert [event for event in run(one_move()).events if event[0] == "popup"] == []
+    events = run(one_move(), carries=1.2).events
+    asked = [event for event in events if event[0] == "popup"]
+    assert len(asked) == 1 and "0.000 kg" in asked[0][1]
+    assert events.index(asked[0]) < [event[0] for event in events].index("payload")
+
+
 def test_it_stops_when_the_arm_does_not_follow_or_the_payload_is_not_taken() -> None:
     with pytest.raises(Halt, match="does not follow"):
         run(one_move(), lag=2.0)
     with pytest.raises(Halt, match="payload"):
-        run(one_move(), takes=False)
+        Controller(one_move().start, payload=1.0, takes_payload=False).run(text_of(one_move()))
     with pytest.raises(Halt, match="did not reach the end"):
         run(one_move(), lag=0.05)
 
