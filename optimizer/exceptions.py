@@ -28,6 +28,7 @@ JoulepathError
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -323,7 +324,8 @@ class NotCertified(JoulepathError):
         super().__init__(
             f"The motion is not certified: {reason}. Export an answer as the service gave it, for the robot as it is."
         )
-        self.move, self.worst_ratio = move, {name: ratio for name, ratio in worst_ratio.items() if ratio == ratio}
+        self.move = move
+        self.worst_ratio = {name: ratio for name, ratio in worst_ratio.items() if math.isfinite(ratio)}
 
 
 class FormatUnsuitable(JoulepathError):

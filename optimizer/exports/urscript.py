@@ -3,7 +3,9 @@
 Syntax and functions are those of the maker's script manual (PolyScope 5, e-series; CB3 has the same):
 https://www.universal-robots.com/manuals/EN/HTML/SW5_20/Content/prod-scriptmanual/G5/servoj_qavt0-008lookahead_time.htm
 servoj controls the arm for `t` seconds and then returns; with t = 0.002 s (CB3: 0.008 s) one call is one period of the
-controller.
+controller. A program that is sent over a socket begins with `def` and ends with `end` in the first column, and every
+other line is indented (page "Connecting to URControl" of the same manual). Under speed scaling servoj takes longer:
+https://www.universal-robots.com/articles/ur/programming/trajectory-improvements-for-servoj
 """
 
 from __future__ import annotations
@@ -59,14 +61,14 @@ def to_urscript(program: Program, options: UrscriptOptions | None = None) -> Exp
         f"the arm follows them later by about lookahead_time = {options.lookahead_time:g} s",
         f"it stops if a joint is more than {tracking:.3f} rad away from its set point",
         "at the end of a move it waits up to 1 s until every joint is within 0.001 rad",
-        "the speed slider does not slow servoj down: export with a smaller speed_scale for a slow run",
+        "while the controller scales the speed down, servoj takes longer, and so does the motion",
         *_output_notes(program, options),
     )
     degree = max(move.spline.degree for move in program.moves)
     lines = ["def joulepath():"]
     lines += [f"  # {line}" for line in header(program, "program for Universal Robots controllers", notes)]
     lines += [*CHECKS, *serving(options.rate, options.lookahead_time, options.gain, tracking, degree)]
-    lines += ["", *_beginning(program), *_body(program, options, degree), "  stopj(2.0)", "end"]
+    lines += [*_beginning(program), *_body(program, options, degree), "  stopj(2.0)", "end"]
     return ExportedFile.of_text("\n".join(lines) + "\n", "text/plain", "script", notes)
 
 
@@ -108,6 +110,10 @@ def _beginning(program: Program) -> list[str]:
     return [
         f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
         f"  local jp_start = {start}",
+        f"  if norm(get_target_payload() - {program.payload.mass:.6f}) > 0.05:",
+        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} kg. Continue sets it.", '
+        '"joulepath", True, False, blocking=True)',
+        "  end",
         *_payload(program.payload),
         "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",
         '    popup("The arm is not at the start of the motion. Continue moves it there slowly, with no check for '
@@ -127,7 +133,7 @@ def _payload(payload: Payload) -> list[str]:
 def _body(program: Program, options: UrscriptOptions, degree: int) -> list[str]:
     lines = list[str]()
     for timed in program.timed:
-        lines += ["", f"  # {comment(timed.step.label)}, {timed.step.duration:.4f} s"]
+        lines.append(f"  # {comment(timed.step.label)}, {timed.step.duration:.4f} s")
         lines += _switch(timed, options)
         if not isinstance(timed.step, Move):
             lines.append(f"  sleep({timed.step.duration:.6f})")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 JOINTS = 6
 
-CHECKS = """
+CHECKS = """\
   global jp_tick = 1
   def jp_stop(message):
     stopj(2.0)

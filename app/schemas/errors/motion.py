@@ -290,7 +290,9 @@ class NotCertified(ProblemDetails):
     status: Literal[422] = fixed("status", 422)
     move: int = described("Index of the move, from 0; 0 for an answer that is one move.", None, 0)
     worst_ratio: dict[str, float] = described(
-        "Largest value / limit, for each limit; empty if the certificate was not reached.", "1", {"velocity": 1.31}
+        "Largest value / limit, for each limit where it is finite; empty if the certificate was not reached.",
+        "1",
+        {"velocity": 1.31},
     )
 
 

@@ -11,12 +11,13 @@ import yaml
 from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
-from app.schemas.examples.own_arm import PUT_EXAMPLES
 from app.schemas.export import FORMATS, ExportFormat
+from benchmarks.read_back.urscript_machine import Controller
+from models.registry import load_robot
+from models.urdf import urdf_of
 from tests.app.requests import HOME, NEAR, move
 from tests.app.routes.test_problems import refused
 from tests.app.test_openapi_examples import DOCUMENT
-from tests.optimizer.exports.urscript_machine import Controller
 
 Json = dict[str, Any]
 LOAD = {"mass": 2.0, "com": [0.0, 0.0, 0.05]}
@@ -268,15 +269,24 @@ def test_arms_of_the_other_makers_get_their_programs(client: TestClient) -> None
 
 
 def test_an_arm_of_a_users_own_gets_programs_of_any_maker(client: TestClient) -> None:
-    assert client.put("/robots/irb", json=PUT_EXAMPLES["makers_figures"]["value"]).is_success
-    nq = len(client.get("/robots/irb").json()["joints"])
-    start, goal = [0.1] * nq, [0.3] * nq
-    body = move(robot="irb", start={"q": start}, goal={"q": goal}, collisions=False)
-    found = client.post("/optimize", json=body).json()
-    exported = export(client, "rapid", found["answer"], rapid={"signs": [1] * nq, "offsets": [0.0] * nq})
-    if nq == 6:
-        assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), exported.text
-    else:
-        refused(exported, problems.FormatUnsuitable)
+    urdf = urdf_of("irb", load_robot("ur3e").figures)
+    added = client.put("/robots/irb", json={"urdf": urdf, "tip": "flange", "acceleration": 8.0, "payload": 3.0})
+    assert added.is_success, added.text
+    found = client.post("/optimize", json=move(robot="irb", collisions=False)).json()
+    options = {"signs": [1, -1, 1, 1, 1, 1], "offsets": [0.0, 90.0, 0.0, 0.0, 0.0, 0.0]}
+    exported = export(client, "rapid", found["answer"], rapid=options)
+    assert exported.status_code == 200 and exported.text.startswith("MODULE Joulepath"), exported.text
     client.delete("/robots/irb")
     refused(export(client, "csv", found), problems.UnknownRobot)
+
+
+@pytest.mark.parametrize("factor", [1e-300, 1e-9, 1e4])
+def test_absurd_durations_are_refused(client: TestClient, answer: Json, factor: float) -> None:
+    knots = [factor * each for each in answer["trajectory"]["spline"]["knots"]]
+    absurd = altered(answer, *SPLINE, "knots", value=knots)
+    refused(export(client, "urscript", absurd), problems.NotCertified)
+
+
+def test_a_slow_table_has_a_bounded_number_of_rows(client: TestClient, answer: Json) -> None:
+    told = export(client, "csv", answer["answer"], speed_scale=0.01, table={"period": 1e-4})
+    assert refused(told, problems.FormatUnsuitable)["format"] == "csv"

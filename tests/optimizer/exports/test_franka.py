@@ -8,9 +8,10 @@ from io import StringIO
 import numpy as np
 import pytest
 
+from benchmarks.read_back.random_motions import one_move
 from optimizer.exceptions import FormatUnsuitable
 from optimizer.exports.franka import ROUNDING, FrankaOptions, to_franka
-from tests.optimizer.exports.programs import one_move, round_with_payload
+from tests.optimizer.exports.programs import round_with_payload
 
 
 @pytest.mark.parametrize(("robot", "seed"), [("fr3", 0), ("panda", 1)])

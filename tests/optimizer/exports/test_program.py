@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
 from optimizer.energy.plant import Plant
 from optimizer.exceptions import InvalidProblem, NotCertified
 from optimizer.exports.certified import certified, check_samples
@@ -18,7 +23,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.solution import Trajectory
 from optimizer.trajectories.spline import Spline, retimed
 from optimizer.trajectories.through_samples import spline_through
-from tests.optimizer.exports.programs import arm_of, one_move, random_spline, round_with_payload
+from tests.optimizer.exports.programs import round_with_payload
 from tests.optimizer.moves import AMPLE, GOAL, START
 
 
@@ -133,3 +138,12 @@ def test_a_round_of_the_optimiser_becomes_a_program() -> None:
     switched = [each for each in program.timed if each.payload is not None]
     assert [each.grasps for each in switched] == [True, False]
     certified(program)
+
+
+def test_the_page_shows_what_works() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "exports.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(code, {})
+    assert "slowed down to 0.1 of its speed" in printed.getvalue()

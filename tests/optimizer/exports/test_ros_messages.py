@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from scipy.interpolate import BPoly
 
+from benchmarks.read_back.joint_trajectories import deviations, followed
+from benchmarks.read_back.random_motions import arm_of, one_move
 from models.robot import Array
 from optimizer.exceptions import FormatUnsuitable
 from optimizer.exports import quintic_points as points_module
@@ -17,37 +18,13 @@ from optimizer.exports.program import Move, Program
 from optimizer.exports.quintic_points import POSITION_TOLERANCE, VELOCITY_TOLERANCE
 from optimizer.exports.ros_messages import RosOptions, to_moveit, to_ros2
 from optimizer.trajectories.spline import Spline
-from tests.optimizer.exports.programs import arm_of, one_move, round_with_payload
+from tests.optimizer.exports.programs import round_with_payload
 
 # fields of the messages, as their definitions have them
 GOAL = {
     "trajectory", "multi_dof_trajectory", "path_tolerance", "component_path_tolerance", "goal_tolerance",
     "component_goal_tolerance", "goal_time_tolerance",
 }  # fmt: skip
-POINT = {"positions", "velocities", "accelerations", "effort", "time_from_start"}
-
-
-def followed(trajectory: dict[str, Any]) -> BPoly:
-    """What the controller does: the quintic through position, velocity and acceleration at both ends of a segment.
-
-    SciPy makes it from the Bernstein basis, apart from the formula in the library.
-    """
-    assert trajectory.keys() <= {"header", "joint_names", "points"}
-    points = trajectory["points"]
-    assert all(point.keys() <= POINT for point in points)
-    times = [point["time_from_start"] for point in points]
-    assert all(0 <= each["nanosec"] < 1_000_000_000 for each in times)
-    t = np.array([each["sec"] + each["nanosec"] * 1e-9 for each in times])
-    assert t[0] == 0 and (np.diff(t) > 0).all()
-    states = [[point[name] for name in ("positions", "velocities", "accelerations")] for point in points]
-    return BPoly.from_derivatives(t, np.array(states))
-
-
-def deviations(program: Program, curve: BPoly) -> tuple[float, float]:
-    t = np.linspace(0, program.duration, 20_011)
-    q, v, _ = program.at(t)
-    end = np.minimum(t, curve.x[-1])
-    return float(np.abs(curve(end) - q).max()), float(np.abs(curve(end, 1) - v).max())
 
 
 def check(program: Program, trajectory: dict[str, Any]) -> tuple[float, float]:

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_lsq_spline
 
+from benchmarks.read_back.random_motions import arm_of, one_move, random_spline
+from benchmarks.read_back.urscript_machine import Controller, Halt, translated
 from models.robot import Array
 from optimizer.exceptions import FormatUnsuitable
 from optimizer.exports.program import Move, Program
 from optimizer.exports.urscript import SET_POINT_ERROR, UrscriptOptions, to_urscript
 from optimizer.trajectories.spline import retimed
-from tests.optimizer.exports.programs import LOAD, arm_of, one_move, random_spline, round_with_payload
-from tests.optimizer.exports.urscript_machine import Controller, Halt, translated
+from tests.optimizer.exports.programs import LOAD, round_with_payload
 
 EVIL = 'pick"\n  set_standard_digital_out(7, True)\r# \u2028 end'
 
@@ -24,9 +25,9 @@ def text_of(program: Program, **options: object) -> str:
 
 
 def run(
-    program: Program, at: Array | None = None, lag: float = 0.0, takes: bool = True, **options: object
+    program: Program, at: Array | None = None, lag: float = 0.0, carries: float = 0.0, **options: object
 ) -> Controller:
-    controller = Controller(program.start if at is None else at, lag, takes)
+    controller = Controller(program.start if at is None else at, lag, carries)
     controller.run(text_of(program, **options))
     return controller
 
@@ -70,11 +71,19 @@ def test_an_arm_elsewhere_is_asked_for_and_moved_slowly() -> None:
     assert moved[1] <= 0.25 and np.allclose(moved[2], program.start)
 
 
+def test_another_payload_in_force_is_asked_about() -> None:
+    assert [event for event in run(one_move()).events if event[0] == "popup"] == []
+    events = run(one_move(), carries=1.2).events
+    asked = [event for event in events if event[0] == "popup"]
+    assert len(asked) == 1 and "0.000 kg" in asked[0][1]
+    assert events.index(asked[0]) < [event[0] for event in events].index("payload")
+
+
 def test_it_stops_when_the_arm_does_not_follow_or_the_payload_is_not_taken() -> None:
     with pytest.raises(Halt, match="does not follow"):
         run(one_move(), lag=2.0)
     with pytest.raises(Halt, match="payload"):
-        run(one_move(), takes=False)
+        Controller(one_move().start, payload=1.0, takes_payload=False).run(text_of(one_move()))
     with pytest.raises(Halt, match="did not reach the end"):
         run(one_move(), lag=0.05)
 
@@ -90,6 +99,13 @@ def test_text_of_a_user_cannot_leave_its_comment() -> None:
         line for line in plain.splitlines() if not line.strip().startswith("#")
     ]
     assert text.isascii()
+
+
+def test_the_text_has_the_form_that_the_controller_takes_over_a_socket() -> None:
+    for form in ("polynomials", "points"):
+        first, *inner, last = text_of(round_with_payload(), form=form, digital_output=0).splitlines()
+        assert (first, last) == ("def joulepath():", "end")
+        assert all(line.startswith("  ") and line.strip() and line.isascii() for line in inner)
 
 
 def test_splines_of_other_degrees_are_served_too() -> None:

@@ -35,12 +35,16 @@ class Halt(Exception):
 
 
 class Controller:
-    """An arm that stands wherever servoj or movej last sent it, `lag` [rad] behind; it records what it is told."""
+    """An arm that stands wherever servoj or movej last sent it, `lag` [rad] behind, with a `payload` [kg] in force.
 
-    def __init__(self, q: Array, lag: float = 0.0, takes_payload: bool = True) -> None:
-        self.q, self.lag, self.takes_payload = np.asarray(q, dtype=float), lag, takes_payload
+    It records what it is told.
+    """
+
+    def __init__(self, q: Array, lag: float = 0.0, payload: float = 0.0, takes_payload: bool = True) -> None:
+        self.q, self.lag, self.payload = np.asarray(q, dtype=float), lag, payload
+        self.takes_payload = takes_payload
         self.events: list[tuple[Any, ...]] = []
-        self.payload, self.said, self.clock = -1.0, "", 0.0
+        self.said, self.clock = "", 0.0
 
     @property
     def set_points(self) -> Array:

@@ -1,0 +1,114 @@
+"""`joulepath export`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import orjson
+
+from app.cli import terminal
+from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable
+
+    from app.engine.result import TaskResult
+    from app.store.store import Store
+    from app.tasks.export import ExportTask
+
+# wall time [s] that an export may take; it takes milliseconds
+DEADLINE = 120.0
+NAMES = ("urscript", "ros2", "moveit", "franka", "rapid", "krl", "csv", "json", "npz")
+"""The formats, known before the schemas are imported."""
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  joulepath optimize request.json --output answer.json
+  joulepath export urscript answer.json --speed-scale 0.1 --output slowly.script
+  joulepath export ros2 answer.json --set message=trajectory > trajectory.yaml"""
+)
+@click.argument("format", type=click.Choice(NAMES))
+@FILE
+@OUTPUT
+@click.option("--speed-scale", type=float, default=1.0, help="Fraction of the speed, certified again. Default: 1.")
+@click.option("--set", "options", multiple=True, metavar="NAME=VALUE", help="An option of the format, JSON or a word.")
+def export(format: str, file: str, output: Path | None, speed_scale: float, options: tuple[str, ...]) -> None:
+    """Writes the motion of an answer as a file for a robot controller.
+
+    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`, whose moves must be
+    in the database; or - for standard input. If standard error is a terminal, a summary follows: how far the file
+    deviates, and what it leaves out.
+    """
+    from app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
+    from app.tasks.export import ExportTask
+
+    chosen, request_id = ExportFormat(format), new_id()
+    given = _given(options)
+    if given and chosen not in OPTIONS_OF:
+        raise click.UsageError(f"The format {format} has no options.")
+    beside = {OPTIONS_OF[chosen]: given} if given else {}
+    body = b'{"answer":%b,"speed_scale":%b%b}' % (
+        content_of(file).strip() or b"null",
+        orjson.dumps(speed_scale),
+        b"".join(b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()),
+    )
+    request = validated(ExportRequest, body, request_id)
+    task = _WithKept(ExportTask(request, chosen, False, request_id))
+    with terminal.progress("Certifying the motion"):
+        document = answered(task, DEADLINE, request_id)
+    write(document, output)
+    terminal.summary(lambda: {f"note {k}": note for k, note in enumerate(task.notes, 1)})
+
+
+def _given(options: tuple[str, ...]) -> dict[str, Any]:
+    """The options by name. Raises click.UsageError."""
+    given = {}
+    for option in options:
+        name, sign, value = option.partition("=")
+        if not sign:
+            raise click.UsageError(f"--set {option}: write it as NAME=VALUE.")
+        try:
+            given[name] = orjson.loads(value)
+        except orjson.JSONDecodeError:
+            given[name] = value
+    return given
+
+
+@dataclass
+class _WithKept:
+    """An export that gets the answers of the moves of a round from the database; it holds the notes of the file."""
+
+    task: ExportTask
+    notes: tuple[str, ...] = ()
+
+    @property
+    def request_id(self) -> str:
+        """Id of the request."""
+        return self.task.request_id
+
+    def run(self, deadline: float) -> TaskResult:
+        """The file."""
+        from app.exceptions import PartsNeeded
+
+        try:
+            result = self.task.run(deadline)
+        except PartsNeeded as needed:
+            result = self.task.with_kept(_from_store(needed.names)).run(deadline)
+        self.notes = result.notes
+        return result
+
+
+def _from_store(names: list[str]) -> dict[str, bytes]:
+    from app.cli.store import in_store
+    from app.store import answers
+
+    def body_of(name: str, store: Store) -> Awaitable[bytes]:
+        return store.read(lambda session: answers.get(session, name.rpartition("/")[2])[1])
+
+    return {name: in_store(partial(body_of, name)) for name in names}

@@ -1,0 +1,50 @@
+"""`joulepath export`: the file that the service gives, and its refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from app.cli.export import NAMES
+from app.schemas.export import ExportFormat
+from tests.app.cli.console import ROOT as PROJECT
+from tests.app.cli.console import Here
+
+ANSWER = json.loads((PROJECT / "examples" / "export" / "urscript" / "slow_run.json").read_text())["answer"]
+
+
+@pytest.fixture
+def answer(tmp_path: Path) -> str:
+    file = tmp_path / "answer.json"
+    file.write_text(json.dumps(ANSWER))
+    return str(file)
+
+
+def test_the_command_knows_every_format() -> None:
+    assert set(NAMES) == set(ExportFormat)
+
+
+def test_a_motion_is_written_with_the_options_of_its_format(here: Here, answer: str, tmp_path: Path) -> None:
+    output = tmp_path / "slow.script"
+    options = ("--speed-scale", "0.1", "--set", "form=points", "--set", "rate=125", "--output", str(output))
+    assert here.run("export", "urscript", answer, *options)[0] == 0
+    text = output.read_text()
+    assert "slowed down to 0.1 of its speed" in text and "t=0.008" in text and "jp_piece(0.0" not in text
+
+
+def test_an_altered_answer_is_a_problem_and_wrong_usage_is_told(here: Here, answer: str) -> None:
+    altered = json.dumps({**ANSWER, "arm": {"payload": {"mass": 3.0, "com": [0.0, 0.0, 0.0]}}})
+    code, content = here.problem("export", "csv", "-", stdin=altered)
+    assert (code, content["type"]) == (1, "/problems/not-certified")
+    code, content = here.problem("export", "csv", "-", stdin="")
+    assert (code, content["type"]) == (2, "/problems/validation")
+    code, content = here.problem("export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": []}))
+    assert (code, content["type"]) == (2, "/problems/validation")
+    leg = {"kind": "move", "start": {"stop": "a"}, "goal": {"stop": "b"}, "duration": 1.0, "answer": "/answers/none"}
+    code, content = here.problem("export", "csv", "-", stdin=json.dumps({"robot": "ur5e", "legs": [leg]}))
+    assert (code, content["type"]) == (1, "/problems/unknown-answer")
+    for wrong in (("--set", "form"), ("--speed-scale", "x")):
+        assert here.run("export", "urscript", answer, *wrong)[0] == 2
+    assert here.run("export", "json", answer, "--set", "form=points")[0] == 2
