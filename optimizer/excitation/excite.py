@@ -16,6 +16,7 @@ from models.robot import Array
 from optimizer.certificate import certify
 from optimizer.collision.model import CollisionModel, collision_model
 from optimizer.deadline import Deadline
+from optimizer.energy.plant import Plant
 from optimizer.exceptions import DeadlineExceeded, ExcitationInfeasible
 from optimizer.excitation.excitation_problem import ExcitationProblem
 from optimizer.excitation.fourier import FourierBasis
@@ -23,11 +24,10 @@ from optimizer.excitation.information import Information
 from optimizer.excitation.limits import ClearancePenalty, excess, range_excess, torque_excess
 from optimizer.excitation.torque_columns import TorqueColumns
 from optimizer.linear_algebra import one_thread
-from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import HalfSpace, Obstacle, Scene
-from optimizer.solution import Certificate
+from optimizer.solution import Certificate, Energy, Trajectory
 from optimizer.trajectories.spline import Spline, retimed
 
 MOUNTING_PLANE = "mounting plane"
@@ -41,6 +41,8 @@ PROGRESS = 1e-5
 INDEPENDENT_RATE = 10.0
 # attempts to find a centre without collision, and greatest amplitude [rad/s] of the first coefficients
 _CENTRES, _AMPLITUDE = 100, 0.15
+# shares of the way from a start to what was found at which a motion is looked for that keeps all limits
+_WAY_BACK = (1.0, 0.9, 0.7, 0.4, 0.0)
 # share of its part of the time left that the search of a start may use: its certificate needs some
 _SHARE = 0.9
 
@@ -49,17 +51,18 @@ _SHARE = 0.9
 class Excitation:
     """A motion that tells parameters apart.
 
-    `centre` (nq,) [rad], `a`, `b` (nq, harmonics) [rad/s] and `period` [s] are those of the series, `spline` is the
-    same motion. `condition` and `scaled_condition` are those of the columns over the noise, as they are and scaled to
-    one length. `names` and `predicted_sd` are the parameters and their standard deviations after one period.
-    `certificate` is that of the spline. `starts` were completed, of which `feasible` gave a motion.
+    `centre` (nq,) [rad], `a`, `b` (nq, harmonics) [rad/s] and `period` [s] are those of the series; `trajectory` is the
+    same motion as a spline, with samples, and `energy` what it needs. `condition` and `scaled_condition` are those of
+    the columns over the noise, as they are and scaled to one length. `names` and `predicted_sd` are the parameters and
+    their standard deviations after one period. `starts` were completed, of which `feasible` gave a motion.
     """
 
     period: float
     centre: Array
     a: Array
     b: Array
-    spline: Spline
+    trajectory: Trajectory
+    energy: Energy
     condition: float
     scaled_condition: float
     names: tuple[str, ...]
@@ -84,10 +87,8 @@ def excite(problem: ExcitationProblem) -> Excitation:
         if coordinates is None:
             limit = "clearance"
             continue
-        motion = design.certified(design.improved(coordinates, deadline.within(part)))
-        broken = design.broken(motion.certificate)
-        if broken is not None:
-            limit = broken
+        motion, limit = design.kept(coordinates, design.improved(coordinates, deadline.within(part)))
+        if motion is None:
             continue
         feasible += 1
         if best is None or motion.scaled_condition < best.scaled_condition:
@@ -106,6 +107,7 @@ class _Design:
         self.columns = TorqueColumns(self.arm, problem.parts, STATES)
         t = np.arange(STATES) * problem.period / STATES
         self.matrices = [self.basis.matrix(t, order) for order in range(4)]
+        self.plant = Plant(self.arm)
         limits = self.arm.active_limits
         self.rates = [limits.v_max * problem.speed_fraction, limits.a_max, limits.j_max]
         self.collisions: CollisionModel | None = collision_model(self.arm) if self.arm.collisions else None
@@ -173,15 +175,26 @@ class _Design:
         total = sum(matrix.T @ gradient for matrix, gradient in zip(self.matrices, gradients, strict=True))
         return value + PENALTY * penalty, np.asarray(total)
 
+    def kept(self, start: Array, found: Array) -> tuple[Excitation | None, str | None]:
+        """The motion of a search that ended at coordinates `found`, or the nearest one back to its start that keeps all
+        limits: a search that ran out of time may break them. If none does, the limit that it breaks."""
+        limit = None
+        for share in _WAY_BACK:
+            motion = self.certified(start + share * (found - start))
+            limit = self.broken(motion.certificate)
+            if limit is None:
+                return motion, None
+        return None, limit
+
     def certified(self, coordinates: Array) -> Excitation:
         """The motion with its period long enough for all rates and torques, and its certificate."""
         spline = self.basis.spline(coordinates)
-        certificate = self._certificate(spline)
+        certificate, energy = self._certificate(spline)
         stretch = self._stretch(certificate)
         basis = FourierBasis(self.basis.period * stretch, self.basis.harmonics)
         if stretch > 1:
             spline = retimed(spline, stretch)
-            certificate = self._certificate(spline)
+            certificate, energy = self._certificate(spline)
         # of the coefficients, which are speeds: a longer period makes them smaller
         centre, a, b = basis.coefficients(np.vstack([coordinates[:1], coordinates[1:] / stretch]))
         t = np.linspace(0.0, spline.duration, STATES, endpoint=False)
@@ -193,7 +206,8 @@ class _Design:
             centre=centre,
             a=a,
             b=b,
-            spline=spline,
+            trajectory=self.plant.trajectory(spline, self.problem.sample_period),
+            energy=energy,
             condition=information.condition(scaled=False),
             scaled_condition=information.condition(scaled=True),
             names=tuple(self.columns.names[k] for k in self.columns.wanted),
@@ -220,10 +234,9 @@ class _Design:
             return max(certificate.worst_ratio, key=certificate.worst_ratio.__getitem__)
         return None
 
-    def _certificate(self, spline: Spline) -> Certificate:
-        ends = spline.control_points[[0, -1]]
-        asked = Problem(arm=self.arm, start=ends[0], goal=ends[1])
-        return certify(asked, spline, ends[0], ends[1], PreparedProblem.of(asked).energy(spline))
+    def _certificate(self, spline: Spline) -> tuple[Certificate, Energy]:
+        energy, (start, *_, goal) = self.plant.energy(spline), spline.control_points
+        return certify(Problem(arm=self.arm, start=start, goal=goal), spline, start, goal, energy), energy
 
 
 def _standing(problem: ExcitationProblem) -> Arm:

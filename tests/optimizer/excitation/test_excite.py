@@ -38,8 +38,8 @@ def test_the_series_is_at_rest_at_its_ends_and_the_spline_is_the_series(found: E
     t = np.linspace(0, found.period, 301)
     q = found.centre + np.sin(np.outer(t, w)) @ (found.a / w).T - np.cos(np.outer(t, w)) @ (found.b / w).T
     # the spline has 24 spans for every harmonic
-    assert np.abs(found.spline.curve(t) - q).max() < 1e-6
-    v, a = (np.asarray(found.spline.curve(t[[0, -1]], order)) for order in (1, 2))
+    assert np.abs(found.trajectory.spline.curve(t) - q).max() < 1e-6
+    v, a = (np.asarray(found.trajectory.spline.curve(t[[0, -1]], order)) for order in (1, 2))
     assert np.abs(v).max() < 1e-9 and np.abs(a).max() < 1e-7
 
 
@@ -57,7 +57,7 @@ def test_the_plane_that_the_arm_stands_on_is_kept(found: Excitation) -> None:
     model = ARM.robot.model
     data, flange = model.createData(), model.getFrameId("flange")
     for t in np.linspace(0, found.period, 200):
-        pin.framesForwardKinematics(model, data, found.spline.curve(t))
+        pin.framesForwardKinematics(model, data, found.trajectory.spline.curve(t))
         assert data.oMf[flange].translation[2] > 0
 
 
@@ -136,8 +136,8 @@ def test_an_obstacle_of_the_planes_name_stands_for_it() -> None:
         ("period", {"period": float("nan")}),
         ("harmonics", {"harmonics": 1}),
         ("speed_fraction", {"speed_fraction": 2.0}),
-        ("for", {"parts": ()}),
-        ("for", {"parts": ("power",)}),
+        ("parameters", {"parts": ()}),
+        ("parameters", {"parts": ("power",)}),
         ("criterion", {"criterion": "e"}),
         ("centre", {"centre": np.zeros(5)}),
         ("centre.q", {"centre": np.full(6, 10.0)}),
