@@ -5,6 +5,7 @@ JoulepathError
 │   ├── OutsideLimits       given joints beyond a limit
 │   └── InvalidTable        a row of a given motion, or its table as a whole
 ├── LogTooLarge             a log with more rows or bytes than are read
+├── ExcitationInfeasible    no excitation keeps its limits
 ├── EffortNotUsable         logged efforts that say nothing of the arm
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
@@ -111,6 +112,17 @@ class EffortNotUsable(JoulepathError):
     def __init__(self, message: str, meaning: str | None, slope: dict[str, float | None]) -> None:
         super().__init__(message)
         self.meaning, self.slope = meaning, slope
+
+
+class ExcitationInfeasible(JoulepathError):
+    """No start of an excitation gave a motion within all limits; `limit` names the one that the last one broke."""
+
+    def __init__(self, limit: str) -> None:
+        remedy = "relax it, or give a longer period"
+        if limit == "clearance":
+            remedy = "move the obstacles, ask for less clearance, or give a centre with more room"
+        super().__init__(f"No excitation was found that keeps its limits, the last one broke {limit}: {remedy}.")
+        self.limit = limit
 
 
 class UnknownRobot(JoulepathError):

@@ -10,7 +10,7 @@ from app.convert.warnings import certified_warnings
 from app.schemas.request import WhichCandidates
 from app.schemas.response import Clearance
 from optimizer.problem.problem import MethodName
-from optimizer.solution import Certificate, ElectricalEnergy, Energy, Objective, Solution, StorageUse
+from optimizer.solution import Certificate, ElectricalEnergy, Energy, Objective, Solution, StorageUse, Trajectory
 
 
 class Asked(Protocol):
@@ -33,7 +33,6 @@ def to_optimize_response(
 
     `arm` is that of `arm_fields`. Its last field, `answer`, is None: who keeps the answer sets it.
     """
-    trajectory = solution.trajectory
     return {
         "id": request_id,
         "robot": request.robot,
@@ -43,10 +42,7 @@ def to_optimize_response(
         "duration": solution.duration,
         "status": solution.status,
         "branch": {end: fields(getattr(solution, end), "label", "q", "target") for end in ("start", "goal")},
-        "trajectory": {
-            **fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power", "charge"),
-            "spline": fields(trajectory.spline, "degree", "knots", "control_points"),
-        },
+        "trajectory": trajectory_fields(solution.trajectory),
         "energy": {
             **energy_fields(solution.energy),
             "lower_bound": solution.lower_bound,
@@ -61,6 +57,14 @@ def to_optimize_response(
         "solver": fields(solution.solver, "wall_time", "iterations", "nlp_solves", "stationarity"),
         # the last: see `TaskResult.of_kept_json`
         "answer": None,
+    }
+
+
+def trajectory_fields(trajectory: Trajectory) -> dict[str, Any]:
+    """The fields of a motion."""
+    return {
+        **fields(trajectory, "t", "q", "v", "a", "tau", "tau_motor", "power", "charge"),
+        "spline": fields(trajectory.spline, "degree", "knots", "control_points"),
     }
 
 

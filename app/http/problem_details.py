@@ -58,6 +58,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.InvalidTable: problems.InvalidTable,
     optimizer_errors.LogTooLarge: problems.LogTooLarge,
     optimizer_errors.EffortNotUsable: problems.EffortNotUsable,
+    optimizer_errors.ExcitationInfeasible: problems.ExcitationInfeasible,
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,

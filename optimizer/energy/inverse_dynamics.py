@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -56,14 +57,27 @@ def inverse_dynamics(
     reflected rotor inertia; armature and gravity of the model are not read. `link_mass_scale` (nv,) [1] multiplies mass
     and inertia of the moving links, not of the payload; None: 1.
 
-    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5). Every link is described by
-    mass, first moment and inertia about the origin of its joint frame: the torques are linear in these.
-
     Raises ValueError if a joint is not revolute about its z axis.
     """
+    _check_chain(model)
+    scales: Sequence[ca.SX | int] = [1] * model.nv if link_mass_scale is None else ca.vertsplit(link_mass_scale)
+    bodies = [_link(model, i, payload, scale) for i, scale in enumerate(scales, 1)]
+    torques = body_torques(model, q, v, a, gravity, bodies)
+    return ca.vertcat(*(torque + rotor[j] * a[j] for j, torque in enumerate(torques)))
+
+
+Body = tuple[ca.SX, ca.SX, ca.SX]
+"""Mass [kg], first moment (3,) [kg·m] and inertia (3, 3) [kg·m²] of a link about the origin of its joint frame."""
+
+
+def body_torques(model: pin.Model, q: ca.SX, v: ca.SX, a: ca.SX, gravity: ca.SX, bodies: Sequence[Body]) -> list[ca.SX]:
+    """Torques [N·m] at every joint of rigid bodies on the links of the chain; inertias of the model are not read.
+
+    Recursive Newton-Euler in link frames (Luh, Walker, Paul 1980; Featherstone 2008, ch. 5). The torques are linear in
+    what describes the bodies. Raises ValueError if a joint is not revolute about its z axis.
+    """
+    _check_chain(model)
     joints = range(1, model.njoints)
-    if any(model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints):
-        raise ValueError("the model must be a serial chain of joints that turn about their z axes")
     rotations = {i: _tidy(model.jointPlacements[i].rotation) @ _rotation_z(q[i - 1]) for i in joints}
     offsets = {i: _tidy(model.jointPlacements[i].translation) for i in joints}
     forces: dict[int, ca.SX] = {}
@@ -77,7 +91,7 @@ def inverse_dynamics(
         omega_parent = R.T @ omega
         omega = omega_parent + spin
         alpha = R.T @ alpha + _Z * a[i - 1] + ca.cross(omega_parent, spin)
-        mass, moment, inertia = _link(model, i, payload, 1 if link_mass_scale is None else link_mass_scale[i - 1])
+        mass, moment, inertia = bodies[i - 1]
         forces[i] = mass * acceleration + ca.cross(alpha, moment) + ca.cross(omega, ca.cross(omega, moment))
         moments[i] = inertia @ alpha + ca.cross(omega, inertia @ omega) + ca.cross(moment, acceleration)
 
@@ -85,18 +99,21 @@ def inverse_dynamics(
     force, torque = ca.SX(3, 1), ca.SX(3, 1)
     for i in reversed(joints):
         force, torque = forces[i] + force, moments[i] + torque
-        tau[i - 1] = torque[2] + rotor[i - 1] * a[i - 1]
+        tau[i - 1] = torque[2]
         R, p = rotations[i], offsets[i]
         force = R @ force
         torque = R @ torque + ca.cross(p, force)
-    return ca.vertcat(*tau)
+    return tau
 
 
-def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Mass [kg], first moment (3,) [kg·m] and inertia (3, 3) [kg·m²] of link i about the origin of joint i's frame.
+def _check_chain(model: pin.Model) -> None:
+    joints = range(1, model.njoints)
+    if any(model.joints[i].shortname() != "JointModelRZ" or model.parents[i] != i - 1 for i in joints):
+        raise ValueError("the model must be a serial chain of joints that turn about their z axes")
 
-    The last link includes the payload. `scale` multiplies the link's own part.
-    """
+
+def _link(model: pin.Model, i: int, payload: SymbolicPayload, scale: ca.SX | int) -> Body:
+    """What describes link i. The last link includes the payload. `scale` multiplies the link's own part."""
     body = model.inertias[i]
     com = ca.SX(_tidy(body.lever))
     # constants first, then their factor: one product for each

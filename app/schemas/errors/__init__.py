@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.schemas.errors.logs import EffortNotUsable, LogTooLarge, TooManyLogs, UnknownLog
+from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
     CycleTooShort,
@@ -100,6 +100,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     LogTooLarge,
     TooManyLogs,
     EffortNotUsable,
+    ExcitationInfeasible,
     KeyReused,
     Unauthenticated,
     RoleTooLow,
@@ -132,6 +133,7 @@ __all__ = [
     "DurationTooShort",
     "EffortNotUsable",
     "EmptyStudy",
+    "ExcitationInfeasible",
     "FormatUnsuitable",
     "GoalInCollision",
     "HeadTooLarge",

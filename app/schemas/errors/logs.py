@@ -27,6 +27,21 @@ class EffortNotUsable(ProblemDetails):
     )
 
 
+class ExcitationInfeasible(ProblemDetails):
+    """No excitation was found that keeps its limits from any start. `limit` names the one that the last start broke.
+    For `clearance`, move obstacles, ask for less, or give a `centre` with more room; else relax the limit or give a
+    longer `period`."""
+
+    type: Literal["/problems/excitation-infeasible"] = fixed("type", "/problems/excitation-infeasible")
+    title: Literal["No excitation within the limits"] = fixed("title", "No excitation within the limits")
+    status: Literal[422] = fixed("status", 422)
+    limit: str = described(
+        "`clearance`, or a name of `worst_ratio` in a certificate: `position`, `velocity`, `torque`, …",
+        None,
+        "clearance",
+    )
+
+
 class LogTooLarge(ProblemDetails):
     """A log has too many rows, or is too large after unpacking. Send it in parts, at a lower rate, or only the columns
     that count."""

@@ -35,6 +35,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.DeadlineExceeded([CANDIDATE]),
     exceptions.InvalidTable("Times must increase.", 17, "t"),
     exceptions.LogTooLarge(1_000_000, "rows"),
+    exceptions.ExcitationInfeasible("clearance"),
     exceptions.EffortNotUsable("Log motor currents.", "external", {"elbow_joint": 0.02, "shoulder_lift_joint": None}),
     exceptions.StartInCollision([COLLIDING]),
     exceptions.GoalInCollision([COLLIDING, replace(COLLIDING, depth=0.01)]),

@@ -1,0 +1,38 @@
+"""POST /excitation."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import result_response
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings
+from app.routes.large_bodies import LargeBodyRoute
+from app.routes.parameters import WantedFormat, deadline_of
+from app.routes.problem_lists import WORKER_PROBLEMS
+from app.schemas import errors as problems
+from app.schemas.excitation import ExcitationRequest, ExcitationResponse
+from app.tasks.excitation import ExcitationTask
+
+router = APIRouter(tags=["logs"], route_class=LargeBodyRoute)
+_CSV = "t,q1,…,q6,v1,…,v6,a1,…,a6\n0.0,0.0,-1.57,…\n0.008,0.0001,-1.5699,…\n"
+
+
+@router.post(
+    "/excitation",
+    summary="A motion that tells an arm's parameters apart",
+    response_model=ExcitationResponse,
+    responses={
+        200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": _CSV}}},
+        **problem_responses(*WORKER_PROBLEMS, problems.OutsideLimits, problems.ExcitationInfeasible),
+    },
+)
+async def excitation(
+    request: Request, body: ExcitationRequest, wanted: WantedFormat, settings: ServiceSettings, engine: ServiceArmEngine
+) -> Response:
+    """A periodic motion from rest to rest whose log tells friction, rotor inertias and base parameters apart, within
+    all limits and clear of everything. `Accept: text/csv` returns its samples as a table, which `/evaluate` takes."""
+    task = ExcitationTask(body, wanted, request.state.id)
+    result = await unless_disconnected(request, engine.run(task, deadline_of(body, settings.max_deadline)))
+    return result_response(result)

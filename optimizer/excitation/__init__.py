@@ -1,0 +1,1 @@
+"""Motions that tell an arm's parameters apart: excitation trajectories."""

@@ -1,0 +1,248 @@
+"""excite(problem) → Excitation: a motion that tells the parameters of an arm apart, with its certificate.
+
+Fourier series at rest at both ends (Swevers, Ganseman, Tükel, De Schutter, Van Brussel 1997), D-optimal, by L-BFGS on a
+cost with penalties from several random starts. What the penalties leave of speed, acceleration, jerk and torque is
+removed by a longer period; collisions are proven absent, or the start is dropped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import OptimizeResult, minimize
+
+from models.robot import Array
+from optimizer.certificate import certify
+from optimizer.collision.model import CollisionModel, collision_model
+from optimizer.deadline import Deadline
+from optimizer.energy.plant import Plant
+from optimizer.exceptions import DeadlineExceeded, ExcitationInfeasible
+from optimizer.excitation.excitation_problem import ExcitationProblem
+from optimizer.excitation.fourier import FourierBasis
+from optimizer.excitation.information import Information
+from optimizer.excitation.limits import ClearancePenalty, excess, range_excess, torque_excess
+from optimizer.excitation.torque_columns import TorqueColumns
+from optimizer.linear_algebra import one_thread
+from optimizer.problem.arm import Arm
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import HalfSpace, Obstacle, Scene
+from optimizer.solution import Certificate, Energy, Trajectory
+from optimizer.trajectories.spline import Spline, retimed
+
+MOUNTING_PLANE = "mounting plane"
+# states of the period at which columns are computed; at each of them the limits, too
+STATES = 120
+# weight of the penalties, and most evaluations of a start
+PENALTY, MOST_EVALUATIONS = 40.0, 1000
+# relative decrease of the cost below which a start ends
+PROGRESS = 1e-5
+# independent samples per second that the predicted deviations assume: residuals of torques are correlated over 0.1 s
+INDEPENDENT_RATE = 10.0
+# attempts to find a centre without collision, and greatest amplitude [rad/s] of the first coefficients
+_CENTRES, _AMPLITUDE = 100, 0.15
+# shares of the way from a start to what was found at which a motion is looked for that keeps all limits
+_WAY_BACK = (1.0, 0.9, 0.7, 0.4, 0.0)
+# share of its part of the time left that the search of a start may use: its certificate needs some
+_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """A motion that tells parameters apart.
+
+    `centre` (nq,) [rad], `a`, `b` (nq, harmonics) [rad/s] and `period` [s] are those of the series; `trajectory` is the
+    same motion as a spline, with samples, and `energy` what it needs. `condition` and `scaled_condition` are those of
+    the columns over the noise, as they are and scaled to one length. `names` and `predicted_sd` are the parameters and
+    their standard deviations after one period. `starts` were completed, of which `feasible` gave a motion.
+    """
+
+    period: float
+    centre: Array
+    a: Array
+    b: Array
+    trajectory: Trajectory
+    energy: Energy
+    condition: float
+    scaled_condition: float
+    names: tuple[str, ...]
+    predicted_sd: Array
+    certificate: Certificate
+    starts: int
+    feasible: int
+
+
+@one_thread()
+def excite(problem: ExcitationProblem) -> Excitation:
+    """The best motion of all starts that end before the deadline. Raises ExcitationInfeasible, or DeadlineExceeded."""
+    deadline = Deadline.after(problem.deadline)
+    design = _Design(problem)
+    best: Excitation | None = None
+    done = feasible = 0
+    limit: str | None = None
+    while done < problem.starts and not deadline.passed:
+        coordinates = design.start(done)
+        part = _SHARE * deadline.left / (problem.starts - done)
+        done += 1
+        if coordinates is None:
+            limit = "clearance"
+            continue
+        motion, limit = design.kept(coordinates, design.improved(coordinates, deadline.within(part)))
+        if motion is None:
+            continue
+        feasible += 1
+        if best is None or motion.scaled_condition < best.scaled_condition:
+            best = motion
+    if best is None:
+        raise DeadlineExceeded([]) if limit is None else ExcitationInfeasible(limit)
+    return replace(best, starts=done, feasible=feasible)
+
+
+class _Design:
+    """A problem with its columns, limits and collisions."""
+
+    def __init__(self, problem: ExcitationProblem) -> None:
+        self.problem, self.arm = problem, _standing(problem)
+        self.basis = FourierBasis(problem.period, problem.harmonics)
+        self.columns = TorqueColumns(self.arm, problem.parts, STATES)
+        t = np.arange(STATES) * problem.period / STATES
+        self.matrices = [self.basis.matrix(t, order) for order in range(4)]
+        self.plant = Plant(self.arm)
+        limits = self.arm.active_limits
+        self.rates = [limits.v_max * problem.speed_fraction, limits.a_max, limits.j_max]
+        self.collisions: CollisionModel | None = collision_model(self.arm) if self.arm.collisions else None
+
+    def start(self, number: int) -> Array | None:
+        """Coordinates of a small motion about a centre without collision; None if none was found."""
+        random, limits = np.random.default_rng(number), self.arm.active_limits
+        size = (self.basis.free, self.arm.robot.nq)
+        small = random.uniform(-_AMPLITUDE, _AMPLITUDE, size) * np.minimum(1.0, limits.v_max)
+        if self.problem.centre is not None:
+            return np.vstack([self.problem.centre, small])
+        low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
+        for centre in random.uniform(low + 0.2 * (high - low), high - 0.2 * (high - low), (_CENTRES, len(low))):
+            q = centre + self.matrices[0][:, 1:] @ small
+            if self.collisions is None or self.collisions.least_distance(q, 0.1) > self.problem.clearance:
+                return np.vstack([centre, small])
+        return None
+
+    def improved(self, coordinates: Array, deadline: Deadline) -> Array:
+        """Coordinates of a local optimum of the cost with penalties, or of the best point before the deadline."""
+        shape = coordinates.shape
+        fixed = self.problem.centre is not None
+
+        def cost(x: Array) -> tuple[float, Array]:
+            value, gradient = self.cost(x.reshape(shape))
+            if fixed:
+                gradient[0] = 0.0
+            return value, gradient.ravel()
+
+        def stop_late(intermediate_result: OptimizeResult) -> None:
+            if deadline.passed:
+                raise StopIteration
+
+        found = minimize(
+            cost,
+            coordinates.ravel(),
+            jac=True,
+            method="L-BFGS-B",
+            callback=stop_late,
+            options={"maxfun": MOST_EVALUATIONS, "maxiter": MOST_EVALUATIONS, "maxcor": 30, "ftol": PROGRESS},
+        )
+        return np.asarray(found.x, dtype=float).reshape(shape)
+
+    def cost(self, coordinates: Array) -> tuple[float, Array]:
+        """The criterion and the penalties, and the gradient (1 + free, nq)."""
+        arm, columns = self.arm, self.columns
+        q, v, a, jerk = states = [matrix @ coordinates for matrix in self.matrices]
+        W = columns.values(q, v, a)
+        noise = np.asarray(self.problem.noise)
+        wanted = (W[:, :, columns.wanted] / noise[:, None]).reshape(-1, len(columns.wanted))
+        value, by_wanted = Information(wanted).criterion(self.problem.criterion)
+        seed = np.zeros_like(W)
+        seed[:, :, columns.wanted] = by_wanted.reshape(*W.shape[:2], -1) / noise[:, None]
+        torque_cost, by_torque = torque_excess(arm, W @ columns.dynamics, v, a)
+        seed += PENALTY * by_torque[:, :, None] * columns.dynamics
+        gradients = [*columns.pulled_back(q, v, a, seed), np.zeros_like(jerk)]
+        penalties = [range_excess(arm, q), *(excess(x, most) for x, most in zip(states[1:], self.rates, strict=True))]
+        for order, (_, by_state) in enumerate(penalties):
+            gradients[order] = gradients[order] + PENALTY * by_state
+        penalty = torque_cost + sum(each for each, _ in penalties)
+        if self.collisions is not None:
+            near, by_q = ClearancePenalty(self.collisions, self.problem.clearance)(q)
+            penalty += near
+            gradients[0] = gradients[0] + PENALTY * by_q
+        total = sum(matrix.T @ gradient for matrix, gradient in zip(self.matrices, gradients, strict=True))
+        return value + PENALTY * penalty, np.asarray(total)
+
+    def kept(self, start: Array, found: Array) -> tuple[Excitation | None, str | None]:
+        """The motion of a search that ended at coordinates `found`, or the nearest one back to its start that keeps all
+        limits: a search that ran out of time may break them. If none does, the limit that it breaks."""
+        limit = None
+        for share in _WAY_BACK:
+            motion = self.certified(start + share * (found - start))
+            limit = self.broken(motion.certificate)
+            if limit is None:
+                return motion, None
+        return None, limit
+
+    def certified(self, coordinates: Array) -> Excitation:
+        """The motion with its period long enough for all rates and torques, and its certificate."""
+        spline = self.basis.spline(coordinates)
+        certificate, energy = self._certificate(spline)
+        stretch = self._stretch(certificate)
+        basis = FourierBasis(self.basis.period * stretch, self.basis.harmonics)
+        if stretch > 1:
+            spline = retimed(spline, stretch)
+            certificate, energy = self._certificate(spline)
+        # of the coefficients, which are speeds: a longer period makes them smaller
+        centre, a, b = basis.coefficients(np.vstack([coordinates[:1], coordinates[1:] / stretch]))
+        t = np.linspace(0.0, spline.duration, STATES, endpoint=False)
+        W = self.columns.values(*(np.asarray(spline.curve(t, order)) for order in range(3)))
+        noise = np.asarray(self.problem.noise)
+        information = Information((W[:, :, self.columns.wanted] / noise[:, None]).reshape(-1, len(self.columns.wanted)))
+        return Excitation(
+            period=basis.period,
+            centre=centre,
+            a=a,
+            b=b,
+            trajectory=self.plant.trajectory(spline, self.problem.sample_period),
+            energy=energy,
+            condition=information.condition(scaled=False),
+            scaled_condition=information.condition(scaled=True),
+            names=tuple(self.columns.names[k] for k in self.columns.wanted),
+            predicted_sd=information.deviations(INDEPENDENT_RATE * spline.duration * self.arm.robot.nq),
+            certificate=certificate,
+            starts=0,
+            feasible=0,
+        )
+
+    def _stretch(self, certificate: Certificate) -> float:
+        """Factor ≥ 1 of the period that brings every rate within its limit."""
+        orders = {"velocity": 1, "acceleration": 2, "jerk": 3, "tcp_speed": 1, "elbow_speed": 1, "torque": 2}
+        ratios = dict(certificate.worst_ratio)
+        ratios["velocity"] /= self.problem.speed_fraction
+        needed = [(ratios[name] * (1 + 1e-9)) ** (1 / order) for name, order in orders.items() if name in ratios]
+        return float(max(1.0, *needed))
+
+    def broken(self, certificate: Certificate) -> str | None:
+        """The limit that a motion breaks; None if it keeps all of them."""
+        clearance = certificate.clearance
+        if clearance is not None and clearance.min_clearance < self.problem.clearance:
+            return "clearance"
+        if not certificate.valid:
+            return max(certificate.worst_ratio, key=certificate.worst_ratio.__getitem__)
+        return None
+
+    def _certificate(self, spline: Spline) -> tuple[Certificate, Energy]:
+        energy, (start, *_, goal) = self.plant.energy(spline), spline.control_points
+        return certify(Problem(arm=self.arm, start=start, goal=goal), spline, start, goal, energy), energy
+
+
+def _standing(problem: ExcitationProblem) -> Arm:
+    """The arm with the plane that it stands on among its obstacles, if asked for."""
+    arm = problem.arm
+    if not (problem.mounting_plane and arm.collisions) or MOUNTING_PLANE in arm.scene.names:
+        return arm
+    plane = Obstacle(MOUNTING_PLANE, HalfSpace(), margin=0.0)
+    return replace(arm, scene=Scene([*arm.scene.obstacles, plane]))

@@ -1,0 +1,72 @@
+"""The columns that an arm's torques are linear in, at states of a motion, and the gradients of functions of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+
+from models.robot import Array
+from optimizer.energy.torque_regressor import torque_regressor
+from optimizer.excitation.excitation_problem import Part
+from optimizer.identification.base_parameters import base_parameters
+from optimizer.identification.regressor import body_parameters
+from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.problem.arm import Arm
+
+# speed [rad/s] over which the sign of a speed is smoothed: friction of slower joints tells little
+KNEE = 0.05
+
+
+class TorqueColumns:
+    """Columns for n states of an arm: base parameters of its links and rotors, then friction of every joint.
+
+    `names` (p,) are those of the columns, `wanted` the indices of those of `parts`. `dynamics` (p,) are the arm's own
+    values of links and rotors, zero for friction: with them the columns give the torques without friction.
+    """
+
+    def __init__(self, arm: Arm, parts: Sequence[Part], n: int) -> None:
+        model = rigid_body_model(arm)
+        base, nq = base_parameters(model), model.nq
+        q, v, a = (ca.SX.sym(name, nq) for name in "qva")
+        gravity = ca.SX(ca.DM(model.gravity.linear))
+        links = torque_regressor(model, q, v, a, gravity)
+        dynamics = ca.horzcat(links, ca.diag(a))[:, list(base.independent)]
+        sign = v / ca.sqrt(v * v + KNEE * KNEE)
+        columns = ca.horzcat(dynamics, ca.diag(sign), ca.diag(v), ca.SX.eye(nq))
+        seed = ca.SX.sym("seed", nq, columns.shape[1])
+        state = ca.vertcat(q, v, a)
+        self.shape = (nq, columns.shape[1])
+        self._values = ca.Function("columns", [q, v, a], [ca.densify(columns)]).map(n)
+        pulled = ca.gradient(ca.dot(seed, columns), state)
+        self._pulled_back = ca.Function("pulled_back", [q, v, a, seed], [ca.densify(pulled)]).map(n)
+        kinds = ("coulomb", "viscous", "offset")
+        self.names = (*base.expressions, *(f"{kind}{j}" for kind in kinds for j in range(1, nq + 1)))
+        self.dynamics = np.append(base.combination @ _own(model), np.zeros(3 * nq))
+        self.wanted = _wanted(base.independent, nq, parts)
+
+    def values(self, q: Array, v: Array, a: Array) -> Array:
+        """Columns (n, nq, p) at states q, v, a (n, nq)."""
+        found = np.array(self._values(q.T, v.T, a.T)).reshape(self.shape[0], len(q), self.shape[1])
+        return np.ascontiguousarray(found.transpose(1, 0, 2))
+
+    def pulled_back(self, q: Array, v: Array, a: Array, seed: Array) -> tuple[Array, Array, Array]:
+        """Gradients (n, nq) by q, v and a of Σ seed · columns, for seeds (n, nq, p)."""
+        flat = seed.transpose(1, 0, 2).reshape(self.shape[0], -1)
+        found = np.array(self._pulled_back(q.T, v.T, a.T, flat)).T
+        by_q, by_v, by_a = np.split(found, 3, axis=1)
+        return by_q, by_v, by_a
+
+
+def _own(model: pin.Model) -> Array:
+    return np.append(body_parameters(model), model.armature)
+
+
+def _wanted(independent: Sequence[int], nq: int, parts: Sequence[Part]) -> list[int]:
+    rotors = 10 * nq
+    chosen = [k for k, number in enumerate(independent) if ("inertials" if number < rotors else "rotor") in parts]
+    if "friction" in parts:
+        chosen += range(len(independent), len(independent) + 3 * nq)
+    return chosen

@@ -1,0 +1,151 @@
+"""Excitations tell parameters apart, rest at their ends and keep their limits; gradients and deviations are right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from models.registry import load_robot
+from optimizer.exceptions import DeadlineExceeded, ExcitationInfeasible, InvalidProblem
+from optimizer.excitation import excite as module
+from optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
+from optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
+from optimizer.excitation.fourier import FourierBasis
+from optimizer.excitation.information import Information
+from optimizer.excitation.torque_columns import TorqueColumns
+from optimizer.problem.arm import Arm
+from optimizer.problem.scene import Obstacle, Scene, Sphere
+from optimizer.problem.tool_cone import ToolCone
+
+ARM = Arm(robot=load_robot("ur5e"))
+# of finite differences over 2e-6 of a cost with corners in its second derivative
+GRADIENT = 1e-3
+
+
+@pytest.fixture(scope="module")
+def found() -> Excitation:
+    """A short search from one start."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "MOST_EVALUATIONS", 80)
+        return excite(ExcitationProblem(arm=ARM, starts=1, deadline=np.inf))
+
+
+def test_the_series_is_at_rest_at_its_ends_and_the_spline_is_the_series(found: Excitation) -> None:
+    k = np.arange(1, found.a.shape[1] + 1)
+    w = 2 * np.pi / found.period * k
+    assert np.abs(found.a.sum(axis=1)).max() < 1e-12 and np.abs((found.b * k).sum(axis=1)).max() < 1e-12
+    t = np.linspace(0, found.period, 301)
+    q = found.centre + np.sin(np.outer(t, w)) @ (found.a / w).T - np.cos(np.outer(t, w)) @ (found.b / w).T
+    # the spline has 24 spans for every harmonic
+    assert np.abs(found.trajectory.spline.curve(t) - q).max() < 1e-6
+    v, a = (np.asarray(found.trajectory.spline.curve(t[[0, -1]], order)) for order in (1, 2))
+    assert np.abs(v).max() < 1e-9 and np.abs(a).max() < 1e-7
+
+
+def test_limits_clearance_and_condition(found: Excitation) -> None:
+    certificate = found.certificate
+    assert certificate.valid
+    assert certificate.worst_ratio["velocity"] <= 0.6 * (1 + 1e-6)
+    assert certificate.clearance is not None and certificate.clearance.min_clearance >= 0.02
+    assert found.scaled_condition <= 60 < found.condition
+    assert (found.starts, found.feasible) == (1, 1)
+    assert len(found.names) == len(found.predicted_sd) == 40 + 18
+
+
+def test_the_plane_that_the_arm_stands_on_is_kept(found: Excitation) -> None:
+    model = ARM.robot.model
+    data, flange = model.createData(), model.getFrameId("flange")
+    for t in np.linspace(0, found.period, 200):
+        pin.framesForwardKinematics(model, data, found.trajectory.spline.curve(t))
+        assert data.oMf[flange].translation[2] > 0
+
+
+def test_a_log_of_it_gives_the_predicted_deviations() -> None:
+    """Least squares on noisy torques scatter as predicted."""
+    random = np.random.default_rng(5)
+    columns = random.normal(size=(300, 4)) @ random.normal(size=(4, 4))
+    truth = np.array([1.0, -2.0, 0.5, 3.0])
+    predicted = Information(columns).deviations(len(columns))
+    fits = [
+        np.linalg.lstsq(columns, columns @ truth + random.normal(size=len(columns)), rcond=None)[0] for _ in range(2000)
+    ]
+    # of a standard deviation from 2000 draws: 1.6 %
+    assert np.std(fits, axis=0) == pytest.approx(predicted, rel=0.06)
+
+
+@pytest.mark.parametrize("kind", ["d", "condition"])
+def test_gradient_of_the_cost(kind: Criterion) -> None:
+    design = module._Design(ExcitationProblem(arm=ARM, period=4.0, harmonics=3, criterion=kind))
+    random = np.random.default_rng(2)
+    start = design.start(0)
+    assert start is not None
+    # far enough for limits and clearances to matter
+    x = start + np.vstack([np.zeros(6), random.normal(size=start[1:].shape)])
+    _, gradient = design.cost(x)
+    for _ in range(4):
+        step = 1e-6 * random.normal(size=x.shape)
+        difference = (design.cost(x + step)[0] - design.cost(x - step)[0]) / 2
+        assert difference == pytest.approx(float((gradient * step).sum()), rel=GRADIENT, abs=1e-9)
+
+
+def test_the_columns_give_pinocchios_torques() -> None:
+    columns = TorqueColumns(ARM, ("inertials", "rotor"), 7)
+    random = np.random.default_rng(3)
+    q, v, a = random.uniform(-2, 2, (3, 7, 6))
+    model = ARM.robot.model
+    expected = [pin.rnea(model, model.createData(), *row) for row in zip(q, v, a, strict=True)]
+    # independent columns are found to 1e-8
+    assert np.abs(columns.values(q, v, a) @ columns.dynamics - expected).max() < 1e-6
+    assert len(columns.wanted) == 40
+
+
+def test_series_at_rest_have_two_directions_fewer() -> None:
+    basis = FourierBasis(3.0, 4)
+    assert basis.resting.shape == (8, basis.free) == (8, 6)
+    ends = np.array([0.0, 3.0])
+    assert np.abs(basis.matrix(ends, 1)).max() < 1e-12 and np.abs(basis.matrix(ends, 2)).max() < 1e-11
+
+
+def test_no_room_is_said() -> None:
+    """A centre inside an obstacle leaves no motion."""
+    ball = Obstacle("ball", Sphere(0.5), np.eye(4))
+    arm = Arm(robot=ARM.robot, scene=Scene([ball]))
+    with pytest.raises(ExcitationInfeasible, match="clearance") as caught:
+        excite(ExcitationProblem(arm=arm, starts=2, deadline=np.inf))
+    assert caught.value.limit == "clearance"
+
+
+def test_no_time_is_said() -> None:
+    with pytest.raises(DeadlineExceeded):
+        excite(ExcitationProblem(arm=ARM, deadline=1e-3))
+
+
+def test_an_obstacle_of_the_planes_name_stands_for_it() -> None:
+    own = Scene([Obstacle(MOUNTING_PLANE, Sphere(0.05), np.diag([1.0, 1, 1, 1]))])
+    arm = module._standing(ExcitationProblem(arm=Arm(robot=ARM.robot, scene=own)))
+    assert len(arm.scene.obstacles) == 1
+    assert len(module._standing(ExcitationProblem(arm=ARM)).scene.obstacles) == 1
+    assert not module._standing(ExcitationProblem(arm=ARM, mounting_plane=False)).scene.obstacles
+
+
+@pytest.mark.parametrize(
+    ("field", "given"),
+    [
+        ("period", {"period": 0.0}),
+        ("period", {"period": float("nan")}),
+        ("harmonics", {"harmonics": 1}),
+        ("speed_fraction", {"speed_fraction": 2.0}),
+        ("parameters", {"parts": ()}),
+        ("parameters", {"parts": ("power",)}),
+        ("criterion", {"criterion": "e"}),
+        ("centre", {"centre": np.zeros(5)}),
+        ("centre.q", {"centre": np.full(6, 10.0)}),
+        ("noise", {"noise": -1.0}),
+        ("tool_cone", {"arm": Arm(robot=ARM.robot, tool_cone=ToolCone(np.eye(3)[2], -np.eye(3)[2], 0.2))}),
+    ],
+)
+def test_wrong_problems(field: str, given: dict[str, object]) -> None:
+    with pytest.raises(InvalidProblem) as caught:
+        ExcitationProblem(**{"arm": ARM, **given})  # type: ignore[arg-type]
+    assert caught.value.field == field
