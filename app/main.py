@@ -52,6 +52,7 @@ from app.routes import (
     problems,
     robots,
     studies,
+    studio,
     suggest,
     whatif,
 )
@@ -80,6 +81,7 @@ ROUTES = (
     cluster,
     problems,
     docs,
+    studio,
 )
 """Modules of routes, in the order of the documentation pages."""
 
