@@ -27,6 +27,7 @@ NEEDED = [
     "three/examples/jsm/loaders/GLTFLoader.js",
     "three/examples/jsm/loaders/OBJLoader.js",
     "three/examples/jsm/loaders/STLLoader.js",
+    "three/examples/jsm/utils/BufferGeometryUtils.js",
     "uplot/dist/uPlot.esm.js",
     "uplot/dist/uPlot.min.css",
 ]

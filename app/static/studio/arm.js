@@ -1,57 +1,64 @@
 // An arm as three.js objects: its links from the figures, its tool and its payload; and what collision checks see.
 import * as THREE from "three";
+import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import { IDENTITY } from "./chain.js";
 import { linkBodies, linkCapsules } from "./links.js";
 import { along, capsule, place, placedShape, roundedCylinder } from "./shapes.js";
 
 const COLOURS = { tube: 0xe3e7ec, housing: 0xcfd5dc, cap: 0x2f7fb8, ring: 0x3a424c, foot: 0x555e69, tool: 0x2f3742, payload: 0xd8951f };
+const SIDES = 22; // of round bodies
 const geometries = new Map(); // of each robot, by name: several arms share them
 
+/** One geometry for each link, with the colours of its bodies, and one with the capsules of its collision checks. */
 function robotGeometry(robot) {
   if (!geometries.has(robot.name)) {
-    const drawn = linkBodies(robot).map((bodies) => bodies.map(({ kind, from, to, radius }) => ({ kind, geometry: bodyGeometry(kind, from, to, radius) })));
-    const seen = linkCapsules(robot).map((own) => own.map(({ from, to, radius }) => capsule(from, to, radius, 14)));
+    const drawn = linkBodies(robot).map((bodies) => merged(bodies.map(({ kind, from, to, radius }) => coloured(bodyGeometry(kind, from, to, radius), COLOURS[kind]))));
+    const seen = linkCapsules(robot).map((own) => merged(own.map(({ from, to, radius }) => capsule(from, to, radius, 14))));
     geometries.set(robot.name, { drawn, seen });
   }
   return geometries.get(robot.name);
 }
 
-function bodyGeometry(kind, from, to, radius) {
-  if (kind === "tube") return along(from, to, (length) => new THREE.CylinderGeometry(radius, radius, length, 28, 1, true).rotateX(Math.PI / 2));
-  const round = { cap: 0.16, housing: 0.04, ring: 0.01, foot: 0.1 }[kind] * radius;
-  return along(from, to, (length) => roundedCylinder(radius, length, round, 30));
+const merged = (parts) => (parts.length ? mergeGeometries(parts) : new THREE.BufferGeometry());
+
+function coloured(geometry, colour) {
+  const one = new THREE.Color(colour).toArray();
+  const all = Array.from({ length: geometry.attributes.position.count }, () => one).flat();
+  return geometry.setAttribute("color", new THREE.Float32BufferAttribute(all, 3));
 }
 
-/** One arm in the scene. `tint`: its one colour, for a ghost or a branch; null: as it looks. `opacity` below 1: a ghost. */
+function bodyGeometry(kind, from, to, radius) {
+  if (kind === "tube") return along(from, to, (length) => new THREE.CylinderGeometry(radius, radius, length, SIDES, 1, true).rotateX(Math.PI / 2));
+  const round = { cap: 0.16, housing: 0.04, ring: 0.01, foot: 0.1 }[kind] * radius;
+  return along(from, to, (length) => roundedCylinder(radius, length, round, SIDES));
+}
+
+/** One arm in the scene. `tint`: a colour over its own ones. `opacity` below 1: a ghost, in the tint alone. */
 export class Arm {
-  constructor(chain, robot, request, { tint = null, opacity = 1 } = {}) {
+  constructor(chain, robot, request, { tint = 0xffffff, opacity = 1 } = {}) {
     this.chain = chain;
     this.object = new THREE.Group();
-    const materials = new Map();
-    const material = (kind) => {
-      const colour = tint !== null && (opacity < 1 || kind === "cap") ? tint : COLOURS[kind];
-      if (!materials.has(colour)) materials.set(colour, armMaterial(colour, opacity));
-      return materials.get(colour);
-    };
+    const ghost = opacity < 1;
     const { drawn, seen } = robotGeometry(robot);
-    const checked = armMaterial(0x66aadd, 0.45);
-    this.links = [...drawn, []].map(() => place(new THREE.Group(), chain.frames(chain.placements.map(() => 0))[0]));
-    this.drawn = [];
-    this.seen = [];
-    const put = (link, geometry, of, list) => {
-      const mesh = new THREE.Mesh(geometry, of);
-      mesh.castShadow = opacity === 1;
+    const own = armMaterial(tint, opacity, !ghost);
+    const of = (kind) => (ghost ? own : armMaterial(COLOURS[kind], 1, false));
+    this.links = [...drawn, null].map(() => place(new THREE.Group(), IDENTITY));
+    const put = (link, geometry, material) => {
+      const mesh = new THREE.Mesh(geometry, material);
+      mesh.castShadow = !ghost;
       this.links[link].add(mesh);
-      list.push(mesh);
       return mesh;
     };
     // a ghost stands on the same base
-    drawn.forEach((bodies, link) => (link > 0 || opacity === 1) && bodies.forEach(({ kind, geometry }) => put(link, geometry, material(kind), this.drawn)));
-    if (opacity === 1) seen.forEach((own, link) => own.forEach((geometry) => put(link, geometry, checked, this.seen).castShadow = false));
-    for (const { start, end, radius } of request.tool?.capsules ?? []) put(seen.length, capsule(start, end, radius, 18), material("tool"), []);
+    this.drawn = drawn.map((geometry, link) => link > 0 || !ghost ? put(link, geometry, own) : null).filter(Boolean);
+    this.seen = ghost ? [] : seen.map((geometry, link) => put(link, geometry, armMaterial(0x66aadd, 0.45, false)));
+    for (const mesh of this.seen) mesh.castShadow = false;
+    const tool = (request.tool?.capsules ?? []).map(({ start, end, radius }) => capsule(start, end, radius, 16));
+    if (tool.length) put(drawn.length, merged(tool), of("tool"));
     const load = request.payload?.shape;
     if (load) {
-      const part = placedShape(load, material("payload"));
-      part.traverse((each) => { each.castShadow = opacity === 1; });
+      const part = placedShape(load, of("payload"));
+      part.traverse((each) => { each.castShadow = !ghost; });
       this.links.at(-1).add(part);
     }
     this.object.add(...this.links);
@@ -70,7 +77,9 @@ export class Arm {
   }
 }
 
-function armMaterial(colour, opacity) {
+function armMaterial(color, opacity, vertexColors) {
   const ghost = opacity < 1;
-  return new THREE.MeshPhongMaterial({ color: colour, shininess: 28, specular: 0x333333, transparent: ghost, opacity, depthWrite: !ghost, polygonOffset: ghost, polygonOffsetFactor: 2, polygonOffsetUnits: 2 });
+  const offset = { polygonOffset: ghost, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
+  const common = { color, opacity, vertexColors, transparent: ghost, depthWrite: !ghost, ...offset };
+  return ghost ? new THREE.MeshLambertMaterial(common) : new THREE.MeshPhongMaterial({ ...common, shininess: 28, specular: 0x333333 });
 }

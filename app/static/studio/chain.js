@@ -64,6 +64,17 @@ export function inverse(T) {
   return R;
 }
 
+/** What is drawn of a request: the same with all obstacles in the base frame. ROS's `base_link` may stand elsewhere. */
+export function cellOf(request, robot) {
+  const T = ofOrigin(robot.kinematics.base_link_origin?.value ?? [0, 0, 0, 0, 0, 0]);
+  const obstacles = (request.scene?.obstacles ?? []).map((obstacle) => {
+    if (obstacle.pose?.frame !== "base_link") return obstacle;
+    const pose = multiply(T, ofPose(obstacle.pose));
+    return { ...obstacle, pose: { position: [pose[3], pose[7], pose[11]], quaternion: quaternionOf(pose) } };
+  });
+  return { ...request, scene: { obstacles } };
+}
+
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
 /** The chain of a robot, from `GET /robots/{name}`. Joints turn about z. */

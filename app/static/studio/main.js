@@ -35,8 +35,10 @@ async function start() {
   const given = await shared();
   if (given.answer) {
     const kept = await get(`answers/${encodeURIComponent(given.answer)}`);
-    setRequest(given.request ?? { robot: kept.answer.robot });
-    await showAnswer(kept.answer, given.request);
+    const { answer } = kept;
+    // the same arm between the same ends: what the answer does not say of its request stays at the defaults
+    setRequest(given.request ?? { robot: answer.robot, ...answer.arm, start: { q: answer.branch.start.q }, goal: { q: answer.branch.goal.q } });
+    await showAnswer(answer, state.request);
   } else {
     setRequest(given.request ?? (await get(FIRST)));
     await optimise();

@@ -1,6 +1,7 @@
 // The request: examples, JSON, and its way to the service and back.
 import { Problem, get, stream } from "./api.js";
-import { $, el, figure } from "./dom.js";
+import { cellOf } from "./chain.js";
+import { $, el, figure, svg } from "./dom.js";
 import { follow, set, state } from "./store.js";
 
 const EXAMPLE = "From a bin to a shelf";
@@ -60,7 +61,7 @@ export async function compute(path, request) {
   running?.abort();
   const own = (running = new AbortController());
   const began = performance.now();
-  const progress = { done: 0, total: 0, incumbent: null };
+  const progress = { done: 0, total: 0, incumbents: [] };
   problem(null);
   busy(true);
   const timer = setInterval(() => tell(progress, began), 200);
@@ -84,7 +85,7 @@ async function streamed(path, request, progress, signal) {
     if (name === "answer") answer = data;
     else if (name === "candidates") progress.total = data.total;
     else if (name === "candidate") progress.done += 1;
-    else if (name === "incumbent") progress.incumbent = data;
+    else if (name === "incumbent") progress.incumbents.push({ ...data, at: performance.now() });
   }, signal);
   if (!answer) throw new Problem({ title: "The answer broke off", detail: "The connection ended before the answer came: send the request again." });
   return answer;
@@ -108,15 +109,32 @@ function busy(on) {
   $("progress").hidden = !on;
   $("optimise").disabled = on;
   document.body.toggleAttribute("aria-busy", on);
+  $("progress-chart").replaceChildren();
   if (on) $("progress-bar").removeAttribute("value");
 }
 
-function tell({ done, total, incumbent }, began) {
-  if (total) $("progress-bar").value = done / total;
+function tell({ done, total, incumbents }, began) {
+  if (total) $("progress-bar").value = Math.min(1, done / total);
+  const incumbent = incumbents.at(-1);
+  if (incumbents.length > 1) $("progress-chart").replaceChildren(falling(incumbents, began));
   const parts = [`${((performance.now() - began) / 1000).toFixed(1)} s`];
   if (total) parts.push(`${done} of ${total} branches`);
-  if (incumbent) parts.push(`best ${figure(incumbent.energy)} J, bound ${figure(incumbent.bound)} J, gap ${figure(100 * incumbent.gap, 2)} %`);
+  if (incumbent) parts.push(`best ${figure(incumbent.energy)} J, bound ${figure(incumbent.bound)} J, gap ${figure(100 * (incumbent.gap ?? NaN), 2)} %`);
   $("progress-text").textContent = parts.join(" · ");
+}
+
+/** The best energy and its bound over time, both in one small picture. */
+function falling(incumbents, began) {
+  const now = performance.now();
+  const [least, most] = [Math.min(...incumbents.map(({ bound, energy }) => bound ?? energy)), incumbents[0].energy];
+  const x = (at) => (100 * (at - began)) / (now - began);
+  const y = (value) => 28 - (26 * (value - least)) / (most - least || 1);
+  const steps = (key) => incumbents.flatMap((each, k) => {
+    const until = incumbents[k + 1]?.at ?? now;
+    return each[key] === null ? [] : [`${x(each.at)},${y(each[key])}`, `${x(until)},${y(each[key])}`];
+  }).join(" ");
+  const line = (key) => svg("polyline", { points: steps(key), class: key, "vector-effect": "non-scaling-stroke" });
+  return svg("svg", { viewBox: "0 0 100 30", preserveAspectRatio: "none", role: "img", "aria-label": "Best energy and bound over time" }, line("energy"), line("bound"));
 }
 
 /** Figures of a robot, asked for once. */
@@ -125,12 +143,12 @@ export async function robotOf(name) {
   return robots.get(name);
 }
 
-/** Shows an answer of POST /optimize to a request. Without the request, there is no cell to draw. */
+/** Shows an answer of POST /optimize. Without its request, the cell is what the answer says of its arm. */
 export async function showAnswer(answer, request) {
   const robot = await robotOf(answer.robot);
-  const asked = request ?? { robot: answer.robot };
+  const asked = { ...answer.arm, ...request, robot: answer.robot };
   set({
-    asked, robot, answer, chosen: [], round: null, time: 0, duration: answer.duration,
+    asked: request ?? null, cell: cellOf(asked, robot), robot, answer, chosen: [], round: null, time: 0, duration: answer.duration,
     arms: [{ name: "this motion", answer }],
   });
   const { warnings } = answer;

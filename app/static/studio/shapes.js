@@ -34,9 +34,9 @@ export const capsule = (from, to, radius, segments = 20) =>
 export function roundedCylinder(radius, length, round, segments = 32) {
   const edge = Math.min(round, radius / 2, length / 2);
   const profile = [new THREE.Vector2(0, -length / 2)];
-  for (const [sign, steps] of [[-1, [0, 1, 2, 3]], [1, [3, 2, 1, 0]]])
+  for (const [sign, steps] of [[-1, [0, 1, 2]], [1, [2, 1, 0]]])
     for (const step of steps) {
-      const angle = (step / 3) * (Math.PI / 2);
+      const angle = (step / 2) * (Math.PI / 2);
       profile.push(new THREE.Vector2(radius - edge + edge * Math.sin(angle), sign * (length / 2 - edge + edge * Math.cos(angle))));
     }
   profile.push(new THREE.Vector2(0, length / 2));

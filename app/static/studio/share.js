@@ -1,20 +1,45 @@
 // Take away: a link that holds the request, and downloads.
 import { send } from "./api.js";
 import { $, el, save } from "./dom.js";
-import { problem } from "./request.js";
+import { openapi, problem } from "./request.js";
 import { state } from "./store.js";
 
+const WARNING = "Set payload, speed and safety limits on the controller before you run it. No format was run on hardware.";
+
 export function createShare(view) {
+  $("downloads").ontoggle = () => $("downloads").open && !$("exports") && offerExports().catch(problem);
   $("share").onclick = () => share().catch(problem);
   const files = [
     ["Answer (JSON)", () => save("answer.json", JSON.stringify(state.answer), "application/json")],
     ["Samples (CSV)", () => save("motion.csv", csv(state.answer.trajectory), "text/csv")],
-    ["Request (JSON)", () => save("request.json", JSON.stringify(state.asked, null, 1), "application/json")],
+    ["Request (JSON)", () => save("request.json", JSON.stringify(state.asked ?? state.request, null, 1), "application/json")],
     ["Robot (URDF)", async () => save(`${state.answer.robot}.urdf`, await (await send(`robots/${state.answer.robot}/urdf`, {})).blob())],
     ...(view ? [["Picture (PNG)", async () => save("motion.png", await view.picture())]] : []),
   ];
   $("download-list").replaceChildren(...files.map(([name, give]) =>
     el("button", { type: "button", onclick: async () => { $("downloads").open = false; if (state.answer) await give(); } }, name)));
+}
+
+/** Buttons for the formats that the service exports to. */
+async function offerExports() {
+  const { paths, components } = await openapi();
+  const post = paths["/export/{format}"]?.post;
+  if (!post) return;
+  const { schema, ...parameter } = post.parameters.find(({ name }) => name === "format");
+  const formats = schema.enum ?? components.schemas[schema.$ref.split("/").at(-1)].enum;
+  const texts = { ...parameter, ...schema }["x-enum-descriptions"] ?? {};
+  const button = (format) => el("button", { type: "button", title: texts[format] ?? "", onclick: () => exportAs(format).catch(problem) }, format);
+  $("download-list").append(el("hr"), el("p", {}, "For the robot's controller"), el("div", { id: "exports" }, formats.map(button)), el("p", {}, WARNING));
+}
+
+async function exportAs(format) {
+  $("downloads").open = false;
+  const { answer } = state;
+  const body = { answer: answer.answer ?? answer };
+  const response = await send(`export/${format}`, { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
+  const name = /filename="?([^";]+)/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? `motion.${format}`;
+  save(name, await response.blob());
+  $("status").textContent = [response.headers.get("Joulepath-Notes"), WARNING].filter(Boolean).join("; ");
 }
 
 /** The motion as a table that `POST /evaluate` reads again. */

@@ -3,6 +3,7 @@
 export const state = {
   request: null, // body of POST /optimize as it is edited
   asked: null, // the body that `answer` belongs to
+  cell: null, // what is drawn around the answer: tool, payload and obstacles, in the base frame
   answer: null,
   robot: null, // GET /robots/{name} of the answer
   arms: [], // [{name, colour, answer}]: the answer and further branches, which move on one clock

@@ -18,6 +18,8 @@ const DEFAULT_MARGIN = 0.005;
 // time of a frame [s] above which the picture gets coarser while it moves, and below which finer again
 const SLOW = 0.055;
 const FAST = 0.022;
+// pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that alone
+const STILL = 2;
 
 let view = null;
 
@@ -38,7 +40,7 @@ export function createView() {
 class View {
   constructor(box) {
     this.box = box;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: false });
+    this.renderer = new THREE.WebGLRenderer({ antialias: false, alpha: true });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     box.prepend(this.renderer.domElement);
@@ -47,6 +49,11 @@ class View {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
+    for (const [name, dragging] of [["start", true], ["end", false]])
+      this.controls.addEventListener(name, () => {
+        this.dragging = dragging;
+        this.draw();
+      });
     this.parts = Object.fromEntries(["arms", "ghosts", "obstacles", "margins", "path", "nearest", "axes"].map((name) => {
       const group = new THREE.Group();
       this.scene.add(group);
@@ -54,7 +61,8 @@ class View {
     }));
     this.labels = new Labels($("labels"), this.camera);
     this.eye = new Eye(this.camera, this.controls, this.parts.obstacles);
-    this.fineness = 1;
+    this.fineness = this.coarse = 1;
+    this.pace = (SLOW + FAST) / 2;
     this.light();
     this.axes();
     new ResizeObserver(() => this.resize()).observe(box);
@@ -81,18 +89,18 @@ class View {
 
   /** Everything anew: another answer, or other arms beside it. */
   build() {
-    const { answer, asked, robot, arms } = state;
+    const { answer, cell, robot, arms } = state;
     if (!answer) return;
     this.chain = new Chain(robot);
     for (const name of ["arms", "obstacles", "margins", "path"]) this.empty(this.parts[name]);
     this.arms = arms.map(({ answer: own, colour }, k) => {
-      const arm = new Arm(this.chain, robot, asked, { tint: k ? colour : null });
+      const arm = new Arm(this.chain, robot, cell, k ? { tint: colour } : {});
       this.parts.arms.add(arm.object);
-      this.parts.path.add(pathOfPower(own.trajectory, (q) => this.chain.tcp(q, asked.tcp), k ? 0.006 : 0.009));
+      this.parts.path.add(pathOfPower(own.trajectory, (q) => this.chain.tcp(q, cell.tcp), k ? 0.006 : 0.009));
       return arm;
     });
-    for (const obstacle of asked.scene?.obstacles ?? []) this.obstacle(obstacle);
-    this.nearest = this.nearestOf(answer, asked, robot);
+    for (const obstacle of cell.scene.obstacles) this.obstacle(obstacle);
+    this.nearest = this.nearestOf(answer, cell, robot);
     this.eye.fit(state.answer.trajectory, this.chain, this.sun);
     this.explain();
     this.buildGhosts();
@@ -132,10 +140,10 @@ class View {
 
   buildGhosts() {
     this.empty(this.parts.ghosts);
-    const { answer, asked, robot, chosen } = state;
+    const { answer, cell, robot, chosen } = state;
     if (!answer) return;
     const ghost = (q, tint, opacity) => {
-      const arm = new Arm(this.chain, robot, asked, { tint, opacity });
+      const arm = new Arm(this.chain, robot, cell, { tint, opacity });
       arm.pose(q);
       this.parts.ghosts.add(arm.object);
     };
@@ -145,13 +153,13 @@ class View {
     this.draw();
   }
 
-  nearestOf(answer, asked, robot) {
+  nearestOf(answer, cell, robot) {
     const clearance = answer.certificate.clearance;
     this.empty(this.parts.nearest);
     this.labels.drop("nearest");
     if (!clearance) return null;
     const { t, q } = answer.trajectory;
-    const points = nearestPoints(asked, robot, this.chain.frames(sampleAt(t, q, clearance.time)), clearance.pair);
+    const points = nearestPoints(cell, robot, this.chain.frames(sampleAt(t, q, clearance.time)), clearance.pair);
     if (!points) return null;
     const ends = [points.first, points.second].map((point) => new THREE.Vector3(...point));
     const material = new THREE.MeshBasicMaterial({ color: 0xd62f6b, depthTest: false, transparent: true });
@@ -163,7 +171,7 @@ class View {
     }
     const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(ends), new THREE.LineBasicMaterial({ color: 0xd62f6b, depthTest: false }));
     this.parts.nearest.add(line);
-    const text = `${clearance.pair.join(" – ")}: ${figure((clearance.sampled + marginOf(asked, clearance.pair)) * 1000)} mm at ${figure(clearance.time)} s`;
+    const text = `${clearance.pair.join(" – ")}: ${figure((clearance.sampled + marginOf(cell, clearance.pair)) * 1000)} mm at ${figure(clearance.time)} s`;
     return { text, at: points.first.map((value, axis) => (value + points.second[axis]) / 2) };
   }
 
@@ -201,8 +209,8 @@ class View {
 
   render() {
     const began = performance.now();
-    if (state.playing) this.adapt(began);
-    else if (this.fineness < 1) this.setFineness(1);
+    if (state.playing || this.dragging) this.adapt(began);
+    else this.setFineness(STILL);
     this.controls.update();
     if (this.arms) this.eye.fade(this.arms[0].frames);
     this.renderer.render(this.scene, this.camera);
@@ -214,15 +222,17 @@ class View {
   /** Coarser while frames come slowly, finer when they come fast. A still picture is always fine. */
   adapt(now) {
     const took = (now - (this.last ?? now)) / 1000;
-    this.pace = 0.8 * (this.pace ?? 0.03) + 0.2 * Math.min(took, 0.3);
-    if (this.pace > SLOW && this.fineness > 0.5) this.setFineness(this.fineness - 0.25);
-    else if (this.pace < FAST && this.fineness < 1) this.setFineness(this.fineness + 0.25);
+    if (this.fineness === this.coarse && took < 0.5) this.pace = 0.8 * this.pace + 0.2 * took;
+    const step = this.pace > SLOW && this.coarse > 0.5 ? -0.25 : this.pace < FAST && this.coarse < STILL ? 0.25 : 0;
+    if (step) this.pace = (SLOW + FAST) / 2;
+    this.coarse += step;
+    this.setFineness(this.coarse);
   }
 
   setFineness(fineness) {
+    if (this.fineness === fineness) return;
     this.fineness = fineness;
-    this.pace = (SLOW + FAST) / 2;
-    this.renderer.setPixelRatio(fineness * Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(fineness);
   }
 
   /** One of the six views, by its number. */
@@ -235,7 +245,7 @@ class View {
     const { clientWidth: width, clientHeight: height } = this.box;
     if (!width || !height) return;
     this.size = { width, height };
-    this.renderer.setPixelRatio(this.fineness * Math.min(devicePixelRatio, 2));
+    this.renderer.setPixelRatio(this.fineness);
     this.renderer.setSize(width, height);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -250,15 +260,15 @@ class View {
 
   /** The picture as a PNG. */
   picture() {
-    this.setFineness(1);
+    this.setFineness(STILL);
     this.renderer.render(this.scene, this.camera);
     return new Promise((resolve) => this.renderer.domElement.toBlob(resolve));
   }
 }
 
 /** The margin [m] between two bodies by name: that of the obstacle, if one of them is one. */
-export function marginOf(asked, pair) {
-  const obstacle = asked.scene?.obstacles?.find(({ name }) => pair.includes(name));
+export function marginOf(cell, pair) {
+  const obstacle = cell.scene.obstacles.find(({ name }) => pair.includes(name));
   return obstacle ? (obstacle.margin ?? DEFAULT_MARGIN) : 0;
 }
 
@@ -266,4 +276,4 @@ export function marginOf(asked, pair) {
 export const show = (name, on) => set({ show: { ...state.show, [name]: on } });
 
 /** Pose of the TCP as it is drawn now: a matrix, row by row. */
-export const drawnTcp = () => multiply(view.arms[0].links.at(-1).matrix.clone().transpose().toArray(), ofPose(state.asked.tcp));
+export const drawnTcp = () => multiply(view.arms[0].links.at(-1).matrix.clone().transpose().toArray(), ofPose(state.cell.tcp));
