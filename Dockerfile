@@ -17,10 +17,17 @@ RUN python3 -m venv venv \
         -r /tmp/${LOCK} \
     && pip uninstall --yes --quiet pip setuptools \
     && python /tmp/slim.py venv
+# The libraries of the studio page, by an npm that stays in this step.
+COPY requirements-node.lock scripts/vendor_studio.py /tmp/studio/scripts/
+COPY app/static/studio/package.json app/static/studio/package-lock.json /tmp/studio/app/static/studio/
+RUN mv /tmp/studio/scripts/requirements-node.lock /tmp/studio/ \
+    && python3 -m venv /tmp/node && PATH=/tmp/node/bin:$PATH \
+    && python /tmp/studio/scripts/vendor_studio.py && rm -rf /tmp/node
 COPY LICENSE ./
 COPY models models
 COPY optimizer optimizer
 COPY app app
+RUN mv /tmp/studio/app/static/studio/vendor app/static/studio/
 ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
 RUN mkdir /opt/matplotlib \

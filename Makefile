@@ -15,6 +15,7 @@ export JOULEPATH_ROBOTS
 VENV := .venv
 PY := $(VENV)/bin/python
 INSTALL := $(PY) scripts/install.py
+STUDIO := app/static/studio
 SOURCES := app optimizer models tests benchmarks examples scripts
 
 # The optimiser compiles its kernels once per robot. Where there is no C compiler, one comes as a Python package.
@@ -28,14 +29,14 @@ comma := ,
 
 .PHONY: serve test test-long bench lock clean lint kernels pytest pytest-long
 
-serve: $(VENV)/.runtime kernels
+serve: $(VENV)/.runtime $(STUDIO)/vendor kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
 # the linters run beside the tests
-test: $(VENV)/.dev kernels
+test: $(VENV)/.dev $(STUDIO)/vendor kernels
 	@$(MAKE) --no-print-directory --jobs=2 lint pytest
 
-test-long: $(VENV)/.dev kernels
+test-long: $(VENV)/.dev $(STUDIO)/vendor kernels
 	@$(MAKE) --no-print-directory --jobs=2 lint pytest-long
 
 pytest:
@@ -62,6 +63,12 @@ $(VENV)/.runtime: requirements.lock $(PY)
 	@$(INSTALL) $<
 	@$(PY) scripts/slim.py $(VENV)
 	@$(PY) scripts/link_libgomp.py
+	@touch $@
+
+# The libraries of the studio page.
+$(STUDIO)/vendor: $(STUDIO)/package-lock.json scripts/vendor_studio.py $(PY)
+	@echo "Fetching the libraries of the studio page into $@ ..."
+	@$(PY) scripts/vendor_studio.py
 	@touch $@
 
 $(VENV)/.dev: requirements-dev.lock $(VENV)/.runtime
@@ -94,7 +101,8 @@ lock: $(VENV)/.dev
 	$(LOCK) pyproject.toml --extra cluster --constraints requirements-dev.lock \
 		--output-file requirements-cluster.lock
 	$(LOCK) --group compiler --output-file requirements-compiler.lock
+	$(LOCK) --group node --output-file requirements-node.lock
 
 clean:
-	rm -rf $(VENV) build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(STUDIO)/vendor build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -53,6 +53,7 @@ from app.routes import (
     problems,
     robots,
     studies,
+    studio,
     suggest,
     whatif,
 )
@@ -82,6 +83,7 @@ ROUTES = (
     cluster,
     problems,
     docs,
+    studio,
 )
 """Modules of routes, in the order of the documentation pages."""
 

@@ -18,6 +18,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.solution import Energy
 from optimizer.surroundings import Surroundings
+from optimizer.trajectories.limit_ratios import too_much
 from optimizer.trajectories.spline import Spline
 
 # value of a second in a minimum-time solve [W]: a hundred times what energy could make up for
@@ -76,11 +77,18 @@ class PreparedProblem(Plant):
             self._joint_paths[key] = joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
         return self._joint_paths[key]
 
-    def satisfies_path_constraints(self, q: Array, v: Array) -> bool:
-        """Whether samples q [rad], v [rad/s] (k, nq) of a motion satisfy the path constraints and do not collide."""
-        if self.path is not None and (self.path.ratios(q, v) > 1 + RATIO_ROUNDING).any():
-            return False
-        return self.surroundings.is_collision_free(q)
+    def broken_on_the_way(self, q: Array, v: Array) -> list[str]:
+        """What samples q [rad], v [rad/s] (k, nq) of a motion break, in words: path constraints, a margin."""
+        broken = []
+        if self.path is not None:
+            worst = self.path.ratios(q, v).max(axis=0)
+            ratios = dict(sorted(zip(self.path.names, worst, strict=True), key=lambda each: each[1]))
+            broken = [too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + RATIO_ROUNDING]
+        collision = self.surroundings.worst_collision(q)
+        if collision is not None:
+            first, second = collision.pair
+            broken.append(f"{first} and {second} are {-collision.distance * 1e3:.3g} mm closer than allowed")
+        return broken
 
     def holding_power(self, q: Array) -> Array:
         """Power drawn (...) [W] while the motors hold the arm at standstill at q (..., nq) [rad]."""

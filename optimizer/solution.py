@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE
 from optimizer.trajectories.spline import Spline
 
@@ -169,14 +169,31 @@ BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "contr
 
 @dataclass(frozen=True)
 class Baseline:
-    """Energy [J] of another method's motion between the same ends; `saving` = 1 - ours / theirs, of the objective."""
+    """Energy [J] of another method's motion between the same ends; `saving` = 1 - ours / theirs, of the objective.
+
+    `reason` says which limits it breaks, and what collides; None if it is within all.
+    """
 
     name: BaselineName
     duration: float
     electrical: float
     mechanical: float
-    within_limits: bool
     saving: float
+    reason: str | None
+
+    @property
+    def within_limits(self) -> bool:
+        """Whether this motion is within every limit; collisions are checked at sample points."""
+        return self.reason is None
+
+
+@dataclass(frozen=True)
+class LimitsInForce:
+    """The limits that an answer was held to: those of the joints; speeds [m/s] of TCP and elbow, None without limit."""
+
+    joints: Limits
+    tcp_speed: float | None
+    elbow_speed: float | None
 
 
 @dataclass(frozen=True)
@@ -263,6 +280,7 @@ class Solution:
     goal: Branch
     trajectory: Trajectory
     energy: Energy
+    limits: LimitsInForce
     lower_bound: float
     baselines: list[Baseline]
     candidates: list[CandidateReport]

@@ -11,7 +11,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.collision.clearance_proof import proven_clearance
-from optimizer.collision.model import CollisionModel, collision_model
+from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from optimizer.collision.path_planner import MOST_STATES, PlannedPaths, PlanningEnd, plan_paths
 from optimizer.deadline import Deadline
 from optimizer.kinematics.forward import joint_placements
@@ -67,6 +67,17 @@ class Surroundings:
         if not self.arm.collisions:
             return True
         return self.model.least_distance(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0) >= 0
+
+    def worst_collision(self, q: Array) -> ClosestPair | None:
+        """The pair that violates its margin most over samples q (k, nq) [rad] of a motion; None if none does.
+
+        About CONTACT_SAMPLES of the samples are checked.
+        """
+        if not self.arm.collisions:
+            return None
+        closest = self.model.closest_pairs(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0)
+        worst = min(closest, key=lambda each: each.distance, default=None)
+        return worst if worst is not None and worst.distance < 0 else None
 
     def is_near_contact(self, q: Array) -> bool:
         """Whether any of q (k, nq) [rad] has a clearance below NEAR_CONTACT.

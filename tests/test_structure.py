@@ -13,6 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("app", "optimizer", "models")
 MOST_LINES = 350  # of a file
+MOST_PAGE_LINES = 3000  # of all scripts, styles and markup of the studio page
 MOST_FUNCTION_LINES = 60  # from the first decorator to the last line, docstring included
 
 
@@ -59,6 +60,26 @@ def test_a_room_says_in_one_line_what_it_is_for(room: Path) -> None:
 @pytest.mark.parametrize("path", all_sources(), ids=name)
 def test_no_file_is_long(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= MOST_LINES
+
+
+def page_sources() -> list[Path]:
+    """The files of the studio page that are ours."""
+    folder = ROOT / "app" / "static" / "studio"
+    return sorted(path for kind in ("js", "css", "html") for path in folder.glob(f"*.{kind}"))
+
+
+def test_the_studio_page_stays_small() -> None:
+    lengths = {name(path): len(path.read_text().splitlines()) for path in page_sources()}
+    assert max(lengths.values()) <= MOST_LINES, lengths
+    assert sum(lengths.values()) <= MOST_PAGE_LINES, lengths
+
+
+def test_the_architecture_page_names_every_script_of_the_studio_page() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    _, _, section = page.partition("### app/static/studio/")
+    cells = [row.split("|")[1] for row in section.partition("\n#")[0].splitlines() if row.startswith("|")]
+    named = {word for cell in cells for word in re.findall(r"`([\w.]+)`", cell)}
+    assert {path.name for path in page_sources()} == named
 
 
 @pytest.mark.parametrize("path", all_sources(), ids=name)

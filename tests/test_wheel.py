@@ -95,12 +95,15 @@ def clean(variables: os._Environ[str] | dict[str, str]) -> dict[str, str]:
 
 
 def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
-    """Every tracked file of the three packages, and nothing else beside the metadata."""
+    """Every tracked file of the three packages, the libraries of the page, and nothing else beside the metadata."""
     tracked = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "app", "optimizer", "models"],
         cwd=ROOT, capture_output=True, text=True, check=True,
     ).stdout.split()  # fmt: skip
-    present = {name for name in tracked if (ROOT / name).exists()}
+    vendor = (ROOT / "app" / "static" / "studio" / "vendor").rglob("*")
+    present = {name for name in tracked if (ROOT / name).exists()} | {
+        str(each.relative_to(ROOT)) for each in vendor if each.is_file()
+    }
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if ".dist-info/" not in name}
     assert held == present

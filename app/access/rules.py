@@ -8,8 +8,8 @@ from typing import get_args
 from app.access.client import Client, Role
 from app.exceptions import NotOwner, RoleTooLow
 
-PUBLIC = re.compile(r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+")
-"""Paths without anything of a user's: probes, the documentation, the pages that explain problems."""
+PUBLIC = re.compile(r"/healthz|/readyz|/openapi\.json|/redoc|/docs(/[^/]+)?|/problems/[^/]+|/|/studio(/\w[\w.-]*)*")
+"""Paths without anything of a user's: probes, the documentation, the pages that explain problems, the studio page."""
 _READING = ("GET", "HEAD", "OPTIONS")
 # it answers a question, but takes the workers' time
 _COMPUTING = re.compile(r"/studies/[^/]+/suggest")

@@ -9,8 +9,18 @@ from app.convert.fields import fields, unreachable_fields
 from app.convert.warnings import certified_warnings
 from app.schemas.request import WhichCandidates
 from app.schemas.response import Clearance
+from optimizer.problem.arm import LIMIT_NAMES
 from optimizer.problem.problem import MethodName
-from optimizer.solution import Certificate, ElectricalEnergy, Energy, Objective, Solution, StorageUse, Trajectory
+from optimizer.solution import (
+    Certificate,
+    ElectricalEnergy,
+    Energy,
+    LimitsInForce,
+    Objective,
+    Solution,
+    StorageUse,
+    Trajectory,
+)
 
 
 class Asked(Protocol):
@@ -48,6 +58,7 @@ def to_optimize_response(
             "lower_bound": solution.lower_bound,
             "optimality_gap": optimality_gap(solution.lower_bound, solution.energy.of(request.objective)),
         },
+        "limits": limit_fields(solution.limits),
         "baselines": baseline_fields(solution),
         "candidates": [candidate_fields(candidate) for candidate in chosen(solution.candidates, request.candidates)],
         "candidate_counts": candidate_counts(solution.candidates),
@@ -75,8 +86,19 @@ def optimality_gap(bound: float, energy: float) -> float:
 
 def baseline_fields(solution: Solution) -> list[dict[str, Any]]:
     """The entries of `baselines`."""
-    names = ("name", "duration", "electrical", "mechanical", "within_limits", "saving")
+    names = ("name", "duration", "electrical", "mechanical", "within_limits", "reason", "saving")
     return [fields(baseline, *names) for baseline in solution.baselines]
+
+
+def limit_fields(limits: LimitsInForce) -> dict[str, Any]:
+    """The limits in force; an infinite one becomes null in JSON."""
+    names = {name: getattr(limits.joints, attribute) for name, attribute in LIMIT_NAMES.items()}
+    return {
+        "position_min": limits.joints.q_min,
+        "position_max": limits.joints.q_max,
+        **names,
+        **fields(limits, "tcp_speed", "elbow_speed"),
+    }
 
 
 def energy_fields(energy: Energy) -> dict[str, Any]:

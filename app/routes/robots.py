@@ -27,6 +27,7 @@ from app.tasks.own_robot import OwnRobotTask
 from models.registry import load_robot, robot_names
 from models.robot import FrictionLaw as Law
 from models.trust import TRUST, energy_trust
+from models.urdf import urdf_of
 
 router = APIRouter(prefix="/robots", tags=["robots"], route_class=LargeBodyRoute)
 
@@ -89,6 +90,23 @@ async def show_robot(name: Name, store: ServiceStore) -> RobotDetail:
     if name in robot_names():
         return _detail(name, load_robot(name).figures, added=False, owner=None, warnings=[])
     return _of_user(await store.read(partial(robots.get, name=name)))
+
+
+@router.get(
+    "/{name}/urdf",
+    summary="The URDF of a robot",
+    response_class=Response,
+    responses={
+        200: {"content": {"application/xml": {"schema": {"type": "string"}}}, "description": "The URDF"},
+        **problem_responses(problems.UnknownRobot, problems.StoreUnavailable),
+    },
+)
+async def urdf(name: Name, store: ServiceStore) -> Response:
+    """The chain of joints from `base` to `flange`, with masses, inertias and limits, without meshes."""
+    figures = load_robot(name).figures if name in robot_names() else None
+    if figures is None:
+        figures = (await store.read(partial(robots.get, name=name))).figures
+    return Response(urdf_of(name, figures), media_type="application/xml")
 
 
 @router.put(

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from app.schemas.common import MotionAnswer, Response, described, part
 from app.schemas.examples.values import ANSWER_PATH, HOME, LABEL, STANDING_STILL
+from app.schemas.limits_in_force import LimitsInForce
 from optimizer.collision.close_pass import CLOSE
 from optimizer.problem.problem import MethodName
 from optimizer.solution import Objective
@@ -169,6 +170,12 @@ class Baseline(Response):
     within_limits: bool = described(
         "Whether this motion is within every limit; collisions are checked at sample points.", None, True
     )
+    reason: str | None = described(
+        "What keeps this motion from being within every limit, in words: limits that it breaks, and two bodies that "
+        "come closer than allowed, by how much. Null if nothing does.",
+        None,
+        "bin front and payload are 31 mm closer than allowed",
+    )
     saving: float = described("1 - energy of the answer / energy of this motion, of the objective.", "1", 0.199)
 
 
@@ -325,6 +332,7 @@ class OptimizeResponse(MotionAnswer):
     branch: Branches = part("Arm configurations of the chosen candidate.")
     trajectory: Trajectory = part("The motion.")
     energy: Energy = part("Energy and power of the motion.")
+    limits: LimitsInForce = part("The limits that the motion was held to.")
     baselines: Annotated[list[Baseline], Field(min_length=1)] = part("The same task by other planners.")
     candidates: list[Candidate] = part(
         "Pairs of a start and a goal configuration, with their results, as `candidates` of the request asks."

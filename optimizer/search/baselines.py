@@ -23,11 +23,12 @@ from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown
 from optimizer.problem.problem import Problem
 from optimizer.solution import Baseline, BaselineName, Energy
-from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios
+from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
 from optimizer.trajectories.ruckig_motion import time_optimal
 from optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
 
 Torques = Callable[[Array, Array, Array], Array]
+Broken = Callable[[Array, Array], list[str]]
 
 
 def baselines(
@@ -38,14 +39,13 @@ def baselines(
     ours: float,
     torques: Torques,
     potential: Callable[[Array], float],
-    satisfies_path_constraints: Callable[[Array, Array], bool],
+    broken_on_the_way: Broken,
 ) -> list[Baseline]:
     """Every baseline from q_start (nq,) to the nearest of q_goals (m, nq), which are within the position limits.
 
     `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
     (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
-    `satisfies_path_constraints` says of samples q, v (k, nq) whether they are free of collision and within the limits
-    along the path.
+    `broken_on_the_way` says of samples q, v (k, nq) which limits along the path they break, and what collides.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks
@@ -56,7 +56,7 @@ def baselines(
         goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
         hold = float(holding_power(problem.arm, torques(goal, still, still))[0])
     for (name, motion), tau in zip(motions.items(), np.split(torques(q, v, a), ends), strict=True):
-        result.append(compared(problem, name, motion, tau, hold, ours, potential, satisfies_path_constraints))
+        result.append(compared(problem, name, motion, tau, hold, ours, potential, broken_on_the_way))
     return result
 
 
@@ -68,7 +68,7 @@ def compared(
     hold: float,
     ours: float,
     potential: Callable[[Array], float],
-    satisfies_path_constraints: Callable[[Array, Array], bool],
+    broken_on_the_way: Broken,
 ) -> Baseline:
     """A motion with torques tau (k, nq) as a baseline; after it, holding the arm draws `hold` [W]. See `baselines`."""
     energy = motion_energy(problem, motion, tau, potential)
@@ -79,8 +79,8 @@ def compared(
         duration=motion.duration,
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
-        within_limits=within_limits(problem, motion, tau) and satisfies_path_constraints(motion.q, motion.v),
         saving=saving(ours, energy.of(problem.objective)),
+        reason="; ".join([*broken_limits(problem, motion, tau), *broken_on_the_way(motion.q, motion.v)]) or None,
     )
 
 
@@ -123,15 +123,17 @@ def motion_energy(problem: Problem, motion: SampledMotion, tau: Array, potential
     )
 
 
-def within_limits(problem: Problem, motion: SampledMotion, tau: Array) -> bool:
-    """Whether a motion is within every limit: its exact peaks of the rates, positions and torques at its samples.
+def broken_limits(problem: Problem, motion: SampledMotion, tau: Array) -> list[str]:
+    """The limits that a motion breaks, in words: its exact peaks of the rates, positions and torques at its samples.
 
-    A motion that takes longer than the cycle does not.
+    A motion that takes longer than the cycle breaks it, too.
     """
-    if problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE):
-        return False
+    late = problem.cycle is not None and motion.duration > problem.cycle.time * (1 + RATIO_TOLERANCE)
     limits = problem.arm.active_limits
     tau_limited = limited_torque(problem.arm, tau, motion.v, motion.a)
     jerk = np.where(np.isfinite(limits.j_max), motion.peak_jerk, 0.0)  # where none is in force, unbounded jerk is fine
     ratios = limit_ratios(limits, motion.q, motion.peak_v, motion.peak_a, jerk, tau_limited)
-    return all(ratio <= 1 + RATIO_TOLERANCE for ratio in ratios.values())
+    return [
+        *(["longer than the cycle"] if late else []),
+        *(too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + RATIO_TOLERANCE),
+    ]

@@ -21,7 +21,7 @@ def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
     hold = 0.0 if problem.cycle is None else float(prepared.holding_power(best.q_goal))
-    oracle = prepared.potential, prepared.satisfies_path_constraints
+    oracle = prepared.potential, prepared.broken_on_the_way
     return [compared(problem, "trapezoid", motion, tau, hold, best.energy, *oracle)]
 
 

@@ -103,7 +103,7 @@ def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Array
     assert best.energy is not None
     prepared, problem = incumbent.prepared, incumbent.problem
     q_goals = np.array([each.q_goal for each in incumbent.candidates if (each.q_start == best.q_start).all()])
-    oracle = prepared.torques, prepared.potential, prepared.satisfies_path_constraints
+    oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
     table = baselines(problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
     return table, nearest(problem, best.q_start, q_goals)
 

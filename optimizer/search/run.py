@@ -34,6 +34,7 @@ from optimizer.solution import (
     Branch,
     CandidateStatus,
     Energy,
+    LimitsInForce,
     Solution,
     SolverReport,
     UnreachableTarget,
@@ -247,6 +248,7 @@ class Run:
         assert best.attempt is not None
         least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])
         incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
+        arm = self.problem.arm
         return Solution(
             status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
             start=Branch(best.start.label, best.q_start, best.start.target),
@@ -254,6 +256,7 @@ class Run:
             trajectory=trajectory,
             energy=energy,
             lower_bound=least,
+            limits=LimitsInForce(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
             complete=all_known(self.problem),
             baselines=table,
             candidates=[each.report() for each in candidates],

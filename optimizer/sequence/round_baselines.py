@@ -139,7 +139,7 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
             each.name: each
             for each in baselines(
                 prepared.problem, q_start, q_goal[None], 1.0, 0.0,
-                prepared.torques, prepared.potential, prepared.satisfies_path_constraints,
+                prepared.torques, prepared.potential, prepared.broken_on_the_way,
             )
         }  # fmt: skip
         if "controller_default" not in found:

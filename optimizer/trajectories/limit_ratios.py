@@ -15,6 +15,12 @@ def limit_ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_
     return {name: float(each.max()) for name, each in ratios(limits, q, v, a, jerk, tau_limited).items()}
 
 
+def too_much(name: str, ratio: float) -> str:
+    """In words, by how much a limit is broken: value / limit is `ratio` > 1."""
+    words = name.replace("_", " ")
+    return f"{words} {(ratio - 1) * 100:.3g} % above its limit" if np.isfinite(ratio) else f"unbounded {words}"
+
+
 def ratios(limits: Limits, q: Array, v: Array, a: Array, jerk: Array, tau_limited: Array) -> dict[str, Array]:
     """Value / limit (k, nq) of every sample and joint; k may differ between the arrays.
 

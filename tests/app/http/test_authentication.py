@@ -81,6 +81,9 @@ PUBLIC = [
     "/redoc",
     "/docs/swagger-ui.css",
     "/problems/unauthenticated",
+    "/studio",
+    "/studio/main.js",
+    "/studio/vendor/three/build/three.module.js",
 ]
 
 
@@ -106,7 +109,7 @@ def test_everything_else_needs_one(guarded: Guarded, document: dict[str, Any]) -
     "path",
     ["/nothing", "//studies", "/studies/", "/docs/../studies", "/docs/%2e%2e/studies", "/healthz/../studies",
      "/%2fdocs", "/docs%2f..%2fstudies", "/problems/../studies", "/HEALTHZ", "/healthz%0a",
-     "/docs;/../studies", "/metrics", "*"],
+     "/docs;/../studies", "/metrics", "*", "/studio/../studies", "/studio/%2e%2e/studies", "/studio//studies"],
 )  # fmt: skip
 def test_no_spelling_of_a_path_gets_around(guarded: Guarded, path: str) -> None:
     """Sent as it is: clients normalise paths."""

@@ -13,7 +13,7 @@ from models.robot import Array
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods.time_optimal_scaling import GRID, TRUST, time_optimal_on_line
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.baselines import within_limits
+from optimizer.search.baselines import broken_limits
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import DEGREE
 from optimizer.trajectories.time_scalings import quintic
@@ -62,7 +62,7 @@ def fastest_quintic(start: Array, goal: Array, **given: Any) -> float:
         middle = math.sqrt(low * high)
         motion = quintic(start, goal, middle)
         tau = torques(task, motion.q, motion.v, motion.a)
-        low, high = (low, middle) if within_limits(free, motion, tau) else (middle, high)
+        low, high = (low, middle) if not broken_limits(free, motion, tau) else (middle, high)
     return high
 
 

@@ -16,7 +16,7 @@ from models.registry import load_robot
 from models.robot import Array, Limits
 from optimizer.problem.arm import Payload
 from optimizer.problem.problem import Problem
-from optimizer.search.baselines import baselines, guesses, motion_energy, nearest, saving, within_limits
+from optimizer.search.baselines import baselines, broken_limits, guesses, motion_energy, nearest, saving
 from optimizer.solution import Baseline
 from optimizer.trajectories import quadrature
 from optimizer.trajectories.ruckig_motion import time_optimal
@@ -47,7 +47,7 @@ def limits(**given: float | list[float] | Array) -> Limits:
     return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
 
 
-def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Callable[[Array, Array], bool]]:
+def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Callable[[Array, Array], list[str]]]:
     """Torques and potential energy by Pinocchio, and a path without limits."""
     load = task.arm.payload
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
@@ -55,7 +55,7 @@ def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float
     return (
         lambda q, v, a: np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]),
         lambda q: float(pin.computePotentialEnergy(model, data, q)),
-        lambda q, v: True,
+        lambda q, v: [],
     )
 
 
@@ -271,6 +271,8 @@ def test_within_limits_in_time() -> None:
     assert comfortable["ruckig"].duration > 0.5
     assert [name for name in NAMES if hasty[name].within_limits] == ["ruckig"]
     assert hasty["ruckig_slowed"].duration == pytest.approx(0.5, rel=EXACT)
+    assert comfortable["trapezoid"].reason == "unbounded jerk" and comfortable["quintic"].reason is None
+    assert all(name in str(hasty["quintic"].reason) for name in ("velocity", "acceleration", "jerk"))
 
 
 def test_within_limits_of_torque() -> None:
@@ -281,7 +283,8 @@ def test_within_limits_of_torque() -> None:
     tau = torques(motion.q, motion.v, motion.a)
     peaks = np.abs(tau + ROBOT.friction.torque(motion.v)).max(axis=0)
     for factor, inside in ((1 - 1e-5, False), (1 + 1e-5, True)):
-        assert within_limits(problem(limits=limits(tau_max=peaks * factor)), motion, tau) is inside
+        broken = broken_limits(problem(limits=limits(tau_max=peaks * factor)), motion, tau)
+        assert not broken if inside else broken[0].startswith("torque") and len(broken) == 1
 
 
 def test_trapezoids_pass_without_a_jerk_limit() -> None:

@@ -1,0 +1,91 @@
+// Requests to the service. All addresses are relative to the page, so that they hold behind a proxy's path.
+import { $ } from "./dom.js";
+
+const KEY = "joulepath key";
+
+/** A refusal by the service: `details` is its problem document (RFC 9457). */
+export class Problem extends Error {
+  constructor(details) {
+    super(details.detail || details.title || "The service did not answer.");
+    this.details = details;
+  }
+}
+
+/** JSON of a GET. Throws Problem. */
+export const get = (path) => call(path, { method: "GET" });
+
+/** JSON of the answer to a POST. Throws Problem, or AbortError. */
+export const post = (path, body, options = {}) => call(path, posting(body, options));
+
+function posting(body, { signal, headers = {} } = {}) {
+  return { method: "POST", body: JSON.stringify(body), signal, headers: { "Content-Type": "application/json", ...headers } };
+}
+
+/** The response to a request that was accepted. It asks for the key where one is needed. Throws Problem. */
+export async function send(path, options) {
+  const key = sessionStorage.getItem(KEY);
+  const headers = { ...options.headers, ...(key ? { Authorization: `Bearer ${key}` } : {}) };
+  let response;
+  try {
+    response = await fetch(path.replace(/^\//, ""), { ...options, headers });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Problem({ title: "The service cannot be reached", detail: "The service cannot be reached: is it running?" });
+  }
+  if (response.ok) return response;
+  if (response.status === 401 && (await askForKey())) return send(path, options);
+  const text = await response.text();
+  let details;
+  try {
+    details = JSON.parse(text);
+  } catch {
+    details = { title: `The service answered ${response.status}`, detail: text.slice(0, 300) };
+  }
+  throw new Problem({ status: response.status, retry: Number(response.headers.get("Retry-After")) || null, ...details });
+}
+
+const call = async (path, options) => (await send(path, options)).json();
+
+/** Posts, and passes every event of the stream to `event(name, data)`. Where the answer is plain JSON, it is the only
+ * event: `answer`. Throws Problem, or AbortError. */
+export async function stream(path, body, event, signal) {
+  const accept = { Accept: "text/event-stream, application/json;q=0.9" };
+  const response = await send(path, posting(body, { signal, headers: accept }));
+  if (!response.headers.get("Content-Type")?.startsWith("text/event-stream")) {
+    event("answer", await response.json());
+    return;
+  }
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const { value, done } = await reader.read();
+    if (done) return;
+    text += value.replaceAll("\r\n", "\n");
+    let end;
+    while ((end = text.indexOf("\n\n")) >= 0) {
+      const fields = text.slice(0, end).split("\n");
+      text = text.slice(end + 2);
+      const of = (name) => fields.filter((line) => line.startsWith(`${name}:`)).map((line) => line.slice(name.length + 1).replace(/^ /, ""));
+      const data = of("data").join("\n");
+      if (!data) continue;
+      const [name = "message"] = of("event");
+      if (name === "problem") throw new Problem(JSON.parse(data));
+      event(name, JSON.parse(data));
+    }
+  }
+}
+
+function askForKey() {
+  const dialog = $("key-dialog");
+  $("key").value = "";
+  dialog.returnValue = "";
+  if (!dialog.open) dialog.showModal();
+  return new Promise((resolve) => {
+    dialog.addEventListener("close", () => {
+      const key = $("key").value.trim();
+      if (dialog.returnValue !== "ok" || !key) return resolve(false);
+      sessionStorage.setItem(KEY, key);
+      resolve(true);
+    }, { once: true });
+  });
+}

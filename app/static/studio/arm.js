@@ -1,0 +1,85 @@
+// An arm as three.js objects: its links from the figures, its tool and its payload; and what collision checks see.
+import * as THREE from "three";
+import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
+import { IDENTITY } from "./chain.js";
+import { linkBodies, linkCapsules } from "./links.js";
+import { along, capsule, place, placedShape, roundedCylinder } from "./shapes.js";
+
+const COLOURS = { tube: 0xe3e7ec, housing: 0xcfd5dc, cap: 0x2f7fb8, ring: 0x3a424c, foot: 0x555e69, tool: 0x2f3742, payload: 0xd8951f };
+const SIDES = 22; // of round bodies
+const geometries = new Map(); // of each robot, by name: several arms share them
+
+/** One geometry for each link, with the colours of its bodies, and one with the capsules of its collision checks. */
+function robotGeometry(robot) {
+  if (!geometries.has(robot.name)) {
+    const drawn = linkBodies(robot).map((bodies) => merged(bodies.map(({ kind, from, to, radius }) => coloured(bodyGeometry(kind, from, to, radius), COLOURS[kind]))));
+    const seen = linkCapsules(robot).map((own) => merged(own.map(({ from, to, radius }) => capsule(from, to, radius, 14))));
+    geometries.set(robot.name, { drawn, seen });
+  }
+  return geometries.get(robot.name);
+}
+
+const merged = (parts) => (parts.length ? mergeGeometries(parts) : new THREE.BufferGeometry());
+
+function coloured(geometry, colour) {
+  const one = new THREE.Color(colour).toArray();
+  const all = Array.from({ length: geometry.attributes.position.count }, () => one).flat();
+  return geometry.setAttribute("color", new THREE.Float32BufferAttribute(all, 3));
+}
+
+function bodyGeometry(kind, from, to, radius) {
+  if (kind === "tube") return along(from, to, (length) => new THREE.CylinderGeometry(radius, radius, length, SIDES, 1, true).rotateX(Math.PI / 2));
+  const round = { cap: 0.16, housing: 0.04, ring: 0.01, foot: 0.1 }[kind] * radius;
+  return along(from, to, (length) => roundedCylinder(radius, length, round, SIDES));
+}
+
+/** One arm in the scene. `tint`: a colour over its own ones. `opacity` below 1: a ghost, in the tint alone. */
+export class Arm {
+  constructor(chain, robot, request, { tint = 0xffffff, opacity = 1 } = {}) {
+    this.chain = chain;
+    this.object = new THREE.Group();
+    const ghost = opacity < 1;
+    const { drawn, seen } = robotGeometry(robot);
+    const own = armMaterial(tint, opacity, !ghost);
+    const of = (kind) => (ghost ? own : armMaterial(COLOURS[kind], 1, false));
+    this.links = [...drawn, null].map(() => place(new THREE.Group(), IDENTITY));
+    const put = (link, geometry, material) => {
+      const mesh = new THREE.Mesh(geometry, material);
+      mesh.castShadow = !ghost;
+      this.links[link].add(mesh);
+      return mesh;
+    };
+    // a ghost stands on the same base
+    this.drawn = drawn.map((geometry, link) => link > 0 || !ghost ? put(link, geometry, own) : null).filter(Boolean);
+    this.seen = ghost ? [] : seen.map((geometry, link) => put(link, geometry, armMaterial(0x66aadd, 0.45, false)));
+    for (const mesh of this.seen) mesh.castShadow = false;
+    const tool = (request.tool?.capsules ?? []).map(({ start, end, radius }) => capsule(start, end, radius, 16));
+    if (tool.length) put(drawn.length, merged(tool), of("tool"));
+    const load = request.payload?.shape;
+    if (load) {
+      const part = placedShape(load, of("payload"));
+      part.traverse((each) => { each.castShadow = !ghost; });
+      this.links.at(-1).add(part);
+    }
+    this.object.add(...this.links);
+    this.showCapsules(false);
+  }
+
+  /** Moves all links to joint positions q. */
+  pose(q) {
+    this.frames = this.chain.frames(q);
+    this.frames.forEach((T, link) => place(this.links[link], T));
+  }
+
+  showCapsules(on) {
+    for (const mesh of this.seen) mesh.visible = on;
+    if (this.seen.length) for (const mesh of this.drawn) mesh.visible = !on;
+  }
+}
+
+function armMaterial(color, opacity, vertexColors) {
+  const ghost = opacity < 1;
+  const offset = { polygonOffset: ghost, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
+  const common = { color, opacity, vertexColors, transparent: ghost, depthWrite: !ghost, ...offset };
+  return ghost ? new THREE.MeshLambertMaterial(common) : new THREE.MeshPhongMaterial({ ...common, shininess: 28, specular: 0x333333 });
+}

@@ -1,0 +1,71 @@
+// The table of candidates: choose branches to see them as ghosts, compute one to let both arms move on one clock.
+import { $, el, figure } from "./dom.js";
+import { play } from "./player.js";
+import { compute, optimise, problem } from "./request.js";
+import { follow, set, state } from "./store.js";
+
+const MOST = 4; // ghosts at a time
+const MOST_ROWS = 200;
+const COLUMNS = [["goal", "goal"], ["status", "status"], ["lower_bound", "bound J"], ["energy", "energy J"], ["duration", "time s"]];
+
+let order = "lower_bound";
+
+export function createCandidates() {
+  $("candidate-filter").onchange = draw;
+  follow("answer chosen", draw);
+}
+
+function draw() {
+  const { answer } = state;
+  if (!answer) return;
+  const counts = Object.entries(answer.candidate_counts).filter(([, count]) => count);
+  const total = counts.reduce((sum, [, count]) => sum + count, 0);
+  $("candidate-counts").textContent = counts.map(([status, count]) => `${count} ${status}`).join(", ");
+  const filter = $("candidate-filter").value;
+  const rows = answer.candidates.filter(({ status }) => !filter || status === filter).toSorted(compare);
+  const head = el("tr", {}, el("th", {}, "show"), COLUMNS.map(([key, name]) =>
+    el("th", { "aria-sort": key === order ? "ascending" : "none" }, el("button", { type: "button", onclick: () => { order = key; draw(); } }, name))), el("th", {}));
+  const table = el("table", {}, el("thead", {}, head), el("tbody", {}, rows.slice(0, MOST_ROWS).map(row)));
+  const more = [];
+  if (rows.length > MOST_ROWS) more.push(el("p", { class: "hint" }, `${MOST_ROWS} of ${rows.length} are listed.`));
+  if (answer.candidates.length < total) more.push(el("button", { type: "button", onclick: listAll }, `List all ${total} (computes again)`));
+  $("candidates").replaceChildren(rows.length ? el("div", { class: "scroll" }, table) : el("p", { class: "hint" }, "None with this status."), ...more);
+}
+
+const compare = (a, b) => {
+  const [x, y] = [a[order], b[order]];
+  if (typeof x === "string") return x.localeCompare(y);
+  return (x ?? Infinity) - (y ?? Infinity);
+};
+
+function row(candidate) {
+  const chosen = state.chosen.includes(candidate);
+  const label = `${candidate.start} to ${candidate.goal}`;
+  const box = el("input", { type: "checkbox", checked: chosen, "aria-label": `Show ${label}` });
+  box.onchange = () => {
+    const others = state.chosen.filter((each) => each !== candidate);
+    set({ chosen: box.checked ? [...others, candidate].slice(-MOST) : others });
+  };
+  const best = candidate.q_goal.every((x, j) => Math.abs(x - state.answer.branch.goal.q[j]) < 1e-6) && candidate.q_start.every((x, j) => Math.abs(x - state.answer.branch.start.q[j]) < 1e-6);
+  return el("tr", { title: candidate.reason, class: best ? "best" : candidate.status },
+    el("td", {}, box),
+    el("td", {}, candidate.goal, candidate.start === candidate.goal ? null : el("small", {}, ` from ${candidate.start}`)),
+    el("td", {}, best ? "this motion" : candidate.status),
+    ...["lower_bound", "energy", "duration"].map((key) => el("td", { class: "number" }, figure(candidate[key]))),
+    el("td", {}, best ? null : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute")));
+}
+
+/** Computes one branch, and lets its arm move beside the answer's. Throws Problem. */
+async function beside({ q_start, q_goal, goal }) {
+  const { asked, arms, duration } = state;
+  const answer = await compute("optimize", { ...asked, start: { q: q_start }, goal: { q: q_goal }, branch: null, windings: false });
+  if (!answer) return;
+  const colours = [0, 0xee6677, 0x228833, 0xaa3377];
+  const others = arms.filter(({ name }) => name !== goal).slice(0, MOST - 1);
+  set({ arms: [...others, { name: goal, answer, colour: colours[others.length] }], duration: Math.max(duration, answer.duration), time: 0, playing: false });
+  play();
+}
+
+async function listAll() {
+  await optimise({ ...state.asked, candidates: "all" }).catch(problem);
+}

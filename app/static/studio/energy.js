@@ -1,0 +1,78 @@
+// Where the energy goes: its parts as one stacked bar; and the savings against other planners, down to the proven bound.
+import { $, el, figure, percent, svg } from "./dom.js";
+import { follow, state } from "./store.js";
+
+const PARTS = {
+  idle: ["electronics", "Power of the electronics times the duration."],
+  friction: ["friction", "Friction loss in the joints."],
+  copper: ["copper", "Copper loss in the motor windings."],
+  inverter: ["inverters", "Loss in the inverters."],
+  potential: ["lifting", "Gain of potential energy from start to goal; negative on the way down."],
+  kinetic: ["kinetic", "Gain of kinetic energy; zero from standstill to standstill."],
+  braking: ["braking", "Regenerated energy that no joint uses and no storage takes."],
+  recovered: ["given back", "The part of braking that the supply takes back."],
+  storage_loss: ["storage", "Loss in the energy storage on the bus."],
+  dwell: ["waiting", "Energy drawn while the arm waits at the goal."],
+};
+const LEAST = 5e-3; // parts below this share of the total are not listed
+const NAMES = {
+  trapezoid: "trapezoid", quintic: "quintic", ruckig: "time-optimal (ruckig)", ruckig_slowed: "time-optimal, slowed", controller_default: "controller default",
+};
+
+export function createEnergy() {
+  follow("answer", () => {
+    if (!state.answer) return;
+    $("breakdown").replaceChildren(...breakdown(state.answer.energy.electrical));
+    $("waterfall").replaceChildren(...waterfall(state.answer));
+  });
+}
+
+/** A stacked bar of an `ElectricalEnergy`, and the list of its parts. */
+export function breakdown(electrical) {
+  const parts = Object.keys(PARTS).map((key) => ({ key, value: electrical[key] ?? 0 }));
+  const drawn = parts.filter(({ value }) => Math.abs(value) > 1e-9);
+  const gains = drawn.filter(({ value }) => value > 0).reduce((sum, { value }) => sum + value, 0);
+  const returned = drawn.filter(({ value }) => value < 0).reduce((sum, { value }) => sum - value, 0);
+  const scale = 100 / (gains + returned || 1);
+  let [right, left] = [returned * scale, returned * scale];
+  const bar = svg("svg", { class: "stack", viewBox: "0 0 100 10", preserveAspectRatio: "none", role: "img", "aria-label": "Parts of the energy" });
+  for (const { key, value } of drawn) {
+    const width = Math.abs(value) * scale;
+    if (value < 0) left -= width;
+    bar.append(svg("rect", { x: value < 0 ? left : right, y: 0, width, height: 10, class: `part part-${key}` }, svg("title", {}, `${PARTS[key][0]}: ${figure(value)} J. ${PARTS[key][1]}`)));
+    if (value > 0) right += width;
+  }
+  if (returned > 0) bar.append(svg("line", { x1: returned * scale, x2: returned * scale, y1: 0, y2: 10, class: "zero", "vector-effect": "non-scaling-stroke" }));
+  const listed = drawn.filter(({ value }) => Math.abs(value) > LEAST * Math.abs(electrical.total));
+  const list = el("ul", { class: "parts" }, listed.map(({ key, value }) =>
+    el("li", { title: PARTS[key][1] }, el("i", { class: `swatch part-${key}` }), el("span", {}, PARTS[key][0]), el("b", {}, `${figure(value)} J`))));
+  return [bar, list];
+}
+
+function waterfall(answer) {
+  const objective = answer.objective;
+  const ours = answer.energy[objective].total;
+  const rows = [
+    ...answer.baselines.map((each) => ({ name: NAMES[each.name] ?? each.name, energy: each[objective], duration: each.duration, reason: each.reason })),
+    { name: "this motion", energy: ours, duration: answer.duration, ours: true },
+    { name: "proven bound", energy: answer.energy.lower_bound, bound: true },
+  ];
+  // rows that are of the same height keep their order: this motion above the bound
+  rows.sort((a, b) => b.energy - a.energy);
+  const most = Math.max(...rows.map(({ energy }) => energy), 1e-9);
+  return [el("ol", { class: "bars" }, rows.map((row) => bar(row, ours, most))),
+    el("p", { class: "hint" }, "Hatched: breaks a limit, so it is no alternative. No motion of any kind needs less than the proven bound.")];
+}
+
+function bar({ name, energy, duration, reason, ours: own, bound }, ours, most) {
+  const kind = own ? "own" : bound ? "bound" : reason ? "broken" : "other";
+  const saving = energy ? (energy - ours) / Math.abs(energy) : 0;
+  const against = own || bound || reason ? null : el("em", {}, `${saving >= 0 ? "−" : "+"}${percent(Math.abs(saving))}`);
+  const fill = el("span", { class: `fill ${kind}` });
+  fill.style.width = `${Math.max(0, (100 * energy) / most)}%`;
+  return el("li", { class: kind },
+    el("span", { class: "name" }, name, duration ? el("small", {}, ` ${figure(duration)} s`) : null),
+    el("span", { class: "track" }, fill),
+    el("span", { class: "value" }, figure(energy), against),
+    reason ? el("small", { class: "reason" }, `breaks: ${reason}`) : null);
+}

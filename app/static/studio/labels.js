@@ -1,0 +1,47 @@
+// Words at points of the picture.
+import * as THREE from "three";
+import { el } from "./dom.js";
+
+export class Labels {
+  constructor(layer, camera) {
+    this.layer = layer;
+    this.camera = camera;
+    this.all = new Map();
+  }
+
+  /** A label by its name: its text, the point [x, y, z] it belongs to, and its kind. */
+  put(name, text, at, kind) {
+    if (!this.all.has(name)) {
+      const node = el("span", { class: `label ${kind}` });
+      this.layer.append(node);
+      this.all.set(name, { node });
+    }
+    const label = this.all.get(name);
+    label.at = new THREE.Vector3(...at);
+    if (label.node.textContent !== text) label.node.textContent = text;
+  }
+
+  show(name, on) {
+    const label = this.all.get(name);
+    if (label) label.off = !on;
+  }
+
+  drop(name) {
+    this.all.get(name)?.node.remove();
+    this.all.delete(name);
+  }
+
+  /** Drops labels `kind k` with k at or above `count`. */
+  keep(kind, count) {
+    for (const name of [...this.all.keys()]) if (name.startsWith(`${kind} `) && Number(name.slice(kind.length + 1)) >= count) this.drop(name);
+  }
+
+  place({ width, height }) {
+    for (const { node, at, off } of this.all.values()) {
+      const point = at.clone().project(this.camera);
+      const hidden = off || point.z > 1;
+      node.hidden = hidden;
+      if (!hidden) node.style.transform = `translate(-50%, -50%) translate(${((point.x + 1) * width) / 2}px, ${((1 - point.y) * height) / 2}px)`;
+    }
+  }
+}

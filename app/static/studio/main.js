@@ -1,0 +1,61 @@
+// Puts the page together, and shows an example at once.
+import { get } from "./api.js";
+import { createCandidates } from "./candidates.js";
+import { $, figure, percent, tabs } from "./dom.js";
+import { createEnergy } from "./energy.js";
+import { createFront } from "./front.js";
+import { createLimits } from "./limits.js";
+import { createPlayer, play } from "./player.js";
+import { createPlots } from "./plots.js";
+import { createRequest, optimise, problem, setRequest, showAnswer } from "./request.js";
+import { createShare, shared } from "./share.js";
+import { follow, state } from "./store.js";
+import { createView, drawnTcp } from "./view.js";
+
+const FIRST = "studio/first.json";
+
+const view = createView();
+createPlayer(view);
+createPlots();
+createEnergy();
+createLimits();
+createFront();
+createCandidates();
+createRequest();
+createShare(view);
+tabs(document.querySelector("#ask > .tabs"));
+follow("answer", headline);
+
+/** For tests, and for those who look in the console. */
+window.studio = { state, view, tcp: drawnTcp };
+
+start().catch(problem);
+
+async function start() {
+  const given = await shared();
+  if (given.answer) {
+    const kept = await get(`answers/${encodeURIComponent(given.answer)}`);
+    const { answer } = kept;
+    // the same arm between the same ends: what the answer does not say of its request stays at the defaults
+    setRequest(given.request ?? { robot: answer.robot, ...answer.arm, start: { q: answer.branch.start.q }, goal: { q: answer.branch.goal.q } });
+    await showAnswer(answer, state.request);
+  } else {
+    setRequest(given.request ?? (await get(FIRST)));
+    await optimise();
+  }
+  if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play();
+}
+
+function headline() {
+  const { answer } = state;
+  if (!answer) return;
+  $("joules").textContent = `${figure(answer.energy[answer.objective].total)} J`;
+  const gap = answer.energy.optimality_gap;
+  const usual = answer.baselines.find(({ name }) => name === "controller_default");
+  const facts = [`${figure(answer.duration)} s`, answer.status, `at most ${percent(gap, 2)} above what any motion needs`];
+  if (usual && usual.saving > 0) facts.push(`${percent(usual.saving, 2)} less than the controller's default${usual.within_limits ? "" : " (which breaks a limit)"}`);
+  $("facts").textContent = facts.join(" · ");
+  const [from, to] = [answer.branch.start.label, answer.branch.goal.label];
+  $("view").setAttribute("aria-label", `The arm ${answer.robot} moves from ${from} to ${to} in ${figure(answer.duration)} s and draws ${figure(answer.energy.electrical.total)} J.`);
+  document.title = `${figure(answer.energy[answer.objective].total)} J in ${figure(answer.duration)} s · joulepath studio`;
+}

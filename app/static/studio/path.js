@@ -1,0 +1,36 @@
+// The path of the TCP as a tube, coloured by the power that is drawn there.
+import * as THREE from "three";
+
+const RAMP = ["#2c4fa3", "#2a8bb5", "#3bb58a", "#b9c53a", "#f0a13a", "#d9423c"].map((colour) => new THREE.Color(colour));
+const MOST = 300;
+
+/** The colour of a share of the range. */
+export function colourOf(share) {
+  const place = Math.max(0, Math.min(1, share)) * (RAMP.length - 1);
+  const index = Math.min(Math.floor(place), RAMP.length - 2);
+  return RAMP[index].clone().lerp(RAMP[index + 1], place - index);
+}
+
+export const rampStops = RAMP.map((colour) => `#${colour.getHexString()}`);
+
+/** A tube of `radius` [m] along the TCP of a trajectory; `tcp` maps joint positions to its pose. */
+export function pathOfPower({ q, power }, tcp, radius) {
+  const step = Math.ceil(q.length / MOST);
+  const kept = q.map((_, k) => k).filter((k) => k % step === 0 || k === q.length - 1);
+  const points = kept.map((k) => tcp(q[k])).map((T) => new THREE.Vector3(T[3], T[7], T[11]));
+  const long = points.some((point) => point.distanceTo(points[0]) > 1e-4);
+  if (!long) return new THREE.Group();
+  const [least, most] = [Math.min(...power), Math.max(...power)];
+  const curve = new THREE.CatmullRomCurve3(points, false, "chordal");
+  const segments = kept.length - 1;
+  // the tube is cut at the samples, not at even lengths, so that colours stand where they belong
+  curve.getUtoTmapping = (u) => u;
+  const geometry = new THREE.TubeGeometry(curve, segments, radius, 8);
+  const around = geometry.attributes.position.count / (segments + 1);
+  const colours = kept.flatMap((k) => {
+    const colour = colourOf((power[k] - least) / (most - least || 1)).toArray();
+    return Array.from({ length: around }, () => colour).flat();
+  });
+  geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));
+  return new THREE.Mesh(geometry, new THREE.MeshBasicMaterial({ vertexColors: true }));
+}

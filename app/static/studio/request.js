@@ -1,0 +1,169 @@
+// The request: examples, JSON, and its way to the service and back.
+import { Problem, get, stream } from "./api.js";
+import { cellOf } from "./chain.js";
+import { $, el, figure, svg } from "./dom.js";
+import { follow, set, state } from "./store.js";
+
+const EXAMPLE = "From a bin to a shelf";
+const PATIENCE = 3; // times that a busy service is asked again
+const robots = new Map();
+let running = null; // AbortController of the request that is on its way
+
+export function createRequest() {
+  $("optimise").onclick = () => optimise().catch(problem);
+  $("cancel").onclick = () => running?.abort();
+  $("json").onchange = readJson;
+  follow("request", () => {
+    const text = JSON.stringify(state.request, null, 1);
+    if ($("json").value !== text) $("json").value = text;
+  });
+  $("examples").onchange = (event) => setRequest(structuredClone(event.target.selectedOptions[0].body));
+  $("examples").append(el("option", {}, EXAMPLE));
+  $("examples").onpointerdown = $("examples").onfocus = () => fillExamples().catch(problem);
+}
+
+/** Puts a request into the editor. */
+export const setRequest = (request) => set({ request });
+
+let document_ = null;
+
+/** The OpenAPI document, asked for once. */
+export const openapi = () => (document_ ??= get("openapi.json"));
+
+async function fillExamples() {
+  const select = $("examples");
+  if (select.options.length > 1) return;
+  const first = await get("studio/first.json");
+  const { paths } = await openapi();
+  const option = (name, body) => Object.assign(el("option", {}, name), { body });
+  const examples = paths["/optimize"].post.requestBody.content["application/json"].examples;
+  select.replaceChildren(option(EXAMPLE, first), ...Object.values(examples).map(({ summary, value }) => option(summary, value)));
+}
+
+function readJson() {
+  try {
+    set({ request: JSON.parse($("json").value) });
+    $("json").removeAttribute("aria-invalid");
+  } catch (error) {
+    $("json").setAttribute("aria-invalid", "true");
+    problem(new Problem({ title: "This is no JSON", detail: error.message }));
+  }
+}
+
+/** Sends the request, shows its progress, then its answer. Throws Problem. */
+export async function optimise(request = state.request) {
+  const answer = await compute("optimize", request);
+  if (answer) await showAnswer(answer, request);
+}
+
+/** The answer to a POST with progress; null if it was cancelled. Throws Problem. */
+export async function compute(path, request) {
+  running?.abort();
+  const own = (running = new AbortController());
+  const began = performance.now();
+  const progress = { done: 0, total: 0, incumbents: [] };
+  problem(null);
+  busy(true);
+  const timer = setInterval(() => tell(progress, began), 200);
+  try {
+    return await patiently(() => streamed(path, request, progress, own.signal));
+  } catch (error) {
+    if (error.name === "AbortError") {
+      if (running === own) $("status").textContent = "Cancelled.";
+      return null;
+    }
+    throw error;
+  } finally {
+    clearInterval(timer);
+    if (running === own) busy(false);
+  }
+}
+
+async function streamed(path, request, progress, signal) {
+  let answer = null;
+  await stream(path, request, (name, data) => {
+    if (name === "answer") answer = data;
+    else if (name === "candidates") progress.total = data.total;
+    else if (name === "candidate") progress.done += 1;
+    else if (name === "incumbent") progress.incumbents.push({ ...data, at: performance.now() });
+  }, signal);
+  if (!answer) throw new Problem({ title: "The answer broke off", detail: "The connection ended before the answer came: send the request again." });
+  return answer;
+}
+
+/** Asks a busy service again after the time that it names. */
+async function patiently(attempt) {
+  for (let left = PATIENCE; ; left--) {
+    try {
+      return await attempt();
+    } catch (error) {
+      if (!(left > 0 && error.details?.status === 503 && error.details.retry)) throw error;
+      $("status").textContent = `The service is busy: trying again in ${error.details.retry} s.`;
+      await new Promise((resolve) => setTimeout(resolve, 1000 * error.details.retry));
+    }
+  }
+}
+
+function busy(on) {
+  $("cancel").hidden = !on;
+  $("progress").hidden = !on;
+  $("optimise").disabled = on;
+  document.body.toggleAttribute("aria-busy", on);
+  $("progress-chart").replaceChildren();
+  if (on) $("progress-bar").removeAttribute("value");
+}
+
+function tell({ done, total, incumbents }, began) {
+  if (total) $("progress-bar").value = Math.min(1, done / total);
+  const incumbent = incumbents.at(-1);
+  if (incumbents.length > 1) $("progress-chart").replaceChildren(falling(incumbents, began));
+  const parts = [`${((performance.now() - began) / 1000).toFixed(1)} s`];
+  if (total) parts.push(`${done} of ${total} branches`);
+  if (incumbent) parts.push(`best ${figure(incumbent.energy)} J, bound ${figure(incumbent.bound)} J, gap ${figure(100 * (incumbent.gap ?? NaN), 2)} %`);
+  $("progress-text").textContent = parts.join(" · ");
+}
+
+/** The best energy and its bound over time, both in one small picture. */
+function falling(incumbents, began) {
+  const now = performance.now();
+  const [least, most] = [Math.min(...incumbents.map(({ bound, energy }) => bound ?? energy)), incumbents[0].energy];
+  const x = (at) => (100 * (at - began)) / (now - began);
+  const y = (value) => 28 - (26 * (value - least)) / (most - least || 1);
+  const steps = (key) => incumbents.flatMap((each, k) => {
+    const until = incumbents[k + 1]?.at ?? now;
+    return each[key] === null ? [] : [`${x(each.at)},${y(each[key])}`, `${x(until)},${y(each[key])}`];
+  }).join(" ");
+  const line = (key) => svg("polyline", { points: steps(key), class: key, "vector-effect": "non-scaling-stroke" });
+  return svg("svg", { viewBox: "0 0 100 30", preserveAspectRatio: "none", role: "img", "aria-label": "Best energy and bound over time" }, line("energy"), line("bound"));
+}
+
+/** Figures of a robot, asked for once. */
+export async function robotOf(name) {
+  if (!robots.has(name)) robots.set(name, await get(`robots/${encodeURIComponent(name)}`));
+  return robots.get(name);
+}
+
+/** Shows an answer of POST /optimize. Without its request, the cell is what the answer says of its arm. */
+export async function showAnswer(answer, request) {
+  const robot = await robotOf(answer.robot);
+  const asked = { ...answer.arm, ...request, robot: answer.robot };
+  set({
+    asked: request ?? null, cell: cellOf(asked, robot), robot, answer, chosen: [], round: null, time: 0, duration: answer.duration,
+    arms: [{ name: "this motion", answer }],
+  });
+  const { warnings } = answer;
+  $("status").textContent = warnings.length ? warnings.join(" ") : "";
+}
+
+/** Shows what went wrong; null: nothing. */
+export function problem(error) {
+  const box = $("problem");
+  box.hidden = !error;
+  box.replaceChildren();
+  if (!error) return;
+  if (!(error instanceof Problem)) console.error(error);
+  const { title, type, errors = [] } = error.details ?? {};
+  box.append(el("strong", {}, title ?? "Something went wrong"), " ", el("span", {}, error.message));
+  if (errors.length) box.append(el("ul", {}, errors.map(({ loc, msg }) => el("li", {}, el("code", {}, loc.filter((part) => part !== "body").join(".")), ` ${msg}`))));
+  if (type?.includes("/problems/")) box.append(" ", el("a", { href: type.slice(type.indexOf("problems/")) }, "What this means"));
+}

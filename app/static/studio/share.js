@@ -1,0 +1,83 @@
+// Take away: a link that holds the request, and downloads.
+import { send } from "./api.js";
+import { $, el, save } from "./dom.js";
+import { openapi, problem } from "./request.js";
+import { state } from "./store.js";
+
+const WARNING = "Set payload, speed and safety limits on the controller before you run it. No format was run on hardware.";
+
+export function createShare(view) {
+  $("downloads").ontoggle = () => $("downloads").open && !$("exports") && offerExports().catch(problem);
+  $("share").onclick = () => share().catch(problem);
+  const files = [
+    ["Answer (JSON)", () => save("answer.json", JSON.stringify(state.answer), "application/json")],
+    ["Samples (CSV)", () => save("motion.csv", csv(state.answer.trajectory), "text/csv")],
+    ["Request (JSON)", () => save("request.json", JSON.stringify(state.asked ?? state.request, null, 1), "application/json")],
+    ["Robot (URDF)", async () => save(`${state.answer.robot}.urdf`, await (await send(`robots/${state.answer.robot}/urdf`, {})).blob())],
+    ...(view ? [["Picture (PNG)", async () => save("motion.png", await view.picture())]] : []),
+  ];
+  $("download-list").replaceChildren(...files.map(([name, give]) =>
+    el("button", { type: "button", onclick: async () => { $("downloads").open = false; if (state.answer) await give(); } }, name)));
+}
+
+/** Buttons for the formats that the service exports to. */
+async function offerExports() {
+  const { paths, components } = await openapi();
+  const post = paths["/export/{format}"]?.post;
+  if (!post) return;
+  const { schema, ...parameter } = post.parameters.find(({ name }) => name === "format");
+  const formats = schema.enum ?? components.schemas[schema.$ref.split("/").at(-1)].enum;
+  const texts = { ...parameter, ...schema }["x-enum-descriptions"] ?? {};
+  const button = (format) => el("button", { type: "button", title: texts[format] ?? "", onclick: () => exportAs(format).catch(problem) }, format);
+  $("download-list").append(el("hr"), el("p", {}, "For the robot's controller"), el("div", { id: "exports" }, formats.map(button)), el("p", {}, WARNING));
+}
+
+async function exportAs(format) {
+  $("downloads").open = false;
+  const { answer } = state;
+  const body = { answer: answer.answer ?? answer };
+  const response = await send(`export/${format}`, { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
+  const name = /filename="?([^";]+)/.exec(response.headers.get("Content-Disposition") ?? "")?.[1] ?? `motion.${format}`;
+  save(name, await response.blob());
+  $("status").textContent = [response.headers.get("Joulepath-Notes"), WARNING].filter(Boolean).join("; ");
+}
+
+/** The motion as a table that `POST /evaluate` reads again. */
+export function csv({ t, q, v, a, tau, tau_motor, power }) {
+  const joints = q[0].map((_, j) => j + 1);
+  const columns = { q, v, a, tau, tau_motor };
+  const head = ["t", ...Object.keys(columns).flatMap((name) => joints.map((j) => `${name}${j}`)), "power"];
+  const lines = t.map((time, k) => [time, ...Object.values(columns).flatMap((rows) => rows[k]), power[k]].join(","));
+  return [head.join(","), ...lines, ""].join("\n");
+}
+
+async function share() {
+  const address = new URL(location.href);
+  address.hash = `r=${await packed(JSON.stringify(state.asked ?? state.request))}`;
+  history.replaceState(null, "", address);
+  try {
+    await navigator.clipboard.writeText(address.href);
+    $("status").textContent = "The link is copied. It holds the whole request, and is the address of this page now.";
+  } catch {
+    $("status").textContent = "The address of this page holds the whole request now: copy it.";
+  }
+}
+
+/** What the address of the page asks for: {request} or {answer}, or nothing. */
+export async function shared() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const request = asked.get("r") ? JSON.parse(await unpacked(asked.get("r"))) : null;
+  return { request, answer: asked.get("answer") };
+}
+
+async function packed(text) {
+  const bytes = await through(new Blob([text]), new CompressionStream("deflate-raw"));
+  return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+}
+
+async function unpacked(text) {
+  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));
+  return new TextDecoder().decode(await through(new Blob([bytes]), new DecompressionStream("deflate-raw")));
+}
+
+const through = async (blob, stream) => new Uint8Array(await new Response(blob.stream().pipeThrough(stream)).arrayBuffer());

@@ -1,0 +1,279 @@
+// The picture: arms, ghosts, obstacles, the path of the TCP, the nearest pair. It draws only when something changed.
+import * as THREE from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Arm } from "./arm.js";
+import { Chain, multiply, ofPose, sampleAt } from "./chain.js";
+import { $, el, figure, style, svg } from "./dom.js";
+import { Eye } from "./eye.js";
+import { Labels } from "./labels.js";
+import { nearestPoints } from "./nearest.js";
+import { pathOfPower, rampStops } from "./path.js";
+import { placedShape } from "./shapes.js";
+import { follow, set, state } from "./store.js";
+
+const START = 0x3b7dd8;
+const GOAL = 0xe07b39;
+// margin of an obstacle without one in the request [m]: the default of the service
+const DEFAULT_MARGIN = 0.005;
+// time of a frame [s] above which the picture gets coarser while it moves, and below which finer again
+const SLOW = 0.055;
+const FAST = 0.022;
+// pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that alone
+const STILL = 2;
+
+let view = null;
+
+/** The picture, or null without WebGL. */
+export function createView() {
+  if (!document.createElement("canvas").getContext("webgl2")) {
+    $("no-view").hidden = false;
+    return null;
+  }
+  view = new View($("view"));
+  follow("answer arms", () => view.build());
+  follow("chosen", () => view.buildGhosts());
+  follow("time show", () => view.pose());
+  follow("playing", () => view.draw());
+  return view;
+}
+
+class View {
+  constructor(box) {
+    this.box = box;
+    this.renderer = new THREE.WebGLRenderer({ antialias: false, alpha: true });
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    box.prepend(this.renderer.domElement);
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera(32, 1, 0.02, 60);
+    this.camera.up.set(0, 0, 1);
+    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
+    this.controls.addEventListener("change", () => this.draw());
+    for (const [name, dragging] of [["start", true], ["end", false]])
+      this.controls.addEventListener(name, () => {
+        this.dragging = dragging;
+        this.draw();
+      });
+    this.parts = Object.fromEntries(["arms", "ghosts", "obstacles", "margins", "path", "nearest", "axes"].map((name) => {
+      const group = new THREE.Group();
+      this.scene.add(group);
+      return [name, group];
+    }));
+    this.labels = new Labels($("labels"), this.camera);
+    this.eye = new Eye(this.camera, this.controls, this.parts.obstacles);
+    this.fineness = this.coarse = 1;
+    this.pace = (SLOW + FAST) / 2;
+    this.light();
+    this.axes();
+    new ResizeObserver(() => this.resize()).observe(box);
+    this.resize();
+  }
+
+  light() {
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8d99a8, 1.9));
+    this.sun = new THREE.DirectionalLight(0xffffff, 2.1);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.bias = -0.0012;
+    this.scene.add(this.sun, this.sun.target);
+  }
+
+  axes() {
+    const length = 0.22;
+    [[1, 0, 0, 0xd64545], [0, 1, 0, 0x2f9e58], [0, 0, 1, 0x3b6fd8]].forEach(([x, y, z, colour], axis) => {
+      const arrow = new THREE.ArrowHelper(new THREE.Vector3(x, y, z), new THREE.Vector3(), length, colour, 0.035, 0.02);
+      this.parts.axes.add(arrow);
+      this.labels.put(`axis ${axis}`, "xyz"[axis], [x, y, z].map((part) => part * (length + 0.02)), "axis");
+    });
+  }
+
+  /** Everything anew: another answer, or other arms beside it. */
+  build() {
+    const { answer, cell, robot, arms } = state;
+    if (!answer) return;
+    this.chain = new Chain(robot);
+    for (const name of ["arms", "obstacles", "margins", "path"]) this.empty(this.parts[name]);
+    this.arms = arms.map(({ answer: own, colour }, k) => {
+      const arm = new Arm(this.chain, robot, cell, k ? { tint: colour } : {});
+      this.parts.arms.add(arm.object);
+      this.parts.path.add(pathOfPower(own.trajectory, (q) => this.chain.tcp(q, cell.tcp), k ? 0.006 : 0.009));
+      return arm;
+    });
+    for (const obstacle of cell.scene.obstacles) this.obstacle(obstacle);
+    this.nearest = this.nearestOf(answer, cell, robot);
+    this.eye.fit(state.answer.trajectory, this.chain, this.sun);
+    this.explain();
+    this.buildGhosts();
+    if (this.shown !== answer.robot) this.look(1);
+    this.shown = answer.robot;
+    this.pose();
+  }
+
+  /** What the colours of the path mean, and what the axes are. */
+  explain() {
+    const { power } = state.answer.trajectory;
+    const stops = rampStops.map((colour, k) => svg("stop", { offset: k / (rampStops.length - 1), "stop-color": colour }));
+    const ramp = svg("svg", { viewBox: "0 0 100 8", preserveAspectRatio: "none" }, svg("linearGradient", { id: "ramp" }, stops), svg("rect", { width: 100, height: 8, rx: 2, fill: "url(#ramp)" }));
+    $("legend").replaceChildren("power along the path", ramp, el("div", {}, el("span", {}, `${figure(Math.min(...power))} W`), el("span", {}, `${figure(Math.max(...power))} W`)));
+    const pendant = state.robot.title.startsWith("Universal Robots");
+    $("frame-note").textContent = pendant ? "base frame as on the teach pendant; ROS base_link is turned by 180° about z" : "base frame of the robot";
+  }
+
+  obstacle(obstacle) {
+    const colour = new THREE.Color(style(obstacle.shape === "half_space" ? "--floor" : "--obstacle"));
+    const material = new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity: 1, side: THREE.DoubleSide });
+    const object = placedShape(obstacle, material);
+    const solid = obstacle.shape !== "half_space";
+    // to look for thousands of parts between eye and arm would take longer than to draw them
+    const hides = solid && !["points", "voxels", "mesh_file"].includes(obstacle.shape);
+    object.userData = { material, solid, hides };
+    object.traverse((mesh) => {
+      mesh.receiveShadow = true;
+      mesh.castShadow = solid;
+    });
+    object.children[0].addEventListener("filled", () => this.draw());
+    this.parts.obstacles.add(object);
+    const shell = new THREE.MeshBasicMaterial({ color: 0xd64545, transparent: true, opacity: 0.16, depthWrite: false, side: THREE.DoubleSide });
+    const margin = obstacle.margin ?? DEFAULT_MARGIN;
+    if (margin > 0 && !["mesh", "mesh_file"].includes(obstacle.shape)) this.parts.margins.add(placedShape(obstacle, shell, margin));
+  }
+
+  buildGhosts() {
+    this.empty(this.parts.ghosts);
+    const { answer, cell, robot, chosen } = state;
+    if (!answer) return;
+    const ghost = (q, tint, opacity) => {
+      const arm = new Arm(this.chain, robot, cell, { tint, opacity });
+      arm.pose(q);
+      this.parts.ghosts.add(arm.object);
+    };
+    ghost(answer.trajectory.q[0], START, 0.2);
+    ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
+    chosen.forEach(({ q_goal }, k) => ghost(q_goal, new THREE.Color(style(`--joint-${k + 2}`)).getHex(), 0.42));
+    this.draw();
+  }
+
+  nearestOf(answer, cell, robot) {
+    const clearance = answer.certificate.clearance;
+    this.empty(this.parts.nearest);
+    this.labels.drop("nearest");
+    if (!clearance) return null;
+    const { t, q } = answer.trajectory;
+    const points = nearestPoints(cell, robot, this.chain.frames(sampleAt(t, q, clearance.time)), clearance.pair);
+    if (!points) return null;
+    const ends = [points.first, points.second].map((point) => new THREE.Vector3(...point));
+    const material = new THREE.MeshBasicMaterial({ color: 0xd62f6b, depthTest: false, transparent: true });
+    for (const end of ends) {
+      const dot = new THREE.Mesh(new THREE.SphereGeometry(0.008, 14, 10), material);
+      dot.position.copy(end);
+      dot.renderOrder = 2;
+      this.parts.nearest.add(dot);
+    }
+    const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(ends), new THREE.LineBasicMaterial({ color: 0xd62f6b, depthTest: false }));
+    this.parts.nearest.add(line);
+    const text = `${clearance.pair.join(" – ")}: ${figure((clearance.sampled + marginOf(cell, clearance.pair)) * 1000)} mm at ${figure(clearance.time)} s`;
+    return { text, at: points.first.map((value, axis) => (value + points.second[axis]) / 2) };
+  }
+
+  /** The arms at the present time, and what is switched on. */
+  pose() {
+    if (!this.arms) return;
+    const { show, time, arms } = state;
+    this.arms.forEach((arm, k) => {
+      const { t, q } = arms[k].answer.trajectory;
+      arm.pose(sampleAt(t, q, time));
+      arm.showCapsules(show.capsules);
+    });
+    for (const name of ["ghosts", "path", "nearest", "margins", "axes"]) this.parts[name].visible = show[name];
+    for (let axis = 0; axis < 3; axis++) this.labels.show(`axis ${axis}`, show.axes);
+    if (this.nearest) this.labels.put("nearest", this.nearest.text, this.nearest.at, "near");
+    this.labels.show("nearest", show.nearest);
+    this.labels.keep("arm", arms.length > 1 ? arms.length : 0);
+    if (arms.length > 1)
+      arms.forEach(({ name, answer }, k) => {
+        const top = this.arms[k].frames.at(-1);
+        this.labels.put(`arm ${k}`, `${name}: ${figure(answer.energy.electrical.total)} J`, [top[3], top[7], top[11] + 0.08], "arm");
+      });
+    this.draw();
+  }
+
+  /** Draws once, at the next frame of the browser. */
+  draw() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.render();
+    });
+  }
+
+  render() {
+    const began = performance.now();
+    if (state.playing || this.dragging) this.adapt(began);
+    else this.setFineness(STILL);
+    this.controls.update();
+    if (this.arms) this.eye.fade(this.arms[0].frames);
+    this.renderer.render(this.scene, this.camera);
+    this.labels.place(this.size);
+    this.frames = (this.frames ?? 0) + 1;
+    this.last = began;
+  }
+
+  /** Coarser while frames come slowly, finer when they come fast. A still picture is always fine. */
+  adapt(now) {
+    const took = (now - (this.last ?? now)) / 1000;
+    if (this.fineness === this.coarse && took < 0.5) this.pace = 0.8 * this.pace + 0.2 * took;
+    const step = this.pace > SLOW && this.coarse > 0.5 ? -0.25 : this.pace < FAST && this.coarse < STILL ? 0.25 : 0;
+    if (step) this.pace = (SLOW + FAST) / 2;
+    this.coarse += step;
+    this.setFineness(this.coarse);
+  }
+
+  setFineness(fineness) {
+    if (this.fineness === fineness) return;
+    this.fineness = fineness;
+    this.renderer.setPixelRatio(fineness);
+  }
+
+  /** One of the six views, by its number. */
+  look(number) {
+    this.eye.look(number);
+    this.draw();
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.box;
+    if (!width || !height) return;
+    this.size = { width, height };
+    this.renderer.setPixelRatio(this.fineness);
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  empty(group) {
+    // what other arms share is sent to the graphics card again when it is next drawn
+    group.traverse((each) => each.geometry?.dispose());
+    group.clear();
+  }
+
+  /** The picture as a PNG. */
+  picture() {
+    this.setFineness(STILL);
+    this.renderer.render(this.scene, this.camera);
+    return new Promise((resolve) => this.renderer.domElement.toBlob(resolve));
+  }
+}
+
+/** The margin [m] between two bodies by name: that of the obstacle, if one of them is one. */
+export function marginOf(cell, pair) {
+  const obstacle = cell.scene.obstacles.find(({ name }) => pair.includes(name));
+  return obstacle ? (obstacle.margin ?? DEFAULT_MARGIN) : 0;
+}
+
+/** Chooses what is drawn. */
+export const show = (name, on) => set({ show: { ...state.show, [name]: on } });
+
+/** Pose of the TCP as it is drawn now: a matrix, row by row. */
+export const drawnTcp = () => multiply(view.arms[0].links.at(-1).matrix.clone().transpose().toArray(), ofPose(state.cell.tcp));

@@ -1,0 +1,43 @@
+"""The studio page in a browser, and what every test asks of it: no error in its console, no request to elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from playwright.sync_api import Browser, Page, expect
+
+from tests.app.live import ANSWER
+
+PATIENCE = 1000 * ANSWER  # [ms]
+expect.set_options(timeout=PATIENCE)
+SHOWN = "() => Boolean(window.studio?.state.answer && (window.studio.view?.frames ?? 1))"
+
+
+def until(page: Page, condition: str, patience: float = ANSWER) -> None:
+    """Waits until a JavaScript function of the page returns true. The page's own policy forbids `wait_for_function`."""
+    end = time.monotonic() + patience
+    while not page.evaluate(condition):
+        assert time.monotonic() < end, condition
+        page.wait_for_timeout(20)
+
+
+@contextmanager
+def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
+    """A page of a fresh context, at 1280 x 800, whose errors and foreign requests fail the test."""
+    options = {"viewport": {"width": 1280, "height": 800}, "reduced_motion": "reduce", **options}
+    context = browser.new_context(accept_downloads=True, **options)
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE)
+    faults: list[str] = []
+    page.on("console", lambda message: faults.append(message.text) if message.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    own = (url.split("/studio")[0], "data:", "blob:")
+    page.on("request", lambda sent: faults.append(sent.url) if not sent.url.startswith(own) else None)
+    page.goto(url)
+    yield page
+    context.close()
+    # Chromium itself says of a refused request that it failed: that is what these tests provoke
+    assert [fault for fault in faults if "status of 4" not in fault] == []

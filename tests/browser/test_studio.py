@@ -1,0 +1,272 @@
+"""The studio page in a real browser: what it shows is what the service answered."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, Route, expect
+
+from models.registry import load_robot
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+from tests.app.live import ROOT, Server
+from tests.app.requests import NEAR, move
+from tests.browser.pages import SHOWN, opened, until
+from tests.browsers import BROWSER, MISSING
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
+
+FIRST = json.loads((ROOT / "examples" / "optimize" / "bin_to_shelf.json").read_text())
+DRAWN = 1e-6  # m; the certificate's own tolerance of an end
+ROUNDING = 1e-9  # m; sums of some ten products in double precision
+# relative; the service integrates the power of the recording's samples by another rule
+RECORDED = 2e-3
+PIXELS = """async () => {
+    const image = await createImageBitmap(await studio.view.picture());
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    let drawn = 0, sum = 0;
+    for (let k = 0; k < data.length; k += 4) {
+        drawn += data[k + 3] > 0;
+        sum += data[k] + 3 * data[k + 1] + 7 * data[k + 2];
+    }
+    return [drawn / (data.length / 4), sum];
+}"""
+
+
+def state(page: Page, what: str) -> Any:
+    return page.evaluate(f"() => studio.state.{what}")
+
+
+def tcp(page: Page, time: float) -> np.ndarray:
+    """The pose of the TCP (4, 4) as it is drawn at a time."""
+    page.locator("#scrub").evaluate("(it, time) => { it.value = time; it.dispatchEvent(new Event('input')); }", time)
+    return np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
+
+
+def test_the_first_look_moves(browser: Browser, service: Server) -> None:
+    """From `/`, without a click: an example is computed, drawn and played."""
+    with opened(browser, f"{service.url}/", reduced_motion="no-preference") as page:
+        until(page, SHOWN)
+        assert page.url == f"{service.url}/studio"
+        until(page, "() => studio.state.playing && studio.state.time > 0")
+        answer = state(page, "answer")
+        assert answer["status"] == "optimal"
+        joules = float(page.locator("#joules").inner_text().split()[0])
+        assert joules == pytest.approx(answer["energy"]["electrical"]["total"], abs=0.05)
+        assert state(page, "asked") == FIRST
+
+
+def test_the_picture_is_of_the_motion(page: Page) -> None:
+    """At both ends the TCP is drawn where the request wants it."""
+    for time, end in ((0.0, "start"), (state(page, "duration"), "goal")):
+        pose = FIRST[end]["pose"]
+        turn = "quaternion" if "quaternion" in pose else "rpy"
+        asked = getattr(Pose, f"from_{turn}")(pose["position"], pose[turn])
+        assert tcp(page, time) == pytest.approx(asked.T, abs=DRAWN)
+
+
+def test_the_picture_is_where_the_library_says(page: Page) -> None:
+    arm = Arm(robot=load_robot("ur5e"), T_flange_tcp=Pose.from_quaternion([0, 0, 0.16], [0, 0, 0, 1]).T)
+    trajectory = state(page, "answer.trajectory")
+    for k in (10, 50, 90):
+        assert tcp(page, trajectory["t"][k]) == pytest.approx(tcp_pose(arm, np.array(trajectory["q"][k])), abs=ROUNDING)
+
+
+def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
+    share, before = page.evaluate(PIXELS)
+    assert share > 0.05
+    page.locator("#show > summary").click()
+    seen = {before}
+    for name in ("ghosts", "path", "nearest", "margins", "capsules", "axes"):
+        page.locator(f"[data-show={name}]").click()
+        _, now = page.evaluate(PIXELS)
+        assert now not in seen, name
+        seen.add(now)
+    for name in ("ghosts", "path", "nearest", "margins", "capsules", "axes"):
+        page.locator(f"[data-show={name}]").click()
+    page.locator("#show > summary").click()
+    assert page.evaluate(PIXELS)[1] == before
+
+
+def test_one_clock(page: Page) -> None:
+    """A click on a plot, a key and a limit set the time of everything."""
+    plot = page.locator("#plot-power .u-over")
+    box = plot.bounding_box()
+    assert box is not None
+    plot.click(position={"x": box["width"] / 4, "y": 20})
+    duration = state(page, "duration")
+    assert state(page, "time") == pytest.approx(duration / 4, abs=0.01 * duration)
+    drawn = np.array(page.evaluate("() => studio.tcp()")).reshape(4, 4)
+    assert drawn == pytest.approx(tcp(page, state(page, "time")), abs=ROUNDING)
+    page.locator("#view").press("Home")
+    assert state(page, "time") == 0
+    page.locator("#view").press("ArrowRight")
+    times = state(page, "answer.trajectory.t")
+    assert state(page, "time") == times[1]
+    page.locator("#limits button", has_text="speed").click()
+    k = times.index(state(page, "time"))
+    shares = np.abs(state(page, "answer.trajectory.v")) / state(page, "answer.limits.velocity")
+    assert shares[k].max() == shares.max()
+    page.locator("#view").press(" ")
+    until(page, f"() => studio.state.time !== {times[k]}")
+    page.locator("#view").press(" ")
+    assert not state(page, "playing")
+
+
+def test_figures_are_those_of_the_answer(page: Page) -> None:
+    answer = state(page, "answer")
+    broken = [each for each in answer["baselines"] if not each["within_limits"]]
+    assert broken and page.locator("#waterfall li.broken").count() == len(broken)
+    for each in broken:
+        expect(page.locator("#waterfall")).to_contain_text(each["reason"])
+    bound = page.locator("#waterfall li.bound .value").inner_text()
+    assert float(bound) == pytest.approx(answer["energy"]["lower_bound"], rel=0.01)
+    friction = page.locator("#breakdown li", has_text="friction").locator("b").inner_text()
+    assert float(friction.split()[0]) == pytest.approx(answer["energy"]["electrical"]["friction"], rel=0.01)
+    for name, unit in (("position", ""), ("torque", "N·m"), ("speed", "rad/s")):
+        page.locator("#quantities button", has_text=name).click()
+        page.locator("#shares").set_checked(not unit)
+        expect(page.locator("#joint-title")).to_contain_text(unit or "share of the limit")
+
+
+def test_downloads_are_what_the_service_reads(page: Page, service: Server) -> None:
+    with page.expect_download() as download:
+        page.locator("#downloads > summary").click()
+        page.get_by_role("button", name="Samples (CSV)").click()
+    rows = list(csv.DictReader(io.StringIO(Path(download.value.path()).read_text())))
+    answer = state(page, "answer")
+    assert len(rows) == len(answer["trajectory"]["t"])
+    columns = {name: [[float(row[f"{name}{j}"]) for j in range(1, 7)] for row in rows] for name in "qva"}
+    body = {"trajectory": {"t": [float(row["t"]) for row in rows], **columns}}
+    again = service.post("/evaluate", {**body, "tcp": FIRST["tcp"], "payload": FIRST["payload"]}).json()
+    ours = answer["energy"]["electrical"]["total"]
+    assert again["total"]["energy"]["electrical"]["total"] == pytest.approx(ours, rel=RECORDED)
+    with page.expect_download() as picture:
+        page.locator("#downloads > summary").click()
+        page.get_by_role("button", name="Picture (PNG)").click()
+    assert Path(picture.value.path()).read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_link_holds_the_request(browser: Browser, page: Page) -> None:
+    page.locator("#share").click()
+    until(page, "() => location.hash.startsWith('#r=')")
+    link = page.url
+    with opened(browser, link) as other:
+        until(other, SHOWN)
+        assert state(other, "request") == FIRST
+        energy = state(page, "answer.energy.electrical.total")
+        assert state(other, "answer.energy.electrical.total") == pytest.approx(energy, rel=1e-9)
+
+
+def ask(page: Page, body: dict[str, Any]) -> None:
+    """Sends a body from the page, and waits for the answer."""
+    before = state(page, "answer.id")
+    page.locator("#json").fill(json.dumps(body))
+    page.locator("#json").blur()
+    page.locator("#optimise").click()
+    until(page, f"() => studio.state.answer.id !== '{before}'")
+
+
+def test_branches_side_by_side(page: Page) -> None:
+    """A branch that the search ruled out: as a ghost, then as a second arm on the same clock."""
+    ask(page, {**FIRST, "branch": {"shoulder": "left", "elbow": "up"}, "candidates": "all"})
+    rows = page.locator("#candidates tbody tr")
+    expect(rows).to_have_count(4)
+    page.locator("#candidate-filter").select_option("pruned")
+    expect(rows).to_have_count(3)
+    before = page.evaluate(PIXELS)[1]
+    rows.first.locator("input").check()
+    assert page.evaluate(PIXELS)[1] != before
+    rows.first.get_by_role("button", name="compute").click()
+    until(page, "() => studio.state.arms.length === 2")
+    first, second = (arm["answer"]["energy"]["electrical"]["total"] for arm in state(page, "arms"))
+    assert first < second
+    labels = page.locator(".label.arm")
+    expect(labels).to_have_count(2)
+    for energy in (first, second):
+        expect(labels.filter(has_text=f"{energy:.3g} J")).to_have_count(1)
+
+
+def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
+    lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
+    ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
+    page.locator("#compute-front").click()
+    points = page.locator("#front circle.point")
+    expect(points.first).to_be_visible()
+    assert points.count() > 1
+    fastest = points.first.get_attribute("aria-label")
+    points.first.click()
+    expect(page.locator("#joules")).to_have_text(str(fastest).split(", ")[1])
+
+
+def test_a_wrong_request_is_explained(page: Page) -> None:
+    page.locator("#json").fill(json.dumps({**FIRST, "sample_period": -1}))
+    page.locator("#json").blur()
+    page.locator("#optimise").click()
+    expect(page.locator("#problem")).to_contain_text("sample_period")
+    assert page.locator("#problem a").get_attribute("href") == "problems/validation"
+    page.locator("#json").fill("{")
+    page.locator("#json").blur()
+    expect(page.locator("#problem")).to_contain_text("no JSON")
+
+
+def test_without_webgl_the_figures_are_there(browser: Browser, service: Server) -> None:
+    options = ["--no-sandbox", "--disable-gpu", "--disable-software-rasterizer"]
+    plain = browser.browser_type.launch(executable_path=BROWSER, args=options)
+    with opened(plain, f"{service.url}/studio") as page:
+        until(page, "() => Boolean(window.studio?.state.answer)")
+        expect(page.locator("#no-view")).to_be_visible()
+        assert page.locator("#plot-power canvas").count() == 1
+        assert page.locator("#limits li").count() >= 5
+    plain.close()
+
+
+def test_behind_the_path_of_a_proxy(browser: Browser, service: Server) -> None:
+    """Every address of the page is relative."""
+    front = "http://cell.example/robots/energy"
+
+    def forward(route: Route) -> None:
+        path = route.request.url.removeprefix(front)
+        assert path != route.request.url, f"outside of the proxy's path: {path}"
+        route.fulfill(response=route.fetch(url=service.url + path, headers={"content-type": "application/json"}))
+
+    context = browser.new_context(reduced_motion="reduce")
+    context.route("**/*", forward)
+    page = context.new_page()
+    page.goto(f"{front}/studio")
+    until(page, SHOWN)
+    context.close()
+
+
+def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        before = state(page, "answer.id")
+
+        def tab_to(name: str) -> None:
+            for _ in range(60):
+                page.keyboard.press("Tab")
+                if page.evaluate("() => document.activeElement.id") == name:
+                    return
+            raise AssertionError(name)
+
+        tab_to("json")
+        page.keyboard.press("Control+a")
+        page.keyboard.insert_text(json.dumps(move()))
+        tab_to("optimise")
+        page.keyboard.press("Enter")
+        until(page, f"() => studio.state.answer.id !== '{before}'")
+        assert state(page, "answer.branch.goal.q") == pytest.approx(NEAR)
+        tab_to("play")
+        page.keyboard.press("Enter")
+        until(page, "() => studio.state.time > 0")
