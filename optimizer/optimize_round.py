@@ -12,6 +12,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.proven_bound import proven_bound
+from optimizer.sequence.rests import rest_sensitivity
 from optimizer.sequence.round_baselines import (
     controller_default,
     fastest_then_wait,
@@ -122,6 +123,7 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: 
     for (k, _, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
         wait, wait_energy = (0.0, 0.0) if timed is None or timed.at != k else (timed.shared.waited, timed.wait_energy)
+        rest = asked.moves[k].dwell + wait
         moves.append(
             Move(
                 planned=asked.moves[k],
@@ -133,6 +135,7 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: 
                 pairs=int((leg.kind >= 0).sum()),
                 kinds=len(leg.pair),
                 solved=len(leg.solved),
+                sensitivity=solution.sensitivity + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
             )
         )
         t0 += moves[-1].duration

@@ -10,7 +10,7 @@ from app.convert.warnings import certified_warnings
 from app.schemas.request import WhichCandidates
 from app.schemas.response import Clearance
 from optimizer.problem.problem import MethodName
-from optimizer.solution import Certificate, ElectricalEnergy, Energy, Objective, Solution, StorageUse
+from optimizer.solution import Certificate, ElectricalEnergy, Energy, EnergyInterval, Objective, Solution, StorageUse
 
 
 class Asked(Protocol):
@@ -72,13 +72,23 @@ def optimality_gap(bound: float, energy: float) -> float:
 def baseline_fields(solution: Solution) -> list[dict[str, Any]]:
     """The entries of `baselines`."""
     names = ("name", "duration", "electrical", "mechanical", "within_limits", "saving")
-    return [fields(baseline, *names) for baseline in solution.baselines]
+    return [
+        {
+            **fields(each, *names),
+            "saving_interval": None if each.saving_interval is None else vars(each.saving_interval),
+        }
+        for each in solution.baselines
+    ]
 
 
 def energy_fields(energy: Energy) -> dict[str, Any]:
     """The fields `electrical` to `mean_power` of an energy."""
+    interval = energy.electrical.interval
     return {
-        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+        "electrical": {
+            **fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+            "interval": None if interval is None else fields(interval, *EnergyInterval.__dataclass_fields__),
+        },
         "mechanical": fields(energy.mechanical, "total", "per_joint"),
         "per_joint": fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
         "storage": None if energy.storage is None else fields(energy.storage, *StorageUse.__dataclass_fields__),

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from optimizer.energy.interval import Known, with_interval
 from optimizer.exceptions import DeadlineExceeded, NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
@@ -17,6 +18,7 @@ from optimizer.problem.problem import Problem
 from optimizer.progress import Improved, Tell, nobody
 from optimizer.search import free_goal, self_motions
 from optimizer.search.attempts import solve, solve_from
+from optimizer.search.baselines import with_saving_intervals
 from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
@@ -222,6 +224,7 @@ class Run:
                 if not certificate.valid:
                     return None
                 trajectory = prepared.trajectory(spline, self.problem.sample_period)
+                sensitivity = prepared.sensitivity(spline)
         except DeadlinePassed:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
@@ -252,10 +255,13 @@ class Run:
             start=Branch(best.start.label, best.q_start, best.start.target),
             goal=Branch(best.goal.label, best.q_goal, best.goal.target),
             trajectory=trajectory,
-            energy=energy,
+            energy=with_interval(energy, sensitivity, spline.duration, self.problem.arm),
+            sensitivity=sensitivity,
             lower_bound=least,
             complete=all_known(self.problem),
-            baselines=table,
+            baselines=with_saving_intervals(
+                table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)
+            ),
             candidates=[each.report() for each in candidates],
             unreachable=self.unreachable,
             certificate=certificate,

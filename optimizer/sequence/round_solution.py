@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass, field, fields
+from functools import cached_property, reduce
 from itertools import pairwise
+from operator import add
 from typing import Literal
 
 import numpy as np
 
+from optimizer.energy.interval import with_interval
 from optimizer.problem.stops import PlannedMove
-from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, Solution
+from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, Sensitivity, Solution
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,7 @@ class Move:
 
     It begins at `t0` [s] of the round. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
     draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
-    `solved`.
+    `solved`. `sensitivity` is that of the energy of all three.
     """
 
     planned: PlannedMove
@@ -32,6 +34,7 @@ class Move:
     pairs: int
     kinds: int
     solved: int
+    sensitivity: Sensitivity = field(repr=False)
 
     @property
     def duration(self) -> float:
@@ -84,7 +87,10 @@ class RoundSolution:
     def energy(self) -> Energy:
         """Energy of the round [J], with dwells and waiting."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
-        return summed([move.solution for move in self.moves], resting)
+        energy = summed([move.solution for move in self.moves], resting)
+        moving = sum(move.solution.duration for move in self.moves)
+        sensitivity = reduce(add, [move.sensitivity for move in self.moves])
+        return with_interval(energy, sensitivity, moving, self.moves[0].planned.arm)
 
     @property
     def order(self) -> list[str]:
@@ -101,7 +107,7 @@ class RoundSolution:
 def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
     """The energy of several motions, and of the dwells between them [J]; mean power is that of the motions."""
     energies = [each.energy for each in solutions]
-    parts = [part.name for part in fields(ElectricalEnergy)]
+    parts = [part.name for part in fields(ElectricalEnergy) if part.name != "interval"]
     electrical = ElectricalEnergy(**{part: sum(getattr(each.electrical, part) for each in energies) for part in parts})
     moving = sum(each.duration for each in solutions)
     return Energy(

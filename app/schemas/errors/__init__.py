@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
 from app.schemas.errors.logs import EffortNotUsable, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
@@ -100,6 +101,9 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     LogTooLarge,
     TooManyLogs,
     EffortNotUsable,
+    UnknownFigures,
+    FiguresInUse,
+    TooManyFigures,
     KeyReused,
     Unauthenticated,
     RoleTooLow,
@@ -132,6 +136,7 @@ __all__ = [
     "DurationTooShort",
     "EffortNotUsable",
     "EmptyStudy",
+    "FiguresInUse",
     "FormatUnsuitable",
     "GoalInCollision",
     "HeadTooLarge",
@@ -161,12 +166,14 @@ __all__ = [
     "StartInCollision",
     "StopInCollision",
     "StoreUnavailable",
+    "TooManyFigures",
     "TooManyLogs",
     "TooManyRequests",
     "TooManyRobots",
     "TorqueInfeasible",
     "Unauthenticated",
     "UnknownAnswer",
+    "UnknownFigures",
     "UnknownJob",
     "UnknownLog",
     "UnknownRobot",
