@@ -150,6 +150,8 @@ def test_query_is_answered(operation: Operation, client: TestClient, study: str,
 
 @pytest.mark.parametrize("name", EVALUATE.parameters("query"))
 def test_setting_of_a_csv_file_is_answered(name: str, client: TestClient) -> None:
+    if name == "figures":
+        assert client.put("/figures", json=FIGURES).json()["id"] == FIGURES_ID
     example = EVALUATE.parameters("query")[name]
     query = {"time_per_segment": "1.5", name: example if isinstance(example, str) else json.dumps(example)}
     answer = client.post("/evaluate", content=CSV, headers={"Content-Type": "text/csv"}, params=query)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-FIGURES_ID = "0d4f8f5e-6d0c-5a0e-9b0e-7d5f3a531d1f"
+# that of the example: it follows from the content
+FIGURES_ID = "26d7fc46-dfa6-58dc-957c-af3337058506"
 
 
 def _identified(value: list[float], unit: str, sd: list[float] | None = None) -> dict[str, Any]:
