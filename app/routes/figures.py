@@ -18,7 +18,7 @@ from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import LOCATION_HEADER
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
-from app.schemas.examples.figures import FIGURES, FIGURES_ID
+from app.schemas.examples.figures import FIGURES, UNKNOWN_ID
 from app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
 from app.store import figures
 from app.store.store import Store
@@ -29,7 +29,7 @@ from models.uncertainty.document import merged
 
 router = APIRouter(prefix="/figures", tags=["robots"], route_class=LargeBodyRoute)
 
-FiguresIdPath = Annotated[str, Path(description="Id of the figures.", examples=[FIGURES_ID])]
+FiguresIdPath = Annotated[str, Path(description="Id of the figures.", examples=[UNKNOWN_ID])]
 YAML = "application/yaml"
 
 

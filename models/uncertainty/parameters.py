@@ -10,7 +10,7 @@ from models.robot import Array, Drives, FrictionLaw
 
 # power of the electronics [W], then those with one value per joint; friction as in FrictionLaw, the rest as in Drives
 BASE_POWER = "base_power"
-FRICTION = ("coulomb", "curved", "viscous", "load")
+FRICTION = ("coulomb", "curved", "speed", "viscous", "load")
 DRIVES = ("torque_constant", "rotor_inertia", "copper", "inverter_constant", "inverter_linear", "inverter_quadratic")
 PER_JOINT = FRICTION + DRIVES
 

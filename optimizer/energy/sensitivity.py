@@ -101,6 +101,7 @@ def _power_rates(v: Array, a: Array, tau: Array, arm: Arm) -> tuple[Array, Array
     rates = {
         "coulomb": step,
         "curved": by_torque * np.arcsinh(v / law.speed),
+        "speed": -by_torque * law.curved * v / (law.speed * np.hypot(v, law.speed)),
         "viscous": by_torque * v,
         "load": step * np.abs(tau - drives.rotor_inertia * a),
         "torque_constant": -(2 * quadratic * square + linear * size) / drives.torque_constant,

@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.schemas.common import KEY_HEADER
+from app.schemas.examples.figures import FIGURES, FIGURES_ID
 from app.schemas.examples.own_arm import PUT_EXAMPLES
 from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from fastapi.openapi.models import Example
+
 # that of the example: it follows from the content
 FIGURES_ID = "26d7fc46-dfa6-58dc-957c-af3337058506"
+UNKNOWN_ID = "9d1f4f1c-0a43-5f4a-8ad0-d1b75c0a0e0f"
 
 
 def _identified(value: list[float], unit: str, sd: list[float] | None = None) -> dict[str, Any]:
@@ -34,4 +37,7 @@ FIGURES: dict[str, Any] = {
     "covariance": COVARIANCE,
     "session_sd": 0.03,
     "move_sd": 1.5,
+}
+FIGURES_EXAMPLES: dict[str, Example] = {
+    "identified_friction": {"summary": "Friction and rotor inertia of one UR5e", "value": FIGURES},
 }
