@@ -22,7 +22,7 @@ from optimizer.sequence.round_baselines import (
     same_factor,
 )
 from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
-from optimizer.sequence.round_solution import Move, RoundSolution
+from optimizer.sequence.round_solution import Move, RoundSolution, known_of
 from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Solution
 
@@ -89,13 +89,13 @@ def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution
         # energies of nearly fastest moves are flat: rounding must not turn the price's sign
         price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
     moves = _moves(search, nodes, moving, timed)
-    ours = sum(each.energy for each in moves)
+    ours = known_of(moves)
     compared = [
         None if greedy is None else of_chain(search, greedy, "move_by_move", ours),
         controller_default(search, nodes[0], ours),
     ]
     if timing is not None:
-        bound = max(bound, timing.bound(price, ours))
+        bound = max(bound, timing.bound(price, ours.energy))
         compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
     complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
     return RoundSolution(

@@ -11,9 +11,17 @@ from typing import Literal
 
 import numpy as np
 
-from optimizer.energy.interval import with_interval
+from optimizer.energy.interval import Known, with_interval
 from optimizer.problem.stops import PlannedMove
-from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, Sensitivity, Solution
+from optimizer.solution import (
+    ElectricalEnergy,
+    Energy,
+    JointEnergy,
+    MechanicalEnergy,
+    SavingInterval,
+    Sensitivity,
+    Solution,
+)
 
 
 @dataclass(frozen=True)
@@ -52,13 +60,15 @@ RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor",
 
 @dataclass(frozen=True)
 class RoundBaseline:
-    """Another way to go round: its duration [s], electrical energy [J], and our saving 1 - ours / theirs."""
+    """Another way to go round: its duration [s], electrical energy [J], our saving 1 - ours / theirs, and how well that
+    is known."""
 
     name: RoundBaselineName
     duration: float
     electrical: float
     within_limits: bool
     saving: float
+    saving_interval: SavingInterval
 
 
 @dataclass(frozen=True)
@@ -88,9 +98,13 @@ class RoundSolution:
         """Energy of the round [J], with dwells and waiting."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
         energy = summed([move.solution for move in self.moves], resting)
-        moving = sum(move.solution.duration for move in self.moves)
-        sensitivity = reduce(add, [move.sensitivity for move in self.moves])
-        return with_interval(energy, sensitivity, moving, self.moves[0].planned.arm)
+        known = known_of(self.moves)
+        return with_interval(energy, known.sensitivity, known.duration, self.moves[0].planned.arm)
+
+    @property
+    def known(self) -> Known:
+        """The round's energy [J] and how it hangs on the arm's figures."""
+        return known_of(self.moves)
 
     @property
     def order(self) -> list[str]:
@@ -102,6 +116,12 @@ class RoundSolution:
         """Largest jump [rad] of a joint from the end of a move to the start of the next."""
         ends = [move.solution.trajectory.spline.control_points[[0, -1]] for move in self.moves]
         return max((float(np.abs(b[0] - a[1]).max()) for a, b in pairwise(ends)), default=0.0)
+
+
+def known_of(moves: Sequence[Move]) -> Known:
+    """The energy [J] of moves and their rests, and how it hangs on the arm's figures."""
+    sensitivity = reduce(add, [move.sensitivity for move in moves])
+    return Known(sum(move.energy for move in moves), sensitivity, sum(move.solution.duration for move in moves))
 
 
 def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
