@@ -76,6 +76,7 @@ class Settings(BaseSettings):
         "their first request.",
     )
     max_robots: int = Field(default=100, ge=0, description="Robots of users' own that the database holds at most.")
+    max_figures: int = Field(default=1000, ge=0, description="Identified figures that the database holds at most.")
     queue_size: int = Field(
         default=64, ge=0, description="Requests that may wait for a worker; further requests are `busy`."
     )

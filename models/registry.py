@@ -30,12 +30,17 @@ def robot_names() -> tuple[str, ...]:
 _LOADING = threading.Lock()
 
 
-def load_robot(robot: str | PathLike[str]) -> Robot:
+def load_robot(robot: str | PathLike[str], figures: str | PathLike[str] | dict[str, Any] | None = None) -> Robot:
     """The robot of that name, or of a user's own arm that a YAML file describes: see `docs/own_robot.md`.
 
+    `figures` is a document of figures identified on one arm, or the path of one in YAML: see `docs/identification.md`.
+
     It is loaded once per process: all threads get the same object. Raises LookupError for a name that is not in
-    `robot_names()`; InvalidArm, which names the field, for a file that makes no robot; OSError if there is none.
+    `robot_names()`; InvalidArm, which names the field, for a file that makes no robot; InvalidFigures for
+    a document that does not fit the robot; OSError if there is no such file.
     """
+    if figures is not None:
+        return _identified(load_robot(robot), figures)
     if isinstance(robot, PathLike) or robot.endswith(DESCRIPTIONS):
         from models.own_arm.robots import read_robot  # its validator takes as long to import as all of this package
 
@@ -43,6 +48,24 @@ def load_robot(robot: str | PathLike[str]) -> Robot:
     # robots are compared by identity, and `cache` lets two threads that miss at the same time both load one
     with _LOADING:
         return _load_robot(robot)
+
+
+def _identified(robot: Robot, figures: str | PathLike[str] | dict[str, Any]) -> Robot:
+    """The robot with the figures of a document, or of a file. Raises InvalidFigures or OSError."""
+    from models.own_arm.robots import own_robot  # as above
+    from models.uncertainty.document import with_document
+
+    document = figures if isinstance(figures, dict) else _read_document(Path(figures))
+    return own_robot(robot.name, with_document(robot.name, robot.figures, document))
+
+
+def _read_document(path: Path) -> Any:
+    from models.uncertainty.document import InvalidFigures
+
+    try:
+        return yaml.load(path.read_text(encoding="utf-8"), Loader=LOADER)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InvalidFigures("", f"{path.name} is no YAML: {error}") from None
 
 
 @cache

@@ -12,6 +12,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.proven_bound import proven_bound
+from optimizer.sequence.rests import rest_sensitivity
 from optimizer.sequence.round_baselines import (
     controller_default,
     fastest_then_wait,
@@ -21,7 +22,7 @@ from optimizer.sequence.round_baselines import (
     same_factor,
 )
 from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
-from optimizer.sequence.round_solution import Move, RoundSolution
+from optimizer.sequence.round_solution import Move, RoundSolution, known_of
 from optimizer.sequence.timed_round import Timed, TimedSearch
 from optimizer.solution import Solution
 
@@ -88,13 +89,13 @@ def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution
         # energies of nearly fastest moves are flat: rounding must not turn the price's sign
         price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
     moves = _moves(search, nodes, moving, timed)
-    ours = sum(each.energy for each in moves)
+    ours = known_of(moves)
     compared = [
         None if greedy is None else of_chain(search, greedy, "move_by_move", ours),
         controller_default(search, nodes[0], ours),
     ]
     if timing is not None:
-        bound = max(bound, timing.bound(price, ours))
+        bound = max(bound, timing.bound(price, ours.energy))
         compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
     complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
     return RoundSolution(
@@ -122,6 +123,7 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: 
     for (k, _, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
         wait, wait_energy = (0.0, 0.0) if timed is None or timed.at != k else (timed.shared.waited, timed.wait_energy)
+        rest = asked.moves[k].dwell + wait
         moves.append(
             Move(
                 planned=asked.moves[k],
@@ -133,6 +135,7 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: 
                 pairs=int((leg.kind >= 0).sum()),
                 kinds=len(leg.pair),
                 solved=len(leg.solved),
+                sensitivity=solution.sensitivity + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
             )
         )
         t0 += moves[-1].duration

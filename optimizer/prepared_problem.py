@@ -8,15 +8,17 @@ from functools import cached_property
 import numpy as np
 
 from models.robot import Array
-from optimizer.energy.dwell import dwell_energy, holding_power
+from optimizer.energy.dwell import dwell_energy, holding_power, waits
+from optimizer.energy.interval import arm_spread
 from optimizer.energy.plant import Plant
+from optimizer.energy.sensitivity import waiting_sensitivity
 from optimizer.kinematics.course_tracing import Trace, joint_path, traces
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
-from optimizer.solution import Energy
+from optimizer.solution import Energy, Sensitivity
 from optimizer.surroundings import Surroundings
 from optimizer.trajectories.limit_ratios import too_much
 from optimizer.trajectories.spline import Spline
@@ -103,6 +105,16 @@ class PreparedProblem(Plant):
             return energy
         hold = float(self.holding_power(spline.control_points[-1]))
         return energy.with_dwell(dwell_energy(cycle, self.arm, hold, spline.duration))
+
+    def sensitivity(self, spline: Spline) -> Sensitivity:
+        """How the electrical energy of a motion, and of waiting after it, hangs on the arm's figures."""
+        moving, cycle = super().sensitivity(spline), self.problem.cycle
+        if cycle is None:
+            return moving
+        still = np.zeros((1, self.arm.robot.nq))
+        held = self.torques(spline.control_points[-1:], still, still)[0]
+        times = waits(cycle, spline.duration)
+        return moving + waiting_sensitivity(self.arm, held, *times, cycle, arm_spread(self.arm))
 
     @cached_property
     def objective_parameters(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Literal
 
@@ -34,10 +34,45 @@ class Trajectory:
 
 
 @dataclass(frozen=True)
+class Sensitivity:
+    """How an electrical energy hangs on the figures of the arm: its `gradient` (p,) in the order of
+    `models.uncertainty.parameters`, and by how much the mean over their errors is above the energy itself [J]."""
+
+    gradient: Array
+    shift: float
+
+    def __add__(self, other: Sensitivity) -> Sensitivity:
+        return Sensitivity(self.gradient + other.gradient, self.shift + other.shift)
+
+
+@dataclass(frozen=True)
+class EnergyInterval:
+    """P5 and P95 of an energy and its standard deviation `sd` [J], from the errors that the arm's figures may have.
+
+    `shares` [1] of the variance add up to 1, by source: a figure to measure, `session` or `move`.
+    """
+
+    p5: float
+    p95: float
+    sd: float
+    shares: dict[str, float]
+
+
+@dataclass(frozen=True)
+class SavingInterval:
+    """P5, P95 and standard deviation `sd` [1] of a saving of electrical energy."""
+
+    p5: float
+    p95: float
+    sd: float
+
+
+@dataclass(frozen=True)
 class ElectricalEnergy:
     """Energy drawn from the supply plus the decrease of the energy storage's charge [J], and the parts of this total.
 
     `recovered` is negative; `storage_loss` is lost in the storage, `dwell` drawn while the arm waits after its motion.
+    `interval` is that of the total, None for a part of a motion.
     """
 
     total: float
@@ -51,6 +86,7 @@ class ElectricalEnergy:
     recovered: float
     storage_loss: float = 0.0
     dwell: float = 0.0
+    interval: EnergyInterval | None = None
 
     @property
     def parts_sum(self) -> float:
@@ -172,6 +208,7 @@ class Baseline:
     """Energy [J] of another method's motion between the same ends; `saving` = 1 - ours / theirs, of the objective.
 
     `reason` says which limits it breaks, and what collides; None if it is within all.
+    `sensitivity` is that of the electrical energy. Mechanical work has no `saving_interval`.
     """
 
     name: BaselineName
@@ -180,6 +217,8 @@ class Baseline:
     mechanical: float
     saving: float
     reason: str | None
+    sensitivity: Sensitivity = field(repr=False)
+    saving_interval: SavingInterval | None = None
 
     @property
     def within_limits(self) -> bool:
@@ -273,6 +312,7 @@ class Solution:
 
     Not `complete`: the inverse kinematics of the arm may have missed configurations at the start or goal. Then `status`
     is `feasible`, and the lower bound covers the motions between those that may be missing.
+    `sensitivity` is that of the electrical energy.
     """
 
     status: Literal["optimal", "feasible"]
@@ -281,6 +321,7 @@ class Solution:
     trajectory: Trajectory
     energy: Energy
     limits: LimitsInForce
+    sensitivity: Sensitivity = field(repr=False)
     lower_bound: float
     baselines: list[Baseline]
     candidates: list[CandidateReport]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from optimizer.certificate import certify
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from optimizer.energy.interval import with_interval
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.linear_algebra import one_thread
 from optimizer.optimize import optimize
@@ -54,6 +55,7 @@ def whatif(base: Solution, problem: Problem, clock: Clock = time.perf_counter) -
         with watch(deadline):
             energy = prepared.energy(spline)
             certificate = certify(asked, spline, base.start.q, base.goal.q, energy)
+            energy = with_interval(energy, prepared.sensitivity(spline), spline.duration, problem.arm)
     except DeadlinePassed:
         raise DeadlineExceeded([]) from None
     problem = replace(problem, deadline=max(deadline.left, LEAST_TIME))

@@ -13,6 +13,7 @@ import click
 import orjson
 
 if TYPE_CHECKING:
+    from app.engine.result import TaskResult
     from app.engine.task import Task
     from app.schemas.common import Request
 
@@ -63,18 +64,33 @@ def validated(model: type[M], body: bytes, request_id: str) -> M:
 
 def answered(task: Task, deadline: float, request_id: str) -> bytes:
     """The answer of a task for which `deadline` [s] is left. Raises Refused."""
-    from app.cli.store import with_own_robot
     from app.exceptions import ServiceError
-    from optimizer.exceptions import JoulepathError, UnknownRobot
+    from optimizer.exceptions import JoulepathError
 
     try:
-        try:
-            result = task.run(deadline)
-        except UnknownRobot as error:
-            result = with_own_robot(task, error.name).run(deadline)
+        result = _run(task, deadline)
         return (result if result.kept_as is None else result.without_path()).document
     except (JoulepathError, ServiceError) as error:
         raise refused(error, request_id) from None
+
+
+def _run(task: Task, deadline: float) -> TaskResult:
+    """The result of a task, with the robot and the figures that it takes from the database."""
+    from app.cli.store import with_figures, with_own_robot
+    from app.exceptions import UnknownFigures
+    from optimizer.exceptions import UnknownRobot
+
+    try:
+        return task.run(deadline)
+    except UnknownFigures as error:
+        task = with_figures(task, error.id)
+    except UnknownRobot as error:
+        task = with_own_robot(task, error.name)
+    try:
+        return task.run(deadline)
+    except UnknownFigures as error:
+        # of a robot that a user added
+        return with_figures(task, error.id).run(deadline)
 
 
 def refused(error: Exception, request_id: str | None = None) -> Refused:

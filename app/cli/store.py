@@ -21,6 +21,13 @@ def with_own_robot(task: Task, name: str) -> Task:
     return WithOwnRobot(task, name, in_store(lambda store: own_figures(store, name)))
 
 
+def with_figures(task: Task, id: str) -> Task:
+    """The task, with identified figures. Raises UnknownFigures or StoreUnavailable."""
+    from app.tasks.arm_engine import WithFigures, identified
+
+    return WithFigures(task, in_store(lambda store: identified(store, id)))
+
+
 def robot_named(name: str) -> Robot:
     """The robot of this name: one that comes with the library, or one in the database.
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from app.convert.identified import with_figures
 from app.convert.own_robots import own_figures_of
 from app.convert.pose import to_base, to_matrix
 from app.convert.scene import to_attachment, to_scene, to_tool
@@ -33,8 +34,10 @@ def robot_named(name: str) -> Robot:
 
 
 def to_arm(request: asked.ArmRequest) -> Arm:
-    """The arm of the library. Raises UnknownRobot or InvalidProblem."""
+    """The arm of the library. Raises UnknownRobot, UnknownFigures or InvalidProblem."""
     robot = robot_named(request.robot)
+    if request.figures is not None:
+        robot = with_figures(robot, request.figures)
     return Arm(
         robot=robot,
         T_flange_tcp=to_matrix(request.tcp),

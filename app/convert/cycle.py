@@ -110,7 +110,10 @@ def to_cycle_response(
             "optimality_gap": optimality_gap(found.lower_bound, electrical.total),
         },
         "legs": [leg for move in found.moves for leg in _legs(move, store)],
-        "baselines": [fields(each, *asked.CycleBaseline.model_fields) for each in found.baselines],
+        "baselines": [
+            {**fields(each, *asked.CycleBaseline.model_fields), "saving_interval": vars(each.saving_interval)}
+            for each in found.baselines
+        ],
         "certificate": {
             "worst_ratio": _worst_ratio(found),
             "joins": found.joins,

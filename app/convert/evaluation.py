@@ -92,6 +92,8 @@ def to_csv_table(result: Evaluation) -> str:
     writer = None
     for name, interval in rows:
         row = {"segment": name, **dict(_flat("", _interval_fields(interval)))}
+        # only the whole motion has one
+        row = {key: value for key, value in row.items() if not key.startswith("electrical.interval")}
         if writer is None:
             writer = csv.DictWriter(text, row.keys(), lineterminator="\n")
             writer.writeheader()

@@ -15,6 +15,7 @@ from optimizer.solution import (
     Certificate,
     ElectricalEnergy,
     Energy,
+    EnergyInterval,
     LimitsInForce,
     Objective,
     Solution,
@@ -87,7 +88,13 @@ def optimality_gap(bound: float, energy: float) -> float:
 def baseline_fields(solution: Solution) -> list[dict[str, Any]]:
     """The entries of `baselines`."""
     names = ("name", "duration", "electrical", "mechanical", "within_limits", "reason", "saving")
-    return [fields(baseline, *names) for baseline in solution.baselines]
+    return [
+        {
+            **fields(each, *names),
+            "saving_interval": None if each.saving_interval is None else vars(each.saving_interval),
+        }
+        for each in solution.baselines
+    ]
 
 
 def limit_fields(limits: LimitsInForce) -> dict[str, Any]:
@@ -103,8 +110,12 @@ def limit_fields(limits: LimitsInForce) -> dict[str, Any]:
 
 def energy_fields(energy: Energy) -> dict[str, Any]:
     """The fields `electrical` to `mean_power` of an energy."""
+    interval = energy.electrical.interval
     return {
-        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+        "electrical": {
+            **fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+            "interval": None if interval is None else fields(interval, *EnergyInterval.__dataclass_fields__),
+        },
         "mechanical": fields(energy.mechanical, "total", "per_joint"),
         "per_joint": fields(energy.per_joint, "friction", "copper", "inverter", "shaft"),
         "storage": None if energy.storage is None else fields(energy.storage, *StorageUse.__dataclass_fields__),

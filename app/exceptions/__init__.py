@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from app.exceptions.access import CrossSite, NoKey, NotOwner, RoleTooLow, WrongHost, WrongKey
 from app.exceptions.base import InvalidRequest, ServiceError
+from app.exceptions.figures import FiguresInUse, TooManyFigures, UnknownFigures
 from app.exceptions.queue import (
     Busy,
     ClientDisconnected,
@@ -58,6 +59,7 @@ __all__ = [
     "ClusterUnavailable",
     "CrossSite",
     "EmptyStudy",
+    "FiguresInUse",
     "HeadTooLarge",
     "InvalidRequest",
     "JobNotCancellable",
@@ -84,11 +86,13 @@ __all__ = [
     "TooManyConnections",
     "TooManyConnectionsOfClient",
     "TooManyDeaths",
+    "TooManyFigures",
     "TooManyLogs",
     "TooManyRequests",
     "TooManyRobots",
     "TooManyWaiting",
     "UnknownAnswer",
+    "UnknownFigures",
     "UnknownIteration",
     "UnknownJob",
     "UnknownLog",

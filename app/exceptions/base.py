@@ -25,6 +25,9 @@ ServiceError
 ├── TooManyRobots       the service holds as many robots of users as it may
 ├── UnknownLog          no log has that id
 ├── TooManyLogs         the service holds as many bytes of logs as it may
+├── UnknownFigures      no figures have that id
+├── FiguresInUse        a study uses the figures
+├── TooManyFigures      the service holds as many figures as it may
 ├── KeyReused           the Idempotency-Key was used for a different request
 ├── NoKey               the request needs an API key
 │   └── WrongKey        its API key is not valid

@@ -144,8 +144,8 @@ def _completed(body: IterationRequest, study: Study) -> tuple[str, OptimizeReque
     """The endpoint and its request with the study's robot and objective. Raises InvalidProblem if the request names
     others."""
     if isinstance(body, OptimizeStep):
-        return "optimize", _about(study, "optimize", body.optimize, "robot", "objective")
-    return "evaluate", _about(study, "evaluate", body.evaluate, "robot")
+        return "optimize", _about(study, "optimize", body.optimize, "robot", "figures", "objective")
+    return "evaluate", _about(study, "evaluate", body.evaluate, "robot", "figures")
 
 
 def _about(study: Study, kind: str, asked: R, *names: str) -> R:
@@ -154,4 +154,6 @@ def _about(study: Study, kind: str, asked: R, *names: str) -> R:
             raise InvalidProblem(
                 f"{kind}.{name}", f"The study has another {name}: leave {name} out, or create another study."
             )
-    return asked.model_copy(update={name: getattr(study, name) for name in names})
+    # null is left out: that is what a request without figures says
+    same = {name: getattr(study, name) for name in names if getattr(study, name) is not None}
+    return asked.model_copy(update=same)

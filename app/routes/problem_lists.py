@@ -7,6 +7,7 @@ from app.schemas import errors as problems
 WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Validation,
     problems.UnknownRobot,
+    problems.UnknownFigures,
     problems.BodyTooLarge,
     problems.RequestTimeout,
     problems.ShuttingDown,

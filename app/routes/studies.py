@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
+from app.convert.identified import identified_as, with_figures
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
@@ -18,7 +19,7 @@ from app.schemas.examples.studies import STUDY_CSV
 from app.schemas.studies import Study, StudyList, StudyPage, StudyRequest, StudySummary
 from app.store import studies
 from app.studies.answers import as_csv, full, summary
-from app.tasks.arm_engine import robot_in
+from app.tasks.arm_engine import identified, robot_in
 
 router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRoute)
 
@@ -34,6 +35,7 @@ router = APIRouter(prefix="/studies", tags=["studies"], route_class=LargeBodyRou
             problems.Validation,
             problems.KeyReused,
             problems.UnknownRobot,
+            problems.UnknownFigures,
             problems.BodyTooLarge,
             problems.RequestTimeout,
             problems.ShuttingDown,
@@ -51,8 +53,11 @@ async def create(
     key: Key = None,
 ) -> StudySummary:
     """Begins a study: a motion that is improved step by step until its energy is at most `threshold`."""
-    await robot_in(store, body.robot)
-    study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key, client.owner)
+    robot = await robot_in(store, body.robot)
+    if body.figures is not None:
+        with identified_as(await identified(store, body.figures)):
+            with_figures(robot, body.figures)
+    study = studies.new_study(body.name, body.robot, body.objective, body.threshold, key, client.owner, body.figures)
     try:
         made, again = await store.write(partial(studies.create, study=study))
     except IntegrityError:  # another process has just created the study of this key

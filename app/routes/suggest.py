@@ -74,7 +74,7 @@ async def _suggestions(store: Store, study_id: str, which: str, computing: _Comp
     least = studies.energy_of(study, iteration)
     _, body = await store.read(partial(answers.get, answer_id=iteration.answer_id))
     base = base_of(iteration.kind, iteration.request, orjson.loads(body), study.objective)
-    with await known_here(store, study.robot):
+    with await known_here(store, study.robot, study.figures):
         found = [] if base is None else proposals(base)
     outcomes = await computing.outcomes(found, study.objective)
     computed = []

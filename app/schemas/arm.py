@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from app.schemas.common import Frame, Request, Vector3, described, frame_of
+from app.schemas.common import FiguresId, Frame, Request, Vector3, described, frame_of
+from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import BOX
 from app.schemas.orientation import Cone
 from app.schemas.scene import CarriedShape, CellRequest, LinkNames, touched_links
@@ -198,6 +199,12 @@ Bus = Annotated[
 class ArmRequest(CellRequest):
     """The arm with its payload, limits, drives, power bus, and surroundings."""
 
+    figures: FiguresId | None = described(
+        "Id of figures that were identified on one arm of this robot, from `GET /figures`. Null: the robot's own.",
+        None,
+        FIGURES_ID,
+        default=None,
+    )
     payload: Payload | None = described(
         "Payload at the flange. Null: no payload.", None, {"mass": 2.0, "com": [0.0, 0.0, 0.05]}, default=None
     )

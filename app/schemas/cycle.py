@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest, MoveLimits, Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
+from app.schemas.energy import MotionEnergy, SavingInterval
 from app.schemas.examples.values import ANSWER_PATH
 from app.schemas.path import Line
 from app.schemas.request import (
@@ -20,7 +21,7 @@ from app.schemas.request import (
     WhichCandidates,
     which_candidates,
 )
-from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, MotionEnergy, WorstRatio
+from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, WorstRatio
 from app.settings import LONGEST_DEADLINE
 from optimizer.problem.free_order import MOST_FREE_STOPS
 from optimizer.problem.names import LONGEST_NAME
@@ -274,6 +275,9 @@ class CycleBaseline(Response):
         "Whether every move is within the limits; collisions are checked at sample points.", None, True
     )
     saving: float = described("1 - energy of the answer / energy of this round.", "1", 0.15)
+    saving_interval: SavingInterval | None = part(
+        "How well the saving is known. Null in answers of an earlier version."
+    )
 
 
 class RoundClearance(Clearance):

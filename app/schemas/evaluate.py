@@ -9,10 +9,11 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest, one_or_each
 from app.schemas.common import JointPositions, MotionAnswer, Request, Response, described, part
+from app.schemas.energy import MotionEnergy
 from app.schemas.examples.values import PAPER_HOME as _HOME
 from app.schemas.examples.values import PAPER_POSE as _THERE
 from app.schemas.request import Seconds
-from app.schemas.response import BODIES, WARNINGS, MotionEnergy, SampledMotion
+from app.schemas.response import BODIES, WARNINGS, SampledMotion
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.replay.limit_report import LimitName
 from optimizer.replay.sampler import MOST_SAMPLES

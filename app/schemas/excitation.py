@@ -8,8 +8,9 @@ from pydantic import Field
 
 from app.schemas.arm import ArmRequest
 from app.schemas.common import MotionAnswer, Response, described, part
+from app.schemas.energy import MotionEnergy
 from app.schemas.examples.values import HOME
-from app.schemas.response import Certificate, MotionEnergy, Trajectory
+from app.schemas.response import Certificate, Trajectory
 from optimizer.excitation.excitation_problem import Criterion, Part
 
 _ALL: list[Part] = ["inertials", "rotor", "friction"]

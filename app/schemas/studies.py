@@ -7,8 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, Tag
 
-from app.schemas.common import NO_CONTROLS, PLAIN, Request, Response, RobotName, by_field, described, part
+from app.schemas.common import NO_CONTROLS, PLAIN, FiguresId, Request, Response, RobotName, by_field, described, part
 from app.schemas.evaluate import EvaluateRequest
+from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
 from app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
 from app.schemas.request import OptimizeRequest
@@ -24,6 +25,12 @@ class StudyRequest(Request):
 
     name: Name = described("Name of the study.", None, "Pick and place, cell 4")
     robot: RobotName = described("Robot of all iterations: a name from `GET /robots`.", None, "ur5e", default="ur5e")
+    figures: FiguresId | None = described(
+        "Id of the identified figures of all iterations, from `GET /figures`. Null: the robot's own figures.",
+        None,
+        FIGURES_ID,
+        default=None,
+    )
     threshold: float = described("Energy that is low enough, of the objective.", "J", 60.0, gt=0, le=1e9)
     objective: Objective = described(
         "Energy that is compared with the threshold, and that the iterations minimise.",
@@ -57,7 +64,9 @@ class OptimizeStep(Request):
     """An iteration that optimises a motion."""
 
     optimize: OptimizeRequest = described(
-        "A body of `POST /optimize`. If `robot` and `objective` are left out, those of the study apply.", None, OPTIMIZE
+        "A body of `POST /optimize`. If `robot`, `figures` and `objective` are left out, those of the study apply.",
+        None,
+        OPTIMIZE,
     )
 
 
@@ -65,7 +74,7 @@ class EvaluateStep(Request):
     """An iteration that evaluates a given motion."""
 
     evaluate: EvaluateRequest = described(
-        "A body of `POST /evaluate`. If `robot` is left out, that of the study applies.", None, EVALUATE
+        "A body of `POST /evaluate`. If `robot` and `figures` are left out, those of the study apply.", None, EVALUATE
     )
 
 
@@ -116,6 +125,7 @@ class StudySummary(Response):
     id: str = described("Id of the study.", None, STUDY_ID)
     name: str = described("Name of the study.", None, "Pick and place, cell 4")
     robot: str = described("Robot of all iterations.", None, "ur5e")
+    figures: str | None = described("Id of the figures of all iterations; null: the robot's own.", None, FIGURES_ID)
     objective: Objective = described(
         "Energy that is compared with the threshold, and that the iterations minimise.", None, "electrical"
     )

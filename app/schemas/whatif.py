@@ -9,10 +9,11 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest
 from app.schemas.common import Answer, Request, Response, described, part
+from app.schemas.energy import ElectricalEnergy
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.examples.values import ANSWER_PATH, EVALUATE, OPTIMIZE
 from app.schemas.request import OptimizeRequest
-from app.schemas.response import OBJECTIVE, Certificate, ElectricalEnergy
+from app.schemas.response import OBJECTIVE, Certificate
 from app.schemas.studies import Name
 from app.settings import LONGEST_DEADLINE
 from optimizer.problem.names import first_repeated
@@ -26,6 +27,8 @@ def _changes_something(arm: ArmRequest) -> ArmRequest:
         raise PydanticCustomError("empty", "Give at least one field of the arm")
     if "robot" in arm.model_fields_set:
         raise PydanticCustomError("robot", "A change cannot replace the robot: leave `robot` out")
+    if "figures" in arm.model_fields_set:
+        raise PydanticCustomError("figures", "A change cannot replace the robot's figures: leave `figures` out")
     return arm
 
 

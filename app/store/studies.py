@@ -78,7 +78,7 @@ def create(session: Session, study: Study) -> tuple[Study, bool]:
         if known is not None:
             if any(
                 getattr(known, name) != getattr(study, name)
-                for name in ("name", "robot", "objective", "threshold", "owner")
+                for name in ("name", "robot", "figures", "objective", "threshold", "owner")
             ):
                 raise KeyReused
             return known, True
@@ -185,12 +185,21 @@ def entry(session: Session, study_id: str, number: int) -> Entry:
     return Entry(study, iteration, before, best_before, _iteration(session, study_id, iteration.best))
 
 
-def new_study(name: str, robot: str, objective: str, threshold: float, key: str | None, owner: str | None) -> Study:
+def new_study(
+    name: str,
+    robot: str,
+    objective: str,
+    threshold: float,
+    key: str | None,
+    owner: str | None,
+    figures: str | None = None,
+) -> Study:
     """A new study, not yet in the database."""
     return Study(
         id=new_id(),
         name=name,
         robot=robot,
+        figures=figures,
         objective=objective,
         threshold=threshold,
         created=now(),

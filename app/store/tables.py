@@ -71,6 +71,8 @@ class Study(Table):
     created: Mapped[datetime] = mapped_column(Instant)
     owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
     idempotency_key: Mapped[str | None] = mapped_column(String(KEY_LENGTH), unique=True)
+    figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    """Id of the figures of all iterations; null for the robot's own."""
 
 
 class OwnRobot(Table):
@@ -102,6 +104,20 @@ class StoredLog(Table):
     size: Mapped[int]
     """Size of the body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
+
+
+class Figures(Table):
+    """Figures of a robot that were identified on one arm: those that take the place of the robot's own."""
+
+    __tablename__ = "figures"
+    __table_args__ = (Index(None, "created", "id"),)
+
+    id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
+    """Made of robot and content: the same figures have the same id on every server."""
+    robot: Mapped[str] = mapped_column(String(ROBOT_LENGTH))
+    created: Mapped[datetime] = mapped_column(Instant)
+    owner: Mapped[str | None] = mapped_column(String(OWNER_LENGTH))
+    content: Mapped[dict[str, Any]] = mapped_column(JSON)
 
 
 class Answer(Table):

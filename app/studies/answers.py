@@ -25,7 +25,7 @@ _COLUMNS = {
     "threshold_met": "threshold_met",
     "answer": "answer",
 }
-_OF_STUDY = ("id", "name", "robot", "objective", "threshold", "created", "owner")
+_OF_STUDY = ("id", "name", "robot", "figures", "objective", "threshold", "created", "owner")
 
 
 def summary(state: State) -> dict[str, Any]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
 
+from app.convert.identified import Identified, identified_as
 from app.convert.own_robots import own_robot_named
 from app.engine.result import TaskResult
 from app.engine.task import Task
-from app.store import robots
+from app.exceptions import UnknownFigures
+from app.store import figures, robots
 from app.store.store import Store
 from models.own_arm.robots import own_robot
 from models.registry import load_robot, robot_names
@@ -47,8 +49,27 @@ class WithOwnRobot:
 
 
 @dataclass(frozen=True)
+class WithFigures:
+    """A task, and the identified figures that it names."""
+
+    task: Task
+    figures: Identified
+
+    @property
+    def request_id(self) -> str:
+        """Id of the request."""
+        return self.task.request_id
+
+    def run(self, deadline: float) -> TaskResult:
+        """The task's result."""
+        with identified_as(self.figures):
+            return self.task.run(deadline)
+
+
+@dataclass(frozen=True)
 class ArmEngine:
-    """Runs tasks about robots that come with the service and about those in the database."""
+    """Runs tasks about robots that come with the service and about those in the database, with their own figures or
+    with identified ones."""
 
     engine: Runner
     store: Store
@@ -56,17 +77,32 @@ class ArmEngine:
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
         """The task's result; `tell` gets what it finds.
 
-        Raises UnknownRobot, and what the engine raises; StoreUnavailable only for a robot that does not come with the
-        service.
+        Raises UnknownRobot, UnknownFigures, and what the engine raises; StoreUnavailable only for figures, and for a
+        robot that does not come with the service.
         """
-        name = getattr(getattr(task, "request", None), "robot", None)
-        if name is None or name in robot_names():
+        request = getattr(task, "request", None)
+        name, used = getattr(request, "robot", None), getattr(request, "figures", None)
+        while True:
+            equipped = await self._equipped(task, name, used)
             try:
-                return await self.engine.run(task, deadline, tell)
+                return await self.engine.run(equipped, deadline, tell)
+            # only the worker reads the body of an upload, and the names in it
             except UnknownRobot as error:
-                # only the worker reads the body of an upload, and the name in it
+                if error.name == name:
+                    raise
                 name = error.name
-        return await self.engine.run(WithOwnRobot(task, name, await own_figures(self.store, name)), deadline, tell)
+            except UnknownFigures as error:
+                if error.id == used:
+                    raise
+                used = error.id
+
+    async def _equipped(self, task: Task, name: str | None, used: str | None) -> Task:
+        """The task with what it needs of the database. Raises UnknownRobot, UnknownFigures, StoreUnavailable."""
+        if used is not None:
+            task = WithFigures(task, await identified(self.store, used))
+        if name is not None and name not in robot_names():
+            task = WithOwnRobot(task, name, await own_figures(self.store, name))
+        return task
 
 
 async def robot_in(store: Store, name: str) -> Robot:
@@ -77,9 +113,23 @@ async def robot_in(store: Store, name: str) -> Robot:
     return load_robot(name) if name in robot_names() else own_robot(name, await own_figures(store, name))
 
 
-async def known_here(store: Store, name: str) -> AbstractContextManager[None]:
-    """A context in which this process knows the robot of this name, too. Raises UnknownRobot or StoreUnavailable."""
-    return nullcontext() if name in robot_names() else own_robot_named(name, await own_figures(store, name))
+async def known_here(store: Store, name: str, used: str | None) -> AbstractContextManager[Any]:
+    """A context in which this process knows the robot of this name, too, and the figures of this id.
+
+    Raises UnknownRobot, UnknownFigures or StoreUnavailable.
+    """
+    context = ExitStack()
+    if name not in robot_names():
+        context.enter_context(own_robot_named(name, await own_figures(store, name)))
+    if used is not None:
+        context.enter_context(identified_as(await identified(store, used)))
+    return context
+
+
+async def identified(store: Store, id: str) -> Identified:
+    """The identified figures of this id. Raises UnknownFigures or StoreUnavailable."""
+    row = await store.read(partial(figures.get, id=id))
+    return Identified(row.id, row.robot, row.content)
 
 
 async def own_figures(store: Store, name: str) -> dict[str, Any]:

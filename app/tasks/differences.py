@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from app.convert.fields import fields
+from app.convert.solution import energy_fields
 from optimizer.energy.losses import ENERGY_FLOOR
 from optimizer.solution import ElectricalEnergy, Energy
 
@@ -13,10 +14,15 @@ def quantities(energy: Energy, duration: float) -> dict[str, Any]:
     """The quantities that base and changes are compared by [s, J, W]; `electrical` is a dict of its parts."""
     return {
         "duration": duration,
-        "electrical": fields(energy.electrical, *ElectricalEnergy.__dataclass_fields__),
+        "electrical": fields(energy.electrical, *(n for n in ElectricalEnergy.__dataclass_fields__ if n != "interval")),
         "mechanical": energy.mechanical.total,
         **fields(energy, "mean_power", "peak_power"),
     }
+
+
+def of_base(energy: Energy, duration: float) -> dict[str, Any]:
+    """The quantities of the base, with the interval of its energy."""
+    return quantities(energy, duration) | {"electrical": energy_fields(energy)["electrical"]}
 
 
 def differences(base: dict[str, Any], energy: Energy, duration: float) -> dict[str, Any]:

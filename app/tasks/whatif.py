@@ -20,7 +20,7 @@ from app.schemas.whatif import Change, WhatifRequest
 from app.tasks.answer_collector import AnswerCollector
 from app.tasks.certified import certified
 from app.tasks.deadline_shares import DeadlineShares
-from app.tasks.differences import differences, quantities
+from app.tasks.differences import differences, of_base
 from optimizer.deadline import Deadline
 from optimizer.exceptions import DeadlineExceeded, InvalidProblem, InvalidTable, OutsideLimits
 from optimizer.optimize import optimize
@@ -93,7 +93,7 @@ class _Optimized(_Work):
             "answer": self.collector.add(to_optimize_response(asked, self.request_id, base, arm_fields(asked))),
             "status": base.status,
             "holds": True,
-            **quantities(base.energy, base.duration),
+            **of_base(base.energy, base.duration),
         }
         rows = [self._row(asked, k, base, content, problem) for k, problem in enumerate(problems)]
         return self.result_of(asked.robot, asked.objective, content, rows)
@@ -156,7 +156,7 @@ class _Evaluated(_Work):
             "answer": self.collector.add(to_evaluate_response(self.request_id, asked, base)),
             "status": None,
             "holds": _holds(base),
-            **quantities(base.total.energy, base.total.duration),
+            **of_base(base.total.energy, base.total.duration),
         }
         rows = [self._row(asked, k, content, arm) for k, arm in enumerate(arms)]
         return self.result_of(asked.robot, None, content, rows)

@@ -49,9 +49,15 @@ def dwell_energy(cycle: Cycle, arm: Arm, hold: float, duration: float) -> float:
 
     Zero if the motion lasts the whole cycle.
     """
+    by_motors, by_brakes = waits(cycle, duration)
+    return hold * by_motors + brake_power(cycle, arm) * by_brakes
+
+
+def waits(cycle: Cycle, duration: float) -> tuple[float, float]:
+    """How long [s] motors, and then brakes, hold the arm after a motion of `duration` [s]."""
     wait = max(cycle.time - duration, 0.0)
     by_motors = wait if cycle.hold == "motors" else min(wait, cycle.brake_delay)
-    return hold * by_motors + brake_power(cycle, arm) * (wait - by_motors)
+    return by_motors, wait - by_motors
 
 
 def holding_power(arm: Arm, tau: Array) -> Array:

@@ -10,13 +10,15 @@ import pinocchio as pin
 
 from models.robot import Array, FrictionLaw
 from optimizer.energy.bus_flow import charges, drawn_at
+from optimizer.energy.interval import arm_spread
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_expressions import Parameters
 from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown, power_flow
+from optimizer.energy.sensitivity import energy_sensitivity
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
-from optimizer.solution import Energy, Trajectory
+from optimizer.solution import Energy, Sensitivity, Trajectory
 from optimizer.trajectories.spline import Spline, fine_samples, sample
 
 # smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that friction grows with
@@ -135,6 +137,11 @@ class Plant:
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
         return breakdown(weights, v, a, self.torques(q, v, a), change, self.arm)
+
+    def sensitivity(self, spline: Spline) -> Sensitivity:
+        """How the electrical energy of a spline motion hangs on the arm's figures."""
+        weights, q, v, a = fine_samples(spline, REPORT_NODES)
+        return energy_sensitivity(weights, v, a, self.torques(q, v, a), self.arm, arm_spread(self.arm))
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples of a spline motion every `period` [s]; the last one lies on the end."""

@@ -111,8 +111,8 @@ def _beginning(program: Program) -> list[str]:
         f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
         f"  local jp_start = {start}",
         f"  if norm(get_target_payload() - {program.payload.mass:.6f}) > 0.05:",
-        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} kg. Continue sets it.", '
-        '"joulepath", True, False, blocking=True)',
+        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} kg. Continue sets '
+        'it.", "joulepath", True, False, blocking=True)',
         "  end",
         *_payload(program.payload),
         "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",

@@ -15,10 +15,13 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
+from models.uncertainty.parameters import count
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from optimizer.energy.bus_flow import charges
+from optimizer.energy.interval import arm_spread, with_interval
 from optimizer.energy.losses import breakdown, power_flow
 from optimizer.energy.plant import Plant
+from optimizer.energy.sensitivity import energy_sensitivity
 from optimizer.exceptions import DeadlineExceeded
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Arm
@@ -28,7 +31,7 @@ from optimizer.replay.nearest_contact import ClearanceMonitor, LeastClearance
 from optimizer.replay.piecewise_motion import Indices, PiecewiseMotion, piecewise_motion
 from optimizer.replay.recording import BLOCK, Log, Waypoints
 from optimizer.replay.sampler import Sampler, Samples
-from optimizer.solution import Energy
+from optimizer.solution import Energy, Sensitivity
 from optimizer.trajectories.quadrature import lobatto_panels
 
 # quadrature panels: their greatest length [s], unless a polynomial piece would have more than MOST_PANELS of them
@@ -123,6 +126,7 @@ class _Evaluator:
         self._segment_count = motion.segments if isinstance(motion, Waypoints) else 1
         self._intervals: dict[int, IntervalEnergy] = {}
         self._speed_jumps = 0
+        self._spread, self._sensitivity = arm_spread(arm), Sensitivity(np.zeros(count(arm.robot.nq)), 0.0)
         self._charge = arm.bus.initial
         self._last: PiecewiseMotion | None = None
 
@@ -139,6 +143,9 @@ class _Evaluator:
             known = np.append(0.0, nodes.weights.cumsum()) + block.breakpoints[0]
             self._sampler.update(block, lambda t: np.interp(t, known, charge))
         self._add_energies(block, nodes, steps, charge)
+        charged = self._charged(float(charge[0]))
+        parts = nodes.weights, nodes.v, nodes.a, nodes.tau
+        self._sensitivity += energy_sensitivity(*parts, charged, self._spread)
         self._last = block
 
     def finish(self) -> Evaluation:
@@ -146,7 +153,7 @@ class _Evaluator:
         assert self._last is not None  # motions without a block are refused
         segments = [self._intervals[k] for k in sorted(self._intervals)]
         return Evaluation(
-            total=joined(segments),
+            total=self._total(segments),
             segments=segments if self._segment_count <= MOST_SEGMENTS else [],
             segment_count=self._segment_count,
             speed_jumps=self._speed_jumps,
@@ -155,6 +162,11 @@ class _Evaluator:
             nearest=None if self._clearance is None else self._clearance.nearest,
             close_pass=None if self._clearance is None else self._clearance.close_pass,
         )
+
+    def _total(self, segments: list[IntervalEnergy]) -> IntervalEnergy:
+        """The whole motion, with the interval of its energy."""
+        total = joined(segments)
+        return replace(total, energy=with_interval(total.energy, self._sensitivity, total.duration, self._arm))
 
     def _charge_course(self, nodes: _Nodes) -> Array:
         """Charge (k + 1,) [J] of the energy storage before each node and after the last."""

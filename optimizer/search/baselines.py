@@ -14,13 +14,16 @@ of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.energy.dwell import dwell_energy, holding_power
+from optimizer.energy.dwell import dwell_energy, holding_power, waits
+from optimizer.energy.interval import Known, arm_spread, saving_interval
 from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown
+from optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
 from optimizer.problem.problem import Problem
 from optimizer.solution import Baseline, BaselineName, Energy
 from optimizer.trajectories.limit_ratios import RATIO_TOLERANCE, limit_ratios, too_much
@@ -51,12 +54,12 @@ def baselines(
     # one call for all: a compiled kernel works through samples in blocks
     q, v, a = (np.concatenate([getattr(motion, name) for motion in motions.values()]) for name in ("q", "v", "a"))
     ends = np.cumsum([len(motion.t) for motion in motions.values()])[:-1]
-    result, hold = [], 0.0
+    result, held = [], np.zeros_like(q_start)
     if problem.cycle is not None:
         goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
-        hold = float(holding_power(problem.arm, torques(goal, still, still))[0])
+        held = torques(goal, still, still)[0]
     for (name, motion), tau in zip(motions.items(), np.split(torques(q, v, a), ends), strict=True):
-        result.append(compared(problem, name, motion, tau, hold, ours, potential, broken_on_the_way))
+        result.append(compared(problem, name, motion, tau, held, ours, potential, broken_on_the_way))
     return result
 
 
@@ -65,15 +68,20 @@ def compared(
     name: BaselineName,
     motion: SampledMotion,
     tau: Array,
-    hold: float,
+    held: Array,
     ours: float,
     potential: Callable[[Array], float],
     broken_on_the_way: Broken,
 ) -> Baseline:
-    """A motion with torques tau (k, nq) as a baseline; after it, holding the arm draws `hold` [W]. See `baselines`."""
+    """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,). See `baselines`."""
     energy = motion_energy(problem, motion, tau, potential)
+    spread = arm_spread(problem.arm)
+    sensitivity = energy_sensitivity(motion.weights, motion.v, motion.a, tau, problem.arm, spread)
     if problem.cycle is not None:
+        hold = float(holding_power(problem.arm, held))
         energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
+        times = waits(problem.cycle, motion.duration)
+        sensitivity += waiting_sensitivity(problem.arm, held, *times, problem.cycle, spread)
     return Baseline(
         name=name,
         duration=motion.duration,
@@ -81,7 +89,19 @@ def compared(
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
         reason="; ".join([*broken_limits(problem, motion, tau), *broken_on_the_way(motion.q, motion.v)]) or None,
+        sensitivity=sensitivity,
     )
+
+
+def with_saving_intervals(table: list[Baseline], problem: Problem, ours: Known) -> list[Baseline]:
+    """The baselines with the intervals of their savings; without, where mechanical work is compared."""
+    if problem.objective != "electrical":
+        return table
+    known = [Known(each.electrical, each.sensitivity, each.duration) for each in table]
+    return [
+        replace(each, saving_interval=saving_interval(ours, theirs, problem.arm))
+        for each, theirs in zip(table, known, strict=True)
+    ]
 
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:

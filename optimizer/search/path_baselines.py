@@ -20,9 +20,10 @@ def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     assert path is not None and best.energy is not None
     motion = along(path, even_speed(best.duration))
     tau = prepared.torques(motion.q, motion.v, motion.a)
-    hold = 0.0 if problem.cycle is None else float(prepared.holding_power(best.q_goal))
+    still = np.zeros_like(best.q_goal)[None]
+    held = prepared.torques(best.q_goal[None], still, still)[0]
     oracle = prepared.potential, prepared.broken_on_the_way
-    return [compared(problem, "trapezoid", motion, tau, hold, best.energy, *oracle)]
+    return [compared(problem, "trapezoid", motion, tau, held, best.energy, *oracle)]
 
 
 def along(path: Spline, law: SampledMotion) -> SampledMotion:

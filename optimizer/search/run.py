@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
+from optimizer.energy.interval import Known, with_interval
 from optimizer.exceptions import DeadlineExceeded, NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
@@ -17,6 +18,7 @@ from optimizer.problem.problem import Problem
 from optimizer.progress import Improved, Tell, nobody
 from optimizer.search import free_goal, self_motions
 from optimizer.search.attempts import solve, solve_from
+from optimizer.search.baselines import with_saving_intervals
 from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
@@ -214,8 +216,7 @@ class Run:
 
     def answer(self, best: Candidate, table: list[Baseline]) -> Solution | None:
         """The solution around the best candidate; None if its certificate fails. Raises DeadlineExceeded."""
-        incumbent, spline = self.incumbent, best.spline
-        prepared, candidates = incumbent.prepared, incumbent.candidates
+        incumbent, spline, prepared = self.incumbent, best.spline, self.incumbent.prepared
         try:
             with watch(incumbent.end.earlier_by(-OVERTIME)):
                 energy = prepared.energy(spline)
@@ -223,9 +224,42 @@ class Run:
                 if not certificate.valid:
                     return None
                 trajectory = prepared.trajectory(spline, self.problem.sample_period)
+                sensitivity = prepared.sensitivity(spline)
         except DeadlinePassed:
             raise self.too_late() from None
         objective = energy.of(self.problem.objective)
+        least, done = self._ruled_out(objective)
+        assert best.attempt is not None
+        incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
+        arm = self.problem.arm
+        return Solution(
+            status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
+            start=Branch(best.start.label, best.q_start, best.start.target),
+            goal=Branch(best.goal.label, best.q_goal, best.goal.target),
+            trajectory=trajectory,
+            energy=with_interval(energy, sensitivity, spline.duration, arm),
+            sensitivity=sensitivity,
+            lower_bound=least,
+            limits=LimitsInForce(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
+            complete=all_known(self.problem),
+            baselines=with_saving_intervals(
+                table, self.problem, Known(energy.electrical.total, sensitivity, spline.duration)
+            ),
+            candidates=[each.report() for each in incumbent.candidates],
+            unreachable=self.unreachable,
+            certificate=certificate,
+            solver=SolverReport(
+                wall_time=self.clock() - self.began,
+                iterations=incumbent.iterations,
+                nlp_solves=incumbent.solves,
+                stationarity=best.attempt.stationarity,
+            ),
+        )
+
+    def _ruled_out(self, objective: float) -> tuple[float, bool]:
+        """What no motion goes below [J], and whether every candidate that was not solved needs at least `objective`."""
+        incumbent = self.incumbent
+        prepared, candidates = incumbent.prepared, incumbent.candidates
         if self.problem.bound == "tight":
             tighten(prepared, candidates, objective, incumbent.deadline)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
@@ -244,28 +278,5 @@ class Run:
             beside = bound_beside(prepared, candidates, incumbent.deadline)
             family = min(family, beside) if any(each.sampled for each in candidates) else family
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
-        done = done and all_known(self.problem)
-        assert best.attempt is not None
         least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])
-        incumbent.tell(Improved(objective, spline.duration, least, best.q_goal))
-        arm = self.problem.arm
-        return Solution(
-            status="optimal" if done and incumbent.method.converges and not incumbent.cut_short else "feasible",
-            start=Branch(best.start.label, best.q_start, best.start.target),
-            goal=Branch(best.goal.label, best.q_goal, best.goal.target),
-            trajectory=trajectory,
-            energy=energy,
-            lower_bound=least,
-            limits=LimitsInForce(arm.active_limits, arm.tcp_speed, arm.elbow_speed),
-            complete=all_known(self.problem),
-            baselines=table,
-            candidates=[each.report() for each in candidates],
-            unreachable=self.unreachable,
-            certificate=certificate,
-            solver=SolverReport(
-                wall_time=self.clock() - self.began,
-                iterations=incumbent.iterations,
-                nlp_solves=incumbent.solves,
-                stationarity=best.attempt.stationarity,
-            ),
-        )
+        return least, done and all_known(self.problem)

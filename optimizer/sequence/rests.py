@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from models.robot import Array
-from optimizer.energy.dwell import brake_power, dwell_energy, holding_power
+from models.uncertainty.parameters import count
+from optimizer.energy.dwell import brake_power, dwell_energy, holding_power, waits
+from optimizer.energy.interval import arm_spread
 from optimizer.energy.plant import Plant
+from optimizer.energy.sensitivity import waiting_sensitivity
 from optimizer.problem.stops import PlannedMove
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.layers import Layer
+from optimizer.solution import Sensitivity
 
 
 def holding_powers(move: PlannedMove, goal: Layer) -> Array:
@@ -36,6 +40,17 @@ def least_holding_power(move: PlannedMove) -> float:
 def rest_energy(asked: WorkRound, move: PlannedMove, length: float, hold: float) -> float:
     """Energy [J] of a rest of `length` [s] after a move, where holding the arm on its motors draws `hold` [W]."""
     return dwell_energy(asked.waiting(length), move.arm_after, hold, 0.0) if length > 0 else 0.0
+
+
+def rest_sensitivity(asked: WorkRound, move: PlannedMove, length: float, q: Array) -> Sensitivity:
+    """How `rest_energy` at q (nq,) [rad] hangs on the arm's figures."""
+    arm = move.arm_after
+    if length <= 0:
+        return Sensitivity(np.zeros(count(arm.robot.nq)), 0.0)
+    cycle = asked.waiting(length)
+    still = np.zeros((1, len(q)))
+    held = Plant(arm).torques(q[None], still, still)[0]
+    return waiting_sensitivity(arm, held, *waits(cycle, 0.0), cycle, arm_spread(arm))
 
 
 def dwell_energies(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:

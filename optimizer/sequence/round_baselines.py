@@ -4,19 +4,23 @@ default speed."""
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import add
 
 import numpy as np
 
 from optimizer.deadline import Clock, DeadlinePassed, watch
+from optimizer.energy.interval import Known, saving_interval
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
+from optimizer.sequence.rests import rest_sensitivity
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName, RoundSolution
 from optimizer.sequence.time_sharing import duration_of
 from optimizer.sequence.timed_round import TimedSearch
-from optimizer.solution import Baseline, Solution
+from optimizer.solution import Baseline, Sensitivity, Solution
 from optimizer.trajectories.spline import Spline, lasting
 
 
@@ -49,7 +53,7 @@ def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
     return nodes if all(each in search.solutions for each in search.pairs(nodes)) else None
 
 
-def same_factor(timing: TimedSearch, nodes: list[int], ours: float) -> RoundBaseline | None:
+def same_factor(timing: TimedSearch, nodes: list[int], ours: Known) -> RoundBaseline | None:
     """The chain's moves of least energy, all of them slowed or sped up by one factor; None if some are not known."""
     search = timing.search
     free = [search.solutions.get(each) for each in search.pairs(nodes)]
@@ -60,7 +64,7 @@ def same_factor(timing: TimedSearch, nodes: list[int], ours: float) -> RoundBase
     return _in_time(timing, "same_factor", nodes, [lasting(spline, spline.duration * factor) for spline in own], ours)
 
 
-def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: float) -> RoundBaseline | None:
+def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: Known) -> RoundBaseline | None:
     """The chain's moves as fast as they can be, all the time that is left waited out; None if some are not found."""
     fast = timing.fastest(nodes)
     if fast is None or duration_of(fast) > timing.time:
@@ -69,7 +73,7 @@ def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: float) -> Rou
 
 
 def _in_time(
-    timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: float
+    timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: Known
 ) -> RoundBaseline | None:
     """The baseline of a chain with given motions; the time that they leave is waited out where it draws least.
 
@@ -77,15 +81,19 @@ def _in_time(
     """
     search = timing.search
     pairs = list(zip(search.pairs(nodes), splines, strict=True))
-    _, wait = timing.cheapest_wait(nodes, timing.time - sum(spline.duration for spline in splines))
-    moving = sum(search.legs[k].prepared.energy(spline).electrical.total for (k, _, _), spline in pairs)
+    waited = timing.time - sum(spline.duration for spline in splines)
+    at, wait = timing.cheapest_wait(nodes, waited)
+    prepared = [search.legs[k].prepared for (k, _, _), _ in pairs]
+    moving = sum(leg.energy(spline).electrical.total for leg, spline in zip(prepared, splines, strict=True))
     total = moving + search.dwells(nodes) + wait
+    sensitivity = reduce(add, [leg.sensitivity(spline) for leg, spline in zip(prepared, splines, strict=True)])
+    theirs = Known(total, sensitivity + resting(search, nodes, at, waited), sum(each.duration for each in splines))
     try:
         with watch(search.end):
             held = all(search.confirms(*pair, spline) for pair, spline in pairs)
     except DeadlinePassed:
         return None
-    return RoundBaseline(name, timing.time + timing.asked.dwelling, total, held, saving(ours, total))
+    return _compared(search, name, timing.time + timing.asked.dwelling, theirs, held, ours)
 
 
 def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock) -> RoundBaseline | None:
@@ -98,13 +106,13 @@ def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock
         return None
     try:
         search = RoundSearch(replace(asked, order=None, deadline=left), clock)
-        return of_chain(search, search.run(), "given_order", ours.energy.electrical.total)
+        return of_chain(search, search.run(), "given_order", ours.known)
     except JoulepathError:
         return None
 
 
-def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, ours: float) -> RoundBaseline | None:
-    """The baseline of a chain whose motions are known; `ours` [J] is what it is compared with.
+def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, ours: Known) -> RoundBaseline | None:
+    """The baseline of a chain whose motions are known; `ours` is what it is compared with.
 
     None if it takes another time than is asked for.
     """
@@ -113,15 +121,17 @@ def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, our
     duration = sum(move.duration for move in moves) + search.asked.dwelling
     if search.asked.nearest_duration(duration) != duration:
         return None
-    return RoundBaseline(name, duration, theirs, True, saving(ours, theirs))
+    sensitivity = reduce(add, [move.sensitivity for move in moves]) + resting(search, nodes)
+    known = Known(theirs, sensitivity, sum(move.duration for move in moves))
+    return _compared(search, name, duration, known, True, ours)
 
 
-def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBaseline | None:
+def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBaseline | None:
     """The round by the robot's own controller: to the nearest configuration each time, at its default speed.
 
     None for a robot whose default is not known, or if it takes another time than is asked for.
     """
-    node, total, duration, held = start, 0.0, 0.0, True
+    node, total, duration, held, nodes, sensitivities = start, 0.0, 0.0, True, [start], list[Sensitivity]()
     for k, leg in enumerate(search.legs):
         if search.asked.moves[k].line is not None:
             # a controller's own line is not known: the line is ours
@@ -130,6 +140,8 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
                 return None
             total += float(leg.cost[node, node])
             duration += own.duration
+            nodes.append(node)
+            sensitivities.append(own.sensitivity)
             continue
         goals = _goals(search, k, start)
         prepared, q_start = leg.prepared, leg.start.q[node]
@@ -148,10 +160,31 @@ def controller_default(search: RoundSearch, start: int, ours: float) -> RoundBas
         total += move.electrical + float(leg.dwell[node])
         duration += move.duration
         held &= move.within_limits
+        nodes.append(node)
+        sensitivities.append(move.sensitivity)
     duration += search.asked.dwelling
     if search.asked.nearest_duration(duration) != duration:
         return None
-    return RoundBaseline("controller_default", duration, total, held, saving(ours, total))
+    theirs = Known(total, reduce(add, sensitivities) + resting(search, nodes), duration - search.asked.dwelling)
+    return _compared(search, "controller_default", duration, theirs, held, ours)
+
+
+def _compared(
+    search: RoundSearch, name: RoundBaselineName, duration: float, theirs: Known, held: bool, ours: Known
+) -> RoundBaseline:
+    """The baseline of a round that takes `duration` [s], rests included."""
+    interval = saving_interval(ours, theirs, search.asked.arm)
+    return RoundBaseline(name, duration, theirs.energy, held, saving(ours.energy, theirs.energy), interval)
+
+
+def resting(search: RoundSearch, nodes: list[int], at: int = -1, waited: float = 0.0) -> Sensitivity:
+    """How the energy of the dwells of a chain hangs on the arm's figures, with a wait [s] after move `at`."""
+    asked = search.asked
+    rests = [
+        rest_sensitivity(asked, move, move.dwell + (waited if k == at else 0.0), search.legs[k].goal.q[node])
+        for k, (move, node) in enumerate(zip(asked.moves, nodes[1:], strict=True))
+    ]
+    return reduce(add, rests)
 
 
 def _line(search: RoundSearch, move: int, node: int) -> Solution | None:

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass, field, fields
+from functools import cached_property, reduce
 from itertools import pairwise
+from operator import add
 from typing import Literal
 
 import numpy as np
 
+from optimizer.energy.interval import Known, with_interval
 from optimizer.problem.stops import PlannedMove
-from optimizer.solution import ElectricalEnergy, Energy, JointEnergy, MechanicalEnergy, Solution
+from optimizer.solution import (
+    ElectricalEnergy,
+    Energy,
+    JointEnergy,
+    MechanicalEnergy,
+    SavingInterval,
+    Sensitivity,
+    Solution,
+)
 
 
 @dataclass(frozen=True)
@@ -20,7 +30,7 @@ class Move:
 
     It begins at `t0` [s] of the round. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
     draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
-    `solved`.
+    `solved`. `sensitivity` is that of the energy of all three.
     """
 
     planned: PlannedMove
@@ -32,6 +42,7 @@ class Move:
     pairs: int
     kinds: int
     solved: int
+    sensitivity: Sensitivity = field(repr=False)
 
     @property
     def duration(self) -> float:
@@ -49,13 +60,15 @@ RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor",
 
 @dataclass(frozen=True)
 class RoundBaseline:
-    """Another way to go round: its duration [s], electrical energy [J], and our saving 1 - ours / theirs."""
+    """Another way to go round: its duration [s], electrical energy [J], our saving 1 - ours / theirs, and how well that
+    is known."""
 
     name: RoundBaselineName
     duration: float
     electrical: float
     within_limits: bool
     saving: float
+    saving_interval: SavingInterval
 
 
 @dataclass(frozen=True)
@@ -84,7 +97,14 @@ class RoundSolution:
     def energy(self) -> Energy:
         """Energy of the round [J], with dwells and waiting."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
-        return summed([move.solution for move in self.moves], resting)
+        energy = summed([move.solution for move in self.moves], resting)
+        known = known_of(self.moves)
+        return with_interval(energy, known.sensitivity, known.duration, self.moves[0].planned.arm)
+
+    @property
+    def known(self) -> Known:
+        """The round's energy [J] and how it hangs on the arm's figures."""
+        return known_of(self.moves)
 
     @property
     def order(self) -> list[str]:
@@ -98,10 +118,16 @@ class RoundSolution:
         return max((float(np.abs(b[0] - a[1]).max()) for a, b in pairwise(ends)), default=0.0)
 
 
+def known_of(moves: Sequence[Move]) -> Known:
+    """The energy [J] of moves and their rests, and how it hangs on the arm's figures."""
+    sensitivity = reduce(add, [move.sensitivity for move in moves])
+    return Known(sum(move.energy for move in moves), sensitivity, sum(move.solution.duration for move in moves))
+
+
 def summed(solutions: Sequence[Solution], dwell: float) -> Energy:
     """The energy of several motions, and of the dwells between them [J]; mean power is that of the motions."""
     energies = [each.energy for each in solutions]
-    parts = [part.name for part in fields(ElectricalEnergy)]
+    parts = [part.name for part in fields(ElectricalEnergy) if part.name != "interval"]
     electrical = ElectricalEnergy(**{part: sum(getattr(each.electrical, part) for each in energies) for part in parts})
     moving = sum(each.duration for each in solutions)
     return Energy(

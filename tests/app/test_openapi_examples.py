@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.schemas.common import KEY_HEADER
+from app.schemas.examples.figures import FIGURES, FIGURES_ID
 from app.schemas.examples.own_arm import PUT_EXAMPLES
 from tests.app.live import LOCAL
 from tests.app.requests import HOME, NEAR
@@ -150,6 +151,8 @@ def test_query_is_answered(operation: Operation, client: TestClient, study: str,
 
 @pytest.mark.parametrize("name", EVALUATE.parameters("query"))
 def test_setting_of_a_csv_file_is_answered(name: str, client: TestClient) -> None:
+    if name == "figures":
+        assert client.put("/figures", json=FIGURES).json()["id"] == FIGURES_ID
     example = EVALUATE.parameters("query")[name]
     query = {"time_per_segment": "1.5", name: example if isinstance(example, str) else json.dumps(example)}
     answer = client.post("/evaluate", content=CSV, headers={"Content-Type": "text/csv"}, params=query)

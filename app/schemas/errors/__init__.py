@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
 from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
@@ -101,6 +102,9 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     TooManyLogs,
     EffortNotUsable,
     ExcitationInfeasible,
+    UnknownFigures,
+    FiguresInUse,
+    TooManyFigures,
     KeyReused,
     Unauthenticated,
     RoleTooLow,
@@ -134,6 +138,7 @@ __all__ = [
     "EffortNotUsable",
     "EmptyStudy",
     "ExcitationInfeasible",
+    "FiguresInUse",
     "FormatUnsuitable",
     "GoalInCollision",
     "HeadTooLarge",
@@ -163,12 +168,14 @@ __all__ = [
     "StartInCollision",
     "StopInCollision",
     "StoreUnavailable",
+    "TooManyFigures",
     "TooManyLogs",
     "TooManyRequests",
     "TooManyRobots",
     "TorqueInfeasible",
     "Unauthenticated",
     "UnknownAnswer",
+    "UnknownFigures",
     "UnknownJob",
     "UnknownLog",
     "UnknownRobot",

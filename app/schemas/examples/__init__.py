@@ -9,6 +9,7 @@ from app.schemas.examples.cycle import CYCLE_EXAMPLES
 from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.excitation import EXCITATION_EXAMPLES
 from app.schemas.examples.export import EXPORT_EXAMPLES
+from app.schemas.examples.figures import FIGURES_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from app.schemas.examples.logs import LOG_EXAMPLES
@@ -33,6 +34,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/logs": {CSV: LOG_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
+    "/figures": {JSON: FIGURES_EXAMPLES},
     "/jobs": {JSON: NEW_JOB_EXAMPLES},
     "/studies": {JSON: STUDY_EXAMPLES},
     "/studies/{id}/iterations": {JSON: ITERATION_EXAMPLES},

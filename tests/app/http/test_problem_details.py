@@ -57,6 +57,7 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.UnknownStudy, service.UnknownIteration, service.KeyReused, service.NotFound)),
     *(kind() for kind in (service.MethodNotAllowed, service.BodyTooLarge, service.UnsupportedMediaType)),
     *(kind() for kind in (service.RobotExists, service.TooManyRobots, service.AnswerInUse)),
+    *(kind() for kind in (service.UnknownFigures, service.FiguresInUse, service.TooManyFigures)),
     *(kind() for kind in (service.NoKey, service.WrongKey, service.CrossSite, service.WrongHost)),
     service.RoleTooLow("read", "compute"),
     service.NotOwner("press_shop"),

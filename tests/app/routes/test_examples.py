@@ -18,7 +18,7 @@ FILES = {file.relative_to(EXAMPLES).with_suffix("").as_posix(): file for file in
 IN_THE_DOCUMENT = {
     f"{path[1:]}/{name}": example["value"]
     for path, by_media_type in BODY_EXAMPLES.items()
-    for name, example in by_media_type[JSON].items()
+    for name, example in by_media_type.get(JSON, {}).items()
 }
 
 

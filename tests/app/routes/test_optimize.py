@@ -63,7 +63,9 @@ def test_energy_adds_up(asked_and_answered: tuple[dict[str, Any], dict[str, Any]
     _, answer = asked_and_answered
     energy, objective = answer["energy"], answer["objective"]
     electrical = dict(energy["electrical"])
-    total = electrical.pop("total")
+    total, interval = electrical.pop("total"), electrical.pop("interval")
+    assert interval["p5"] < total < interval["p95"]
+    assert sum(interval["shares"].values()) == pytest.approx(1.0)
     assert sum(electrical.values()) == pytest.approx(total, rel=Certificate.ENERGY_TOLERANCE)
     assert sum(energy["mechanical"]["per_joint"]) == pytest.approx(energy["mechanical"]["total"])
     assert energy["optimality_gap"] == pytest.approx(1 - energy["lower_bound"] / energy[objective]["total"], abs=EXACT)

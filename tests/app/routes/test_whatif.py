@@ -53,7 +53,7 @@ def kept(client: TestClient, path: str, kind: str) -> dict[str, Any]:
 
 def figures(energy: dict[str, Any], duration: float) -> dict[str, Any]:
     """The figures of a full answer that a base and its changes are compared by, flat."""
-    parts = {f"electrical.{name}": value for name, value in energy["electrical"].items()}
+    parts = {f"electrical.{name}": value for name, value in energy["electrical"].items() if name != "interval"}
     powers = {name: energy[name] for name in ("mean_power", "peak_power")}
     return {"duration": duration, "mechanical": energy["mechanical"]["total"], **parts, **powers}
 

@@ -1,0 +1,55 @@
+"""The identified figures that a request names: they come along with the task, from the database."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+from app.exceptions import UnknownFigures
+from models.own_arm.robots import own_robot
+from models.robot import Robot
+from models.uncertainty.document import merged
+from optimizer.exceptions import InvalidProblem
+
+
+@dataclass(frozen=True)
+class Identified:
+    """Figures by their id: those of a robot that take the place of its own."""
+
+    id: str
+    robot: str
+    content: dict[str, Any]
+
+
+_FIGURES: ContextVar[Identified | None] = ContextVar("identified figures", default=None)
+
+
+@contextmanager
+def identified_as(figures: Identified) -> Iterator[None]:
+    """Within the context, and its thread, requests may name these figures."""
+    before = _FIGURES.set(figures)
+    try:
+        yield
+    finally:
+        _FIGURES.reset(before)
+
+
+def with_figures(robot: Robot, id: str) -> Robot:
+    """The robot with the figures of this id: the same object for the same content.
+
+    Raises UnknownFigures if the request did not bring them, and InvalidProblem if they are of another robot.
+    """
+    figures = _FIGURES.get()
+    if figures is None or figures.id != id:
+        raise UnknownFigures(id)
+    if figures.robot != robot.name:
+        raise InvalidProblem("figures", f"These figures are of the robot {figures.robot}: use this robot, or others.")
+    try:
+        return own_robot(robot.name, merged(robot.figures, figures.content))
+    except (ValueError, KeyError):
+        raise InvalidProblem(
+            "figures", "These figures no longer fit the robot, which was replaced: identify them again."
+        ) from None

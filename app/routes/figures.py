@@ -1,0 +1,129 @@
+"""PUT /figures and GET /figures; GET and DELETE /figures/{id}."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, Any
+
+import orjson
+import yaml
+from fastapi import APIRouter, Path, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from sqlalchemy.exc import IntegrityError
+
+from app.http.disconnect import unless_disconnected
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
+from app.routes.parameters import LOCATION_HEADER
+from app.routes.problem_lists import WORKER_PROBLEMS
+from app.schemas import errors as problems
+from app.schemas.examples.figures import FIGURES, UNKNOWN_ID
+from app.schemas.figures import FiguresDetail, FiguresDocument, FiguresList, FiguresSummary
+from app.store import figures
+from app.store.store import Store
+from app.store.tables import Figures
+from app.tasks.arm_engine import robot_in
+from app.tasks.figures import FiguresTask
+from models.uncertainty.document import merged
+
+router = APIRouter(prefix="/figures", tags=["robots"], route_class=LargeBodyRoute)
+
+FiguresIdPath = Annotated[str, Path(description="Id of the figures.", examples=[UNKNOWN_ID])]
+YAML = "application/yaml"
+
+
+@router.put(
+    "",
+    summary="Store identified figures",
+    response_model=FiguresDetail,
+    responses={
+        201: {"model": FiguresDetail, "description": "Stored", "headers": LOCATION_HEADER},
+        **problem_responses(*WORKER_PROBLEMS, problems.TooManyFigures),
+    },
+)
+async def put(
+    request: Request,
+    response: Response,
+    body: FiguresDocument,
+    settings: ServiceSettings,
+    engine: ServiceArmEngine,
+    store: ServiceStore,
+    client: ServiceClient,
+) -> FiguresDetail:
+    """Stores figures of a robot that were identified on one arm, as `GET /figures/{id}` of this or another server gives
+    them. The id follows from the content: the same figures are stored once. Their first owner keeps them."""
+    task = FiguresTask(body, request.state.id)
+    result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
+    new = figures.new_figures(body.robot, orjson.loads(result.document), client.owner)
+    write = partial(figures.put, figures=new, most=settings.max_figures)
+    try:
+        row, is_new = await store.write(write)
+    except IntegrityError:  # another process has just stored them
+        row, is_new = await store.write(write)
+    if is_new:
+        response.status_code = 201
+    response.headers["Location"] = f"{request.scope.get('root_path', '')}/figures/{row.id}"
+    return await _detail(store, row)
+
+
+@router.get(
+    "",
+    summary="All identified figures",
+    response_model=FiguresList,
+    responses=problem_responses(problems.StoreUnavailable),
+)
+async def list_figures(store: ServiceStore) -> FiguresList:
+    """Ids, robots and owners of all identified figures."""
+    return FiguresList(figures=[FiguresSummary(**_summary(row)) for row in await store.read(figures.all_of)])
+
+
+@router.get(
+    "/{id}",
+    summary="Identified figures",
+    response_model=FiguresDetail,
+    responses={
+        200: {"content": {YAML: {"schema": {"type": "string"}, "example": yaml.safe_dump(FIGURES, sort_keys=False)}}},
+        **problem_responses(problems.UnknownFigures, problems.UnknownRobot, problems.StoreUnavailable),
+    },
+)
+async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
+    """The robot's `figures.yaml` with the identified figures in the place of its own, their covariance and `sd`.
+    `Accept: application/yaml` returns a file for `load_robot(name, figures=…)` of the library."""
+    detail = await _detail(store, await store.read(partial(figures.get, id=id)))
+    if YAML not in request.headers.get("accept", "").lower():
+        return detail
+    content = detail.model_dump(mode="json", exclude={"id", "created", "owner", "parameters"}, exclude_none=True)
+    return Response(await run_in_threadpool(_yaml, content), media_type=YAML)
+
+
+@router.delete(
+    "/{id}",
+    summary="Delete identified figures",
+    status_code=204,
+    responses=problem_responses(
+        problems.UnknownFigures, problems.FiguresInUse, problems.NotOwner, problems.StoreUnavailable
+    ),
+)
+async def delete(id: FiguresIdPath, store: ServiceStore, client: ServiceClient) -> None:
+    """Deletes figures that no study uses. Stored answers that used them stay."""
+    await store.write(partial(figures.delete, id=id, client=client), frees=True)
+
+
+def _summary(row: Figures) -> dict[str, Any]:
+    names = row.content.get("covariance", {}).get("names", [])
+    return {"id": row.id, "robot": row.robot, "created": row.created, "owner": row.owner, "parameters": len(names)}
+
+
+async def _detail(store: Store, row: Figures) -> FiguresDetail:
+    """The whole document of a row. Raises UnknownRobot if its robot was deleted."""
+    whole = merged((await robot_in(store, row.robot)).figures, row.content)
+    sections: dict[str, Any] = {
+        name: whole.get(name) for name in FiguresDetail.model_fields if name not in FiguresSummary.model_fields
+    }
+    return FiguresDetail(**_summary(row), **sections)
+
+
+def _yaml(content: dict[str, Any]) -> str:
+    text: str = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+    return text

@@ -1,0 +1,106 @@
+"""Figures of a robot that were identified on one arm: what the routes under `/figures` take and answer."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from app.schemas.common import Request, Response, RobotName, described, part
+from app.schemas.examples.figures import COVARIANCE, DRIVES, FIGURES_ID, FRICTION
+from app.schemas.examples.values import CREATED
+
+Section = dict[str, Any]
+NAMES = (
+    "Paths of the parameters, with the index of the joint where a figure has one value each: "
+    "`friction_laws.LAW.coulomb.0`, `drives.copper.2`, `electronics.idle_power`."
+)
+
+
+class Covariance(Request):
+    """Covariance of the identified parameters."""
+
+    names: Annotated[list[str], Field(min_length=1, max_length=200)] = described(NAMES, None, COVARIANCE["names"])
+    matrix: Annotated[list[list[float]], Field(min_length=1, max_length=200)] = described(
+        "Symmetric, positive semidefinite; units are products of the parameters'.", None, COVARIANCE["matrix"]
+    )
+
+
+def _section(what: str, example: Section) -> Any:
+    return described(f"{what}. Null: the robot's own.", None, example, default=None)
+
+
+class FiguresDocument(Request):
+    """Figures of a robot, some of them identified on one arm, in the form of its `figures.yaml`. Each figure has
+    `value`, `unit`, `source`, `trust`, and `sd` if it was identified. Only friction laws, drives, electronics and
+    inertials may differ from the robot's own."""
+
+    robot: RobotName = described("Name of the robot.", None, "ur5e")
+    friction_laws: Section | None = _section("Friction laws by name; the first one is the default", FRICTION)
+    drives: Section | None = _section("Motors, gears and inverters", DRIVES)
+    electronics: Section | None = _section("Electronics", {})
+    inertials: Section | None = _section("Masses, centres of mass and inertias of the links", {})
+    covariance: Covariance | None = described(
+        "Covariance of the identified parameters. Null: none was identified.", None, COVARIANCE, default=None
+    )
+    session_sd: Annotated[float, Field(ge=0, le=1)] | None = described(
+        "Relative standard deviation of friction from one day to another.", "1", 0.03, default=None
+    )
+    move_sd: Annotated[float, Field(ge=0, le=1e5)] | None = described(
+        "Standard deviation of what the model cannot express of a motion, as a mean power.", "W", 1.5, default=None
+    )
+    title: str | None = described(
+        "Manufacturer and model. Null: the robot's own.", None, "Universal Robots UR5e", default=None
+    )
+    kinematics: Section | None = _section("As the robot's own", {})
+    limits: Section | None = _section("As the robot's own", {})
+    collision: Section | None = _section("As the robot's own", {})
+    default_motion: Section | None = _section("As the robot's own", {})
+    friction_table: Section | None = _section("As the robot's own", {})
+    id: str | None = described("Has no effect: the id follows from the content.", None, FIGURES_ID, default=None)
+    created: str | None = described("Has no effect.", None, CREATED, default=None)
+    owner: str | None = described("Has no effect.", None, "press_shop", default=None)
+    parameters: int | None = described("Has no effect.", "1", 2, default=None)
+
+    def document(self) -> dict[str, Any]:
+        """The document alone, without what is left out."""
+        return self.model_dump(exclude={"id", "created", "owner", "parameters"}, exclude_none=True)
+
+
+class FiguresSummary(Response):
+    """Figures of a robot that were identified on one arm."""
+
+    id: str = described("Id of the figures, for the field `figures` of a request.", None, FIGURES_ID)
+    robot: str = described("Name of the robot.", None, "ur5e")
+    created: datetime = described("Time at which they were stored, in UTC.", None, CREATED)
+    owner: str | None = described("Name of the API key that stored them; null without one.", None, "press_shop")
+    parameters: int = described("Number of parameters in the covariance.", "1", 2)
+
+
+class FiguresList(Response):
+    """All identified figures."""
+
+    figures: list[FiguresSummary] = part("The figures, newest first.")
+
+
+class FiguresDetail(FiguresSummary):
+    """A robot's `figures.yaml` with the identified figures in the place of its own, and their uncertainty."""
+
+    title: str = described("Manufacturer and model.", None, "Universal Robots UR5e")
+    kinematics: Section = described("Kinematics.", None, {})
+    inertials: Section = described("Masses, centres of mass and inertias of the links.", None, {})
+    limits: Section = described("Limits.", None, {})
+    collision: Section = described("Shapes of the links.", None, {})
+    default_motion: Section | None = described("Default motion of the controller; null if unknown.", None, {})
+    drives: Section = described("Motors, gears and inverters.", None, DRIVES)
+    electronics: Section = described("Electronics.", None, {})
+    friction_table: Section = described("Measured friction torques of the robot.", None, {})
+    friction_laws: Section = described("Friction laws by name; the first one is the default.", None, FRICTION)
+    covariance: Covariance | None = part("Covariance of the identified parameters; null: none was identified.")
+    session_sd: float | None = described(
+        "Relative standard deviation of friction from one day to another; null: not known.", "1", 0.03
+    )
+    move_sd: float | None = described(
+        "Standard deviation of what the model cannot express of a motion, as a mean power; null: not known.", "W", 1.5
+    )

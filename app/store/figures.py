@@ -1,0 +1,60 @@
+"""Figures identified on one arm. Each function works on a session: `await store.write(partial(put, …))`."""
+
+from __future__ import annotations
+
+import json
+import uuid
+from typing import Any
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session
+
+from app.access.client import Client
+from app.access.rules import check_owner
+from app.exceptions import FiguresInUse, TooManyFigures, UnknownFigures
+from app.store.tables import Figures, Study, is_id, now
+
+_SPACE = uuid.UUID("6d0c5a0e-7b0e-5d5f-9a53-1d1f5b1c4a9e")
+
+
+def new_figures(robot: str, content: dict[str, Any], owner: str | None) -> Figures:
+    """Figures that take the place of the robot's own, as `models.uncertainty.document.replaced_in` gives them; not yet
+    in the database."""
+    text = json.dumps([robot, content], sort_keys=True)
+    return Figures(id=str(uuid.uuid5(_SPACE, text)), robot=robot, created=now(), owner=owner, content=content)
+
+
+def put(session: Session, figures: Figures, most: int) -> tuple[Figures, bool]:
+    """Adds figures; returns those of this id, and whether they are new.
+
+    Raises TooManyFigures if they are one more than `most`.
+    """
+    known = session.get(Figures, figures.id)
+    if known is not None:
+        return known, False
+    if (session.scalar(select(func.count()).select_from(Figures)) or 0) >= most:
+        raise TooManyFigures
+    session.add(figures)
+    return figures, True
+
+
+def all_of(session: Session) -> list[Figures]:
+    """All figures, newest first."""
+    return list(session.scalars(select(Figures).order_by(Figures.created.desc(), Figures.id)))
+
+
+def get(session: Session, id: str) -> Figures:
+    """The figures of this id. Raises UnknownFigures."""
+    found = session.get(Figures, id) if is_id(id) else None
+    if found is None:
+        raise UnknownFigures(id)
+    return found
+
+
+def delete(session: Session, id: str, client: Client) -> None:
+    """Deletes figures. Raises UnknownFigures, NotOwner, or FiguresInUse while a study uses them."""
+    figures = get(session, id)
+    check_owner(client, figures.owner)
+    if session.scalar(select(Study.id).where(Study.figures == id).limit(1)) is not None:
+        raise FiguresInUse
+    session.delete(figures)

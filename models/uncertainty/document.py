@@ -1,0 +1,262 @@
+"""A document of figures: those of a robot, some of them identified on one arm, with their covariance.
+
+It has the form of the robot's `figures.yaml`. `robot` names the robot. A figure that was identified has `sd` beside its
+value. At the top, `covariance` has the names and the matrix of all identified parameters, `session_sd` [1] is how much
+friction differs from day to day, and `move_sd` [W] what the model cannot express of a motion, as a mean power. Only the
+figures of `REPLACEABLE` may differ from the robot's own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from models.arrays import read_only
+from models.robot import Array
+from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION
+
+TOP = ("covariance", "session_sd", "move_sd")
+# parts of a friction law, of which `load` may be left out, and figures of the other sections, with their least and
+# greatest value
+LAW: dict[str, tuple[float, float]] = {
+    "coulomb": (0.0, 1e5),
+    "curved": (0.0, 1e5),
+    "speed": (1e-6, 1e5),
+    "viscous": (0.0, 1e5),
+    "load": (0.0, 0.999),
+}
+REPLACEABLE: dict[str, dict[str, tuple[float, float]]] = {
+    "drives": {
+        "torque_constant": (1e-6, 1e6),
+        "rotor_inertia": (0.0, 1e5),
+        "copper": (0.0, 1e6),
+        "inverter_constant": (0.0, 1e3),
+        "inverter_linear": (0.0, 1e3),
+        "inverter_quadratic": (0.0, 1e3),
+    },
+    "electronics": {"idle_power": (0.0, 1e5), "controller_power": (0.0, 1e5), "regeneration": (0.0, 1.0)},
+    "inertials": {
+        "mass": (1e-6, 1e5),
+        "center_of_mass": (-1e3, 1e3),
+        "inertia_frame_rpy": (-10.0, 10.0),
+        "inertia": (-1e6, 1e6),
+    },
+}
+_WIDTHS = {"center_of_mass": 3, "inertia_frame_rpy": 3, "inertia": 6}
+_WORDS = ("unit", "source", "trust", "note")
+MOST_LAWS, MOST_WORD, MOST_PARAMETERS = 8, 2000, 200
+# relative: a principal moment below zero, or above the sum of the others, by rounding of a figure
+ROUNDED = 1e-3
+
+
+class InvalidFigures(ValueError):
+    """A document that makes no figures; `field` names the place."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(f"{field}: {message}" if field else message)
+        self.field = field
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Covariance `matrix` (n, n) of the identified parameters; see the module. A name is the path of a figure, with the
+    index of the joint where it has one value each: `friction_laws.identified.coulomb.0`, `electronics.idle_power`."""
+
+    names: tuple[str, ...]
+    matrix: Array
+    session_sd: float
+    move_sd: float
+
+    def place_of(self, name: str, law: str) -> tuple[str, int] | None:
+        """The figure of `parameters` and the joint that a name stands for; None for one of another friction law."""
+        parts = name.split(".")
+        if parts[0] == "electronics":
+            return BASE_POWER, 0
+        if parts[0] == "friction_laws" and parts[1] != law:
+            return None
+        return parts[-2], int(parts[-1])
+
+    def places(self, law: str) -> list[tuple[str, int]]:
+        """Those of all names, of the friction law `law`."""
+        return [found for name in self.names if (found := self.place_of(name, law)) is not None]
+
+
+def covariance_of(figures: dict[str, Any]) -> Covariance | None:
+    """The covariance of a robot's figures; None if none of them was identified."""
+    if "covariance" not in figures:
+        return None
+    given = figures["covariance"]
+    return Covariance(
+        tuple(given["names"]),
+        np.array(given["matrix"], dtype=float),
+        float(figures.get("session_sd", 0.0)),
+        float(figures.get("move_sd", 0.0)),
+    )
+
+
+def replaced_in(robot: str, figures: dict[str, Any], document: Any) -> dict[str, Any]:
+    """What a document puts in the place of the own `figures` of the robot of this name: sections, figures, covariance.
+
+    All of it is checked. Raises InvalidFigures, which names the place.
+    """
+    if not isinstance(document, dict):
+        raise InvalidFigures("", "Figures must be a mapping of sections.")
+    if document.get("robot", robot) != robot:
+        raise InvalidFigures("robot", f"names another robot than {robot}.")
+    nq = len(figures["drives"]["copper"]["value"])
+    replaced: dict[str, Any] = {}
+    for section, content in document.items():
+        if section in TOP or section == "robot" or content == figures.get(section):
+            continue
+        if section == "friction_laws":
+            replaced[section] = _laws(figures[section], content, nq)
+        elif section in REPLACEABLE:
+            changed = _section(section, figures[section], content, nq)
+            if changed:
+                replaced[section] = changed
+        else:
+            raise InvalidFigures(
+                section, "differs from the robot's own. Identified figures may replace only friction_laws, "
+                f"{', '.join(REPLACEABLE)}.",
+            )  # fmt: skip
+    whole = merged(figures, replaced)
+    if "inertials" in replaced:
+        _check_bodies(whole["inertials"])
+    return replaced | _uncertainty(document, whole, nq)
+
+
+def with_document(robot: str, figures: dict[str, Any], document: Any) -> dict[str, Any]:
+    """The robot's figures with those of the document in their place. Raises InvalidFigures."""
+    return merged(figures, replaced_in(robot, figures, document))
+
+
+def merged(figures: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
+    """The robot's figures with those in their place that `replaced_in` gave."""
+    result = dict(figures)
+    for section, content in replaced.items():
+        if section in TOP:
+            result[section] = content
+        elif section == "friction_laws":
+            # the document's laws come first: the first one is the default
+            result[section] = content | {n: law for n, law in figures[section].items() if n not in content}
+        else:
+            result[section] = figures[section] | content
+    return result
+
+
+def _laws(own: dict[str, Any], content: Any, nq: int) -> dict[str, Any]:
+    if not isinstance(content, dict) or not 0 < len(content) <= MOST_LAWS:
+        raise InvalidFigures("friction_laws", f"must be a mapping of 1 to {MOST_LAWS} laws by name.")
+    laws = {}
+    for name, law in content.items():
+        if not isinstance(name, str) or not name.isidentifier() or len(name) > 64:
+            raise InvalidFigures("friction_laws", "Names of laws are letters, digits and underscores, at most 64.")
+        if law == own.get(name):
+            continue
+        where = f"friction_laws.{name}"
+        if not isinstance(law, dict) or not set(LAW) - {"load"} <= set(law) <= set(LAW):
+            raise InvalidFigures(where, f"must have the figures {', '.join(LAW)}, of which load may be left out.")
+        laws[name] = {part: _figure(f"{where}.{part}", law[part], LAW[part], (nq,)) for part in LAW if part in law}
+    return laws
+
+
+def _section(section: str, own: dict[str, Any], content: Any, nq: int) -> dict[str, Any]:
+    if not isinstance(content, dict):
+        raise InvalidFigures(section, "must be a mapping of figures.")
+    changed = {}
+    for name, figure in content.items():
+        if figure == own.get(name):
+            continue
+        where = f"{section}.{name}"
+        if name not in REPLACEABLE[section]:
+            raise InvalidFigures(where, "differs from the robot's own and cannot be identified.")
+        shape = () if section == "electronics" else (nq, _WIDTHS[name]) if name in _WIDTHS else (nq,)
+        changed[name] = _figure(where, figure, REPLACEABLE[section][name], shape)
+    return changed
+
+
+def _figure(where: str, figure: Any, allowed: tuple[float, float], shape: tuple[int, ...]) -> dict[str, Any]:
+    """The figure, with nothing in it but what is known. Raises InvalidFigures."""
+    if not isinstance(figure, dict) or not {"value", "unit", "source", "trust"} <= set(figure):
+        raise InvalidFigures(where, "must have value, unit, source and trust.")
+    if unknown := set(figure) - {"value", "sd", *_WORDS}:
+        raise InvalidFigures(where, f"has fields that no figure has: {', '.join(sorted(map(str, unknown)))[:200]}.")
+    for word in _WORDS:
+        if word in figure and (not isinstance(figure[word], str) or len(figure[word]) > MOST_WORD):
+            raise InvalidFigures(f"{where}.{word}", f"must be a text of at most {MOST_WORD} characters.")
+    if figure["trust"] not in ("A", "B", "C", "T", "E"):
+        raise InvalidFigures(f"{where}.trust", "must be one of A, B, C, T, E.")
+    result = {name: figure[name] for name in _WORDS if name in figure}
+    low, high = allowed
+    for part, least, most in (("value", low, high), ("sd", 0.0, 1e6)):
+        if part == "sd" and figure.get("sd") is None:
+            continue
+        value = numbers(f"{where}.{part}", figure[part], shape)
+        if not ((value >= least) & (value <= most)).all():
+            raise InvalidFigures(f"{where}.{part}", f"must be from {least:g} to {most:g}.")
+        result[part] = value.tolist()
+    return result
+
+
+def numbers(where: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """A checked array. Raises InvalidFigures."""
+    try:
+        return read_only(value, shape, "It")
+    except (ValueError, OverflowError) as error:
+        raise InvalidFigures(where, str(error)) from None
+
+
+def _check_bodies(inertials: dict[str, Any]) -> None:
+    """Raises InvalidFigures for an inertia that no body has."""
+    for k, row in enumerate(inertials["inertia"]["value"]):
+        ixx, ixy, ixz, iyy, iyz, izz = row
+        moments = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        slack = ROUNDED * abs(float(moments[-1]))
+        if moments[0] < -slack or moments[2] > moments[0] + moments[1] + slack:
+            raise InvalidFigures(f"inertials.inertia.{k}", "belongs to no body: see its principal moments.")
+
+
+def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> dict[str, Any]:
+    """The fields of `TOP` that the document has, checked."""
+    result: dict[str, Any] = {}
+    for name, most in (("session_sd", 1.0), ("move_sd", 1e5)):
+        if document.get(name) is not None:
+            value = float(numbers(name, document[name], ()))
+            if not 0 <= value <= most:
+                raise InvalidFigures(name, f"must be from 0 to {most:g}.")
+            result[name] = value
+    given = document.get("covariance")
+    if given is None:
+        return result
+    if not isinstance(given, dict) or set(given) != {"names", "matrix"} or not isinstance(given["names"], list):
+        raise InvalidFigures("covariance", "must have names and matrix, and nothing else.")
+    names = given["names"]
+    if not 0 < len(names) <= MOST_PARAMETERS or len(set(map(str, names))) != len(names):
+        raise InvalidFigures("covariance.names", f"must be 1 to {MOST_PARAMETERS} different names.")
+    for k, name in enumerate(names):
+        if not _is_parameter(name, figures, nq):
+            raise InvalidFigures(
+                f"covariance.names.{k}",
+                "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, drives.copper.2 or "
+                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power.",
+            )
+    matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
+    scale = float(np.abs(matrix).max())
+    if np.abs(matrix - matrix.T).max() > 1e-9 * scale or np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale:
+        raise InvalidFigures("covariance.matrix", "must be symmetric and positive semidefinite.")
+    return result | {"covariance": {"names": list(names), "matrix": matrix.tolist()}}
+
+
+def _is_parameter(name: Any, figures: dict[str, Any], nq: int) -> bool:
+    if not isinstance(name, str):
+        return False
+    if name == "electronics.idle_power":
+        return True
+    *path, joint = name.split(".")
+    if not (joint.isdecimal() and len(joint) <= 2 and int(joint) < nq):
+        return False
+    if len(path) == 3 and path[0] == "friction_laws":
+        return path[2] in FRICTION and path[2] in figures["friction_laws"].get(path[1], {})
+    return len(path) == 2 and path[0] == "drives" and path[1] in DRIVES

@@ -1,0 +1,72 @@
+"""How well a motion's energy is known, from the errors that the figures of the arm may have.
+
+The variance has three parts: that of the figures, by the gradient of the energy; what the model cannot express of a
+motion, a mean power times its duration; and the friction of another day. See `models.uncertainty.spread`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Array
+from models.uncertainty.parameters import BASE_POWER
+from models.uncertainty.spread import Spread, spread_of
+from optimizer.problem.arm import INVERTER_PARTS, Arm
+from optimizer.solution import Energy, EnergyInterval, SavingInterval, Sensitivity
+
+MOVE = "move"
+
+
+@dataclass(frozen=True)
+class Known:
+    """The energy [J] of a motion of `duration` [s], and its sensitivity."""
+
+    energy: float
+    sensitivity: Sensitivity
+    duration: float
+
+
+def arm_spread(arm: Arm) -> Spread:
+    """The errors that the figures of an arm may have. What the request gives itself is known."""
+    known = tuple(f"inverter_{part}" for part in INVERTER_PARTS if getattr(arm.inverter, part) is not None)
+    return spread_of(arm.robot, arm.friction_law.name, known)
+
+
+def with_interval(energy: Energy, sensitivity: Sensitivity, duration: float, arm: Arm) -> Energy:
+    """The energy with the interval of its electrical total."""
+    known = Known(energy.electrical.total, sensitivity, duration)
+    return replace(energy, electrical=replace(energy.electrical, interval=interval_of(known, arm)))
+
+
+def interval_of(known: Known, arm: Arm) -> EnergyInterval:
+    """P5, P95, standard deviation [J], and each source's share of the variance."""
+    spread, gradient = arm_spread(arm), known.sensitivity.gradient
+    low, high = _ends(_drawn(spread, known, 0))
+    parts = {name: float(gradient @ covariance @ gradient) for name, covariance in spread.covariances.items()}
+    if spread.move_sd:
+        parts[MOVE] = (known.duration * spread.move_sd) ** 2
+    total = sum(parts.values())
+    shares = {"idle_power" if n == BASE_POWER else n: part / total for n, part in parts.items()} if total else {}
+    return EnergyInterval(low, high, float(np.sqrt(total)), shares)
+
+
+def saving_interval(ours: Known, theirs: Known, arm: Arm) -> SavingInterval:
+    """P5, P95 and standard deviation of 1 - ours / theirs, with errors that both motions share; 0 where theirs is 0."""
+    spread = arm_spread(arm)
+    first, second = (_drawn(spread, each, k) for k, each in enumerate((ours, theirs)))
+    size = np.abs(second)
+    saving = np.divide(second - first, size, out=np.zeros_like(size), where=size > 0)
+    return SavingInterval(*_ends(saving), float(saving.std()))
+
+
+def _drawn(spread: Spread, known: Known, move: int) -> Array:
+    """Draws (n,) of the energy [J]."""
+    mean, gradient = known.energy + known.sensitivity.shift, known.sensitivity.gradient
+    return np.asarray(mean + spread.draws @ gradient + known.duration * spread.move_draws[move])
+
+
+def _ends(draws: Array) -> tuple[float, float]:
+    low, high = np.quantile(draws, [0.05, 0.95])
+    return float(low), float(high)

@@ -1,0 +1,114 @@
+"""How a motion's electrical energy hangs on the figures of the arm; the motion stays the same.
+
+A joint takes P = u v + inverter(i) + copper i² with u = tau + friction and i = u / torque_constant, so that
+
+    ∂P/∂u = v + (2 copper i + linear sign(i) + 2 quadratic i) / torque_constant.
+
+Friction's coefficients change u by their own terms, the rotor's inertia by a. P is taken as linear in the figures. The
+bus is not: a watt is worth 1 while the bus draws, and what the supply or the energy storage takes of it while there is
+a surplus. Where errors of the figures decide which it is, the expected worth counts (statistical linearisation): with a
+power P of mean m and standard deviation σ,
+
+    E max(P, 0) = m Φ(m / σ) + σ φ(m / σ),      dE/dm = Φ(m / σ).
+
+What a joule more in the storage changes later on, where it is full or empty, is left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import ndtr
+
+from models.robot import Array
+from models.uncertainty.parameters import PER_JOINT
+from models.uncertainty.spread import Spread
+from optimizer.energy.bus_flow import exchange
+from optimizer.energy.losses import friction_torque
+from optimizer.problem.arm import Arm
+from optimizer.problem.cycle import Cycle
+from optimizer.solution import Sensitivity
+
+# of a surplus that is stored, the storage takes all but rounding
+_STORED = 1e-9
+# standard deviation of a power that counts as none [W]
+_CERTAIN = 1e-9
+
+
+def energy_sensitivity(weights: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread) -> Sensitivity:
+    """That of a motion to the errors of `spread`; the other arguments as in `losses.breakdown`."""
+    rates, joints = _power_rates(v, a, tau, arm)
+    nq, count = tau.shape[1], len(PER_JOINT)
+    # by joint and figure; PER_JOINT comes figure by figure
+    root = spread.root[1:].reshape(count, nq, -1)
+    mean = spread.mean[1:].reshape(count, nq)
+    of_joints = joints + np.einsum("ckj,cj->kj", rates, mean)
+    factors = np.einsum("ckj,cjr->kjr", rates, root)
+    base = np.full(len(joints), arm.base_power)
+    if arm.bus.mode == "isolated":
+        worth, expected = _expected(of_joints, factors, np.zeros(nq))
+        drawn, plain = base + spread.mean[0] + expected.sum(axis=1), base + np.maximum(joints, 0.0).sum(axis=1)
+        electronics = np.ones(len(joints))
+    else:
+        net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
+        means = base + spread.mean[0] + of_joints.sum(axis=1)
+        electronics, drawn = _expected(means, factors.sum(axis=1) + spread.root[0], taken)
+        worth, plain = electronics[:, None], np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
+    gradient = np.einsum("kj,ckj->cj", weights[:, None] * worth, rates)
+    shift = float(weights @ (drawn - plain))
+    return Sensitivity(np.concatenate([[float(weights @ electronics)], gradient.ravel()]), shift)
+
+
+def waiting_sensitivity(
+    arm: Arm, tau: Array, motors: float, brakes: float, cycle: Cycle, spread: Spread
+) -> Sensitivity:
+    """That of standing still: for so long [s] while motors hold torques tau (nq,) [N·m], then by brakes."""
+    still = np.zeros((1, len(tau)))
+    rates, _ = _power_rates(still, still, tau[None], arm)
+    electronics = motors + (brakes if cycle.brake_power is None else 0.0)
+    gradient = np.concatenate([[electronics], motors * rates[:, 0].ravel()])
+    return Sensitivity(gradient, float(gradient @ spread.mean))
+
+
+def _expected(means: Array, factors: Array, taken: Array) -> tuple[Array, Array]:
+    """What a watt more is worth, and the drawn power [W], both expected: of powers with these means, and independent
+    standard normal factors (..., r), of whose surplus the share `taken` is given back."""
+    sd = np.maximum(np.sqrt((factors * factors).sum(axis=-1)), _CERTAIN)
+    x = means / sd
+    above = ndtr(x)
+    positive = means * above + sd * np.exp(-x * x / 2) / np.sqrt(2 * np.pi)
+    return taken + (1 - taken) * above, taken * means + (1 - taken) * positive
+
+
+def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
+    """The share (k,) of the surplus that supply or energy storage take."""
+    taken = np.full(len(joints), arm.regeneration)
+    if arm.bus.mode != "storage":
+        return taken
+    flows = exchange(arm.bus, arm.regeneration, arm.base_power, joints, weights)
+    return np.where((flows.charged > 0) & (flows.surplus <= _STORED * flows.charged), arm.bus.efficiency, taken)
+
+
+def _power_rates(v: Array, a: Array, tau: Array, arm: Arm) -> tuple[Array, Array]:
+    """Derivatives (c, k, nq) of each joint's power by the figures in PER_JOINT, and the power (k, nq) itself [W]."""
+    drives, law = arm.drives, arm.friction_law
+    u = tau + friction_torque(law, drives, tau, v, a)
+    i = u / drives.torque_constant
+    size, square = np.abs(i), i * i
+    linear, quadratic = drives.inverter_linear, drives.copper + drives.inverter_quadratic
+    joints = u * v + quadratic * square + linear * size + drives.inverter_constant
+    by_torque = v + (2 * quadratic * i + linear * np.sign(i)) / drives.torque_constant
+    step = by_torque * v / np.sqrt(v * v + law.knee * law.knee)
+    rates = {
+        "coulomb": step,
+        "curved": by_torque * np.arcsinh(v / law.speed),
+        "speed": -by_torque * law.curved * v / (law.speed * np.hypot(v, law.speed)),
+        "viscous": by_torque * v,
+        "load": step * np.abs(tau - drives.rotor_inertia * a),
+        "torque_constant": -(2 * quadratic * square + linear * size) / drives.torque_constant,
+        "rotor_inertia": by_torque * a,
+        "copper": square,
+        "inverter_constant": np.ones_like(v),
+        "inverter_linear": size,
+        "inverter_quadratic": square,
+    }
+    return np.stack([rates[name] for name in PER_JOINT]), joints
