@@ -1,0 +1,54 @@
+"""Torques of an arm's rigid bodies, and their regressor: the torques are linear in the bodies' ten parameters each.
+
+Of a body: mass m, first moments m·c (3) and inertia about the joint's frame Ixx, Ixy, Iyy, Ixz, Iyz, Izz, in the frame
+of its joint (Pinocchio's order). Rotors are not in them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from models.robot import Array
+
+BODY = 10
+"""Parameters of a body."""
+
+
+def rigid_torques(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
+    """Torques (n, nq) [N·m] of rigid bodies, without rotors, at states q, v, a (n, nq)."""
+    bare = without_rotors(model)
+    data = bare.createData()
+    torques = np.empty_like(q)
+    for row in range(len(q)):
+        torques[row] = pin.rnea(bare, data, q[row], v[row], a[row])
+    return torques
+
+
+def rigid_regressor(model: pin.Model, q: Array, v: Array, a: Array) -> Array:
+    """The matrices (n, nq, 10 nq) whose products with the bodies' parameters are the rigid bodies' torques."""
+    data = model.createData()
+    found = np.empty((len(q), model.nq, BODY * model.nq))
+    for row in range(len(q)):
+        found[row] = pin.computeJointTorqueRegressor(model, data, q[row], v[row], a[row])
+    return found
+
+
+def without_rotors(model: pin.Model) -> pin.Model:
+    """A copy of the model without rotor inertia."""
+    bare = model.copy()
+    bare.armature = np.zeros(model.nq)
+    return bare
+
+
+def body_parameters(model: pin.Model) -> Array:
+    """Parameters (10 nq,) of the model's moving bodies."""
+    return np.concatenate([body.toDynamicParameters() for body in list(model.inertias)[1:]])
+
+
+def placed(placement: pin.SE3) -> Array:
+    """The matrix (10, 10) that turns a body's parameters in one frame into those in the frame it is placed in."""
+    bodies = [pin.Inertia.Random() for _ in range(4 * BODY)]
+    inside = np.array([body.toDynamicParameters() for body in bodies])
+    outside = np.array([placement.act(body).toDynamicParameters() for body in bodies])
+    return np.asarray(np.linalg.lstsq(inside, outside, rcond=None)[0].T)
