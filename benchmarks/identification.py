@@ -25,7 +25,7 @@ import numpy as np
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
 from models.registry import load_robot
-from models.robot import Array, Robot
+from models.robot import Robot
 from optimizer.identification.base_fit import BaseFit, base_arm, fit_base
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.clusters import clusters_of
@@ -113,11 +113,11 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
     assert place is not None
     robot, log = tx40(place)
     rows = rows_of(robot, [log], regressor=True)
-    near = agreeing(base_of(robot, rows)[0], tx40_reference(place))
+    near = agreeing(base_of(robot, rows), tx40_reference(place))
     found = [Gate("tx40: published friction figures met, of 13", near, 12, 13)]
     first = np.arange(len(rows.q)) < len(rows.q) // 2
     for name, half in (("first", first), ("second", ~first)):
-        fitted, _arm = base_of(robot, rows.take(half))
+        fitted = base_of(robot, rows.take(half))
         other = base_arm(robot, rows.take(~half), rows.effort[~half], clusters_of(rows.take(~half)), TX40_OPTIONS)
         error = other.values - fitted.torque(other)
         for joint, most in enumerate((10.0, 8.0, 13.0, 12.0, 22.0, 20.0)):
@@ -127,11 +127,11 @@ def tx40_torque(place: Path | None, _: int) -> list[Gate]:
     return found
 
 
-def base_of(robot: Robot, rows: Rows) -> tuple[BaseFit, Array]:
-    """The base fit of rows with torques, and the rows' joints."""
+def base_of(robot: Robot, rows: Rows) -> BaseFit:
+    """The base fit of rows with torques."""
     clusters = clusters_of(rows)
     arm = base_arm(robot, rows, rows.effort, clusters, TX40_OPTIONS)
-    return fit_base(robot, arm, clusters, TX40_OPTIONS), arm.block.joint
+    return fit_base(robot, arm, clusters, TX40_OPTIONS)
 
 
 def agreeing(fitted: BaseFit, reference: dict[str, tuple[float, float]]) -> int:
@@ -174,7 +174,7 @@ def times(_: Path | None, __: int) -> list[Gate]:
     found = list[Gate]()
     for what, options, most in (("without", Options(), 1.0), ("with", Options(refit=True), 3.0)):
         spent = list[float]()
-        for _ in range(3):
+        for _repeat in range(3):
             start = time.perf_counter()
             fit(robot, [log], options)
             spent.append(time.perf_counter() - start)
