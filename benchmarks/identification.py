@@ -85,7 +85,7 @@ def ur3e_power(place: Path | None, _: int) -> list[Gate]:
             energy, sd = energy_sd(blind, spread, part)
             inside.append(abs(float(part.weight @ part.power) - energy) <= P95 * sd)
             half.append(100 * P95 * sd / energy)
-    errors = power_errors(rows, predicted)
+    errors = power_errors([(rows, predicted)])
     return [
         Gate("ur3e, left out with its reverse: RMSE [W]", errors.rmse, 0.0, 2.0),
         Gate("ur3e, same: mean error of energy [%]", errors.energy_mean, 0.0, 1.3),

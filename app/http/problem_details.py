@@ -39,6 +39,7 @@ from app.exceptions import (
     TooManyRequests,
     TooManyRobots,
     UnknownAnswer,
+    UnknownIdentification,
     UnknownJob,
     UnknownLog,
     UnknownStudy,
@@ -50,6 +51,7 @@ from app.exceptions import (
 from app.http.validation_messages import told
 from app.schemas import errors as problems
 from optimizer import exceptions as optimizer_errors
+from optimizer.identification import errors as identification_errors
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
@@ -58,6 +60,9 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.InvalidTable: problems.InvalidTable,
     optimizer_errors.LogTooLarge: problems.LogTooLarge,
     optimizer_errors.EffortNotUsable: problems.EffortNotUsable,
+    identification_errors.NotExcited: problems.NotExcited,
+    identification_errors.NothingHeldOut: problems.NothingHeldOut,
+    identification_errors.NoPowerChannel: problems.NoPowerChannel,
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,
@@ -90,6 +95,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     KeyReused: problems.KeyReused,
     RobotExists: problems.RobotExists,
     UnknownLog: problems.UnknownLog,
+    UnknownIdentification: problems.UnknownIdentification,
     TooManyLogs: problems.TooManyLogs,
     TooManyRobots: problems.TooManyRobots,
     NoKey: problems.Unauthenticated,

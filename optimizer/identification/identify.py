@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Robot
+from models.robot import Mask, Robot
 from optimizer.exceptions import EffortNotUsable
 from optimizer.identification.block import own_value
 from optimizer.identification.errors import NoPowerChannel, NotExcited
@@ -23,7 +23,7 @@ from optimizer.identification.results import IdentifiedFigures, Parameter, Physi
 from optimizer.identification.split import held_out
 from optimizer.identification.structure import inertials_of, physical_of, structure_of
 from optimizer.identification.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
-from optimizer.identification.validation import validate
+from optimizer.identification.validation import Fold, validate
 from optimizer.identification.whole_fit import LINK, PARTS
 from optimizer.linear_algebra import one_thread
 
@@ -50,7 +50,7 @@ class Identification:
     def validate(self, logs: Sequence[Log]) -> Validation:
         """Errors of the figures on other logs, none of whose moves may be in the fit. Raises InvalidProblem."""
         rows = rows_of(self.robot, logs, self.options.refit)
-        return validate(self.robot, self.fitted, self.spread, rows, self.options.velocity_threshold)
+        return validate(self.robot, [Fold(self.fitted, self.spread, rows)], self.options.velocity_threshold)
 
     def figures(self) -> IdentifiedFigures:
         """The figures, complete over all joints, with their covariance."""
@@ -97,11 +97,8 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
     _check(rows, logs, options)
     validation = None
     if options.held_out:
-        out = held_out(rows, options.held_out)
-        blind = fit_rows(robot, rows.take(~out), options)
-        seen = spread_of(blind, rows.take(~out))
-        # on the same days as the fit
-        validation = validate(robot, blind, replace(seen, session=0.0), rows.take(out), options.velocity_threshold)
+        folds = [_fold(robot, rows, out, options) for out in held_out(rows, options.held_out)]
+        validation = validate(robot, folds, options.velocity_threshold)
     fitted = fit_rows(robot, rows, options)
     parameters = _parameters(robot, fitted.estimate)
     if not any(each.identified for each in parameters):
@@ -118,6 +115,12 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
         validation=validation,
         logs=tuple(log.name or "" for log in logs),
     )
+
+
+def _fold(robot: Robot, rows: Rows, out: Mask, options: Options) -> Fold:
+    """The rows that are held `out` (n,), and a fit to the others, which are of the same days."""
+    blind = fit_rows(robot, rows.take(~out), options)
+    return Fold(blind, replace(spread_of(blind, rows.take(~out)), session=0.0), rows.take(out))
 
 
 def _check(rows: Rows, logs: Sequence[Log], options: Options) -> None:

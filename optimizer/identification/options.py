@@ -44,9 +44,10 @@ class Coupling:
 class Options:
     """`fit`: the figures to find; power is added by itself where the logs have it. `refit`: the links' inertials, too.
 
-    `held_out` is the fraction of the moves that validate. `terms` are those of the friction law, `knee` [rad/s] that
-    of its step (None: the robot's own). `velocity_threshold` [rad/s]: slower samples of a joint do not enter its rows.
-    `prior_weight` is that of the robot's own inertials in a refit. Raises InvalidProblem.
+    `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn. `terms` are those of the
+    friction law, `knee` [rad/s] that of its step (None: the robot's own). `velocity_threshold` [rad/s]: slower samples
+    of a joint do not enter its rows. `prior_weight` is that of the robot's own inertials in a refit. Raises
+    InvalidProblem.
     """
 
     fit: Sequence[Target] = ("friction", "rotor")
@@ -68,7 +69,7 @@ class Options:
         if self.estimator not in get_args(Estimator):
             raise InvalidProblem("estimator", f"estimator must be one of {', '.join(get_args(Estimator))}.")
         for name, least, most in (
-            ("held_out", 0.0, 0.8),
+            ("held_out", 0.0, 1.0),
             ("velocity_threshold", 0.0, 10.0),
             ("prior_weight", 1e-6, 1e6),
         ):

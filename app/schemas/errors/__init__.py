@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from app.schemas.errors.identifications import NoPowerChannel, NotExcited, NothingHeldOut, UnknownIdentification
 from app.schemas.errors.logs import EffortNotUsable, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
@@ -99,6 +100,10 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     UnknownLog,
     LogTooLarge,
     TooManyLogs,
+    UnknownIdentification,
+    NotExcited,
+    NothingHeldOut,
+    NoPowerChannel,
     EffortNotUsable,
     KeyReused,
     Unauthenticated,
@@ -143,13 +148,16 @@ __all__ = [
     "MalformedHttp",
     "MethodNotAllowed",
     "NoCollisionFreeTrajectory",
+    "NoPowerChannel",
     "NoSequence",
     "NoTrajectory",
     "NotAcceptable",
     "NotCertified",
+    "NotExcited",
     "NotFound",
     "NotOwner",
     "NotReady",
+    "NothingHeldOut",
     "OutsideLimits",
     "PathInfeasible",
     "ProblemDetails",
@@ -167,6 +175,7 @@ __all__ = [
     "TorqueInfeasible",
     "Unauthenticated",
     "UnknownAnswer",
+    "UnknownIdentification",
     "UnknownJob",
     "UnknownLog",
     "UnknownRobot",

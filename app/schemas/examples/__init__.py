@@ -8,6 +8,7 @@ from app.schemas.examples.compare import COMPARE_EXAMPLES
 from app.schemas.examples.cycle import CYCLE_EXAMPLES
 from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.export import EXPORT_EXAMPLES
+from app.schemas.examples.identifications import IDENTIFY_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from app.schemas.examples.logs import LOG_EXAMPLES
@@ -28,6 +29,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/export/{format}": {JSON: EXPORT_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
+    "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},
