@@ -12,6 +12,7 @@ from app.cli.cluster_worker import cluster_worker
 from app.cli.cycle import cycle
 from app.cli.evaluate import evaluate
 from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
+from app.cli.identify import identify
 from app.cli.interrupts import interruptible
 from app.cli.keys import keys
 from app.cli.optimize import optimize
@@ -42,7 +43,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, cycle, evaluate, robots, keys, cluster_worker):
+for command in (serve, optimize, cycle, evaluate, identify, robots, keys, cluster_worker):
     joulepath.add_command(command)
 
 
