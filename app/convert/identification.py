@@ -39,4 +39,6 @@ def identification_fields(found: Identification, validation: Validation) -> dict
         "physical": None if found.physical is None else asdict(found.physical),
         "validation": asdict(validation),
         "residuals": asdict(found.residuals),
+        "temperatures": asdict(found.temperatures),
+        "advice": None if found.advice is None else asdict(found.advice),
     }

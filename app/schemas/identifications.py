@@ -167,6 +167,24 @@ class Residuals(Response):
     sessions: list[float] = described("Size of each log's friction relative to the fit's.", "1", [0.98, 1.02])
 
 
+class Temperatures(Response):
+    """Friction over temperature: friction(T) = friction(T0)·exp(-k (T - T0)). Arrays are over joints."""
+
+    reference: list[float | None] = described("T0, the mean of the logs [°C]; null if not logged.", None, [34.4, 35.7])
+    span: list[float | None] = described("Greatest less least temperature of the logs.", "K", [0.1, 0.1])
+    k: list[float | None] = described("k; null where the logs span less than 8 K.", "1/K", [None, 0.011])
+    sd: list[float | None] = described("Its standard deviation.", "1/K", [None, 0.001])
+
+
+class Advice(Response):
+    """What would help most."""
+
+    figure: str = described("The figure whose error has the largest share of the energy's variance.", None, "copper")
+    joint: int | None = described("Its joint, from 0; null: of the whole arm.", "1", 1)
+    share: float = described("This share.", "1", 0.4)
+    do: str = described("What to log. Four times as many such moves halve its standard deviation.", None, "Log rests.")
+
+
 class Identification(Response):
     """An identification: its state and, once it is done, what was found."""
 
@@ -195,3 +213,5 @@ class IdentificationResult(Response):
     physical: Physical | None = part("Whether refitted links are real bodies; null if they are kept.")
     validation: Validation = part("Errors on moves that the fit has not seen.")
     residuals: Residuals = part("What the fit leaves over.")
+    temperatures: Temperatures = part("Friction over temperature.")
+    advice: Advice | None = part("What would help most; null if nothing is known of it.")

@@ -9,6 +9,7 @@ import numpy as np
 
 from models.robot import Mask, Robot
 from optimizer.exceptions import EffortNotUsable
+from optimizer.identification.advice import advice_of
 from optimizer.identification.block import own_value
 from optimizer.identification.errors import NoPowerChannel, NotExcited
 from optimizer.identification.estimate import Estimate, Name
@@ -19,9 +20,19 @@ from optimizer.identification.interval import Spread, sessions, spread_of
 from optimizer.identification.log import Log
 from optimizer.identification.options import Options
 from optimizer.identification.regressor import BODY, body_parameters
-from optimizer.identification.results import IdentifiedFigures, Parameter, Physical, Residuals, Structure, Validation
+from optimizer.identification.results import (
+    Advice,
+    IdentifiedFigures,
+    Parameter,
+    Physical,
+    Residuals,
+    Structure,
+    Temperatures,
+    Validation,
+)
 from optimizer.identification.split import held_out
 from optimizer.identification.structure import inertials_of, physical_of, structure_of
+from optimizer.identification.temperature import temperatures_of
 from optimizer.identification.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
 from optimizer.identification.validation import Fold, validate
 from optimizer.identification.whole_fit import LINK, PARTS
@@ -43,6 +54,8 @@ class Identification:
     structure: Structure
     physical: Physical | None
     residuals: Residuals
+    temperatures: Temperatures
+    advice: Advice | None
     validation: Validation | None
     logs: tuple[str, ...]
 
@@ -112,6 +125,10 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
         structure=structure_of(robot, rows, options),
         physical=physical_of(robot, fitted.arm),
         residuals=_residuals(fitted, rows, options),
+        temperatures=temperatures_of(
+            rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, options.velocity_threshold
+        ),
+        advice=advice_of(fitted, rows),
         validation=validation,
         logs=tuple(log.name or "" for log in logs),
     )
