@@ -217,7 +217,7 @@ def csv_of(
     nq, scale = recording.robot.nq, 180 / np.pi if units == "deg" else 1.0
     stamps = recording.time if time is None else time
     numbers = range(first, nq + first) if form == "rtde" else range(1, nq + 1)
-    names = {
+    forms: dict[str, dict[str, str | None]] = {
         "own": {"q": "q{}", "v": "v{}", "a": "a{}", "i": "i{}" if effort == "current" else "tau{}", "T": None},
         "rtde": {
             "q": "actual_q_{}",
@@ -227,7 +227,8 @@ def csv_of(
             "T": "joint_temperatures_{}",
         },
         "ros": {"q": "position{}", "v": "velocity{}", "a": None, "i": "effort{}", "T": None},
-    }[form]
+    }
+    names = forms[form]
     efforts = recording.current if effort == "current" else recording.torque
     values = {"q": recording.q * scale, "v": recording.v * scale, "a": recording.a * scale, "i": efforts}
     values["T"] = recording.temperature

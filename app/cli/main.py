@@ -13,6 +13,7 @@ from app.cli.cycle import cycle
 from app.cli.evaluate import evaluate
 from app.cli.exit_codes import ANSWERED, INTERRUPTED, INVALID, of_problem
 from app.cli.export import export
+from app.cli.identify import identify
 from app.cli.interrupts import interruptible
 from app.cli.keys import keys
 from app.cli.optimize import optimize
@@ -43,7 +44,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, cycle, evaluate, export, robots, keys, cluster_worker):
+for command in (serve, optimize, cycle, evaluate, export, identify, robots, keys, cluster_worker):
     joulepath.add_command(command)
 
 

@@ -24,6 +24,7 @@ ServiceError
 ├── RobotExists         the name of a robot is taken
 ├── TooManyRobots       the service holds as many robots of users as it may
 ├── UnknownLog          no log has that id
+├── UnknownIdentification   no identification has that id
 ├── TooManyLogs         the service holds as many bytes of logs as it may
 ├── UnknownFigures      no figures have that id
 ├── FiguresInUse        a study uses the figures

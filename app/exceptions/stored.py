@@ -96,6 +96,12 @@ class UnknownLog(ServiceError):
     MESSAGE = "No log has this id: GET /logs lists all logs."
 
 
+class UnknownIdentification(ServiceError):
+    """No identification has that id."""
+
+    MESSAGE = "No identification has this id: it may be older than the service keeps jobs. Send it again."
+
+
 class TooManyLogs(ServiceError):
     """The stored logs and a new one would exceed `limit` bytes."""
 

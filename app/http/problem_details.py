@@ -42,6 +42,7 @@ from app.exceptions import (
     TooManyRobots,
     UnknownAnswer,
     UnknownFigures,
+    UnknownIdentification,
     UnknownJob,
     UnknownLog,
     UnknownStudy,
@@ -53,6 +54,7 @@ from app.exceptions import (
 from app.http.validation_messages import told
 from app.schemas import errors as problems
 from optimizer import exceptions as optimizer_errors
+from optimizer.identification import errors as identification_errors
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
@@ -62,6 +64,9 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.LogTooLarge: problems.LogTooLarge,
     optimizer_errors.EffortNotUsable: problems.EffortNotUsable,
     optimizer_errors.ExcitationInfeasible: problems.ExcitationInfeasible,
+    identification_errors.NotExcited: problems.NotExcited,
+    identification_errors.NothingHeldOut: problems.NothingHeldOut,
+    identification_errors.NoPowerChannel: problems.NoPowerChannel,
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,
@@ -94,6 +99,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     KeyReused: problems.KeyReused,
     RobotExists: problems.RobotExists,
     UnknownLog: problems.UnknownLog,
+    UnknownIdentification: problems.UnknownIdentification,
     TooManyLogs: problems.TooManyLogs,
     TooManyRobots: problems.TooManyRobots,
     UnknownFigures: problems.UnknownFigures,

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol
 
 from app.cluster.link import Cluster
 from app.engine.pool import Engine
 from app.engine.result import TaskResult
 from app.engine.task import Task
+from app.schemas.identifications import IdentifyRequest
+from app.store import logs
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
+from app.tasks.identify import Stored
+from app.tasks.job_request import IDENTIFY, JobRequestTask
 from optimizer.progress import Tell, nobody
 
 
@@ -41,7 +47,15 @@ class LocalExecutor:
 
     async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
         """See `Executor`."""
+        if isinstance(task, JobRequestTask) and task.kind == IDENTIFY:
+            task = replace(task, logs=await self._logs_of(task))
         return await ArmEngine(_Spare(self.engine, stoppable), self.store).run(task, deadline, tell)
+
+    async def _logs_of(self, task: JobRequestTask) -> tuple[Stored, ...]:
+        """The logs that an identification names. Raises UnknownLog or StoreUnavailable."""
+        asked = IdentifyRequest.model_validate_json(zlib.decompress(task.body))
+        found = [await self.store.read(partial(logs.get, log_id=each)) for each in asked.all_logs]
+        return tuple((log.settings, log.body) for log in found)
 
 
 @dataclass(frozen=True)

@@ -59,18 +59,19 @@ def part(description: str) -> Any:
 class Request(BaseModel):
     """A part of a request: no conversion of JSON types, no NaN or infinity, no unknown fields."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, serialize_by_alias=True)
 
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_fields(cls, data: Any) -> Any:
         # before `extra="forbid"`, whose error repeats the unknown name: no answer echoes the caller's input
-        if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
-            unknown = {str(name): nearest(str(name), cls.model_fields) for name in data if name not in cls.model_fields}
+        fields = [field.alias or name for name, field in cls.model_fields.items()]
+        if isinstance(data, dict) and not data.keys() <= set(fields):
+            unknown = {str(name): nearest(str(name), fields) for name in data if name not in fields}
             raise PydanticCustomError(
                 UNKNOWN_FIELD,
                 "Unknown field: use only {known}",
-                {"known": ", ".join(cls.model_fields), "unknown": unknown},
+                {"known": ", ".join(fields), "unknown": unknown},
             )
         return data
 

@@ -21,7 +21,7 @@ MOST_REQUESTS = 10_000
 """Most requests of one job."""
 JobState = Literal["waiting", "running", "done", "cancelling", "cancelled"]
 RequestState = Literal["waiting", "running", "done", "failed", "cancelled"]
-Kind = Literal["optimize", "cycle", "pareto", "compare", "whatif", "evaluate"]
+Kind = Literal["optimize", "cycle", "pareto", "compare", "whatif", "evaluate", "identify"]
 
 
 class OptimizeJob(Request):
@@ -60,7 +60,7 @@ class EvaluateJob(Request):
     evaluate: EvaluateRequest = described("A JSON body of `POST /evaluate`.", None, EVALUATE)
 
 
-KINDS: tuple[Kind, ...] = ("optimize", "cycle", "pareto", "compare", "whatif", "evaluate")
+KINDS = ("optimize", "cycle", "pareto", "compare", "whatif", "evaluate")
 RequestOfJob = Annotated[
     Annotated[OptimizeJob, Tag("by optimize")]
     | Annotated[CycleJob, Tag("by cycle")]

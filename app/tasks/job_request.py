@@ -15,6 +15,7 @@ from app.engine.result import StoredAnswer, TaskResult
 from app.schemas.compare import CompareRequest
 from app.schemas.cycle import CycleRequest
 from app.schemas.evaluate import EvaluateRequest
+from app.schemas.identifications import IdentifyRequest
 from app.schemas.pareto import ParetoRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import WhatifRequest
@@ -22,10 +23,14 @@ from app.store.leases import Figures
 from app.tasks.compare import CompareTask
 from app.tasks.cycle import CycleTask
 from app.tasks.evaluate import evaluated
+from app.tasks.identify import IdentifyTask, Stored
 from app.tasks.optimize import OptimizeTask
 from app.tasks.pareto import ParetoTask
 from app.tasks.whatif import WhatifTask
 from optimizer.deadline import Deadline
+
+IDENTIFY = "identify"
+"""Kind of the request of an identification, which needs stored logs."""
 
 
 @dataclass(frozen=True)
@@ -43,11 +48,18 @@ class JobRequestTask:
     kind: str
     body: bytes
     request_id: str
+    logs: tuple[Stored, ...] = ()
+    """Those that an identification names."""
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of the endpoint, within about `deadline` seconds."""
         began = time.perf_counter()
-        result = _RUN[self.kind](zlib.decompress(self.body), self.request_id, deadline)
+        body = zlib.decompress(self.body)
+        if self.kind == IDENTIFY:
+            asked = IdentifyRequest.model_validate_json(body)
+            result = IdentifyTask(asked, self.logs, self.request_id).run(deadline)
+        else:
+            result = _RUN[self.kind](body, self.request_id, deadline)
         answer = orjson.loads(result.document)
         # here and not in the service, which has more to do; nobody waits, so that size counts more than time
         return JobResult(
@@ -97,4 +109,5 @@ _ENERGY_AND_DURATION = {
     "compare": _of_several,
     "whatif": _of_several,
     "evaluate": _of_given_motion,
+    IDENTIFY: _of_several,
 }

@@ -109,8 +109,17 @@ def robot(client: TestClient) -> str:
     return "added"
 
 
+@pytest.fixture(scope="module")
+def log(client: TestClient) -> str:
+    """The id of a stored log."""
+    (_, _, body) = next(LOGS.bodies())
+    answer = client.post("/logs", content=body["value"], headers={"Content-Type": "text/csv"})
+    assert answer.status_code == 201, answer.text
+    return str(answer.json()["id"])
+
+
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in SLOW else n for n in BODIES])
-def test_body_is_answered(name: str, client: TestClient, study: str, robot: str) -> None:
+def test_body_is_answered(name: str, client: TestClient, study: str, robot: str, log: str) -> None:
     operation, media_type, example = BODIES[name]
     content, url = example["value"], operation.path.format(id=study, name=robot, format=name.split()[-1])
     if media_type == "text/csv":
@@ -118,7 +127,7 @@ def test_body_is_answered(name: str, client: TestClient, study: str, robot: str)
         query = re.search(r"\?\S+", example["summary"])
         url += query[0] if query else ""
     else:
-        content = json.dumps(content)
+        content = json.dumps(content | ({"logs": [log]} if "logs" in content else {}))
     answer = client.request(operation.method, url, content=content, headers={"Content-Type": media_type})
     assert answer.is_success, answer.text
     operation.check(answer)
@@ -173,13 +182,14 @@ def test_setting_of_a_log_is_answered(name: str, client: TestClient) -> None:
 @pytest.mark.parametrize(
     "operation", [own for own in OPERATIONS if own.parameters("header") and any(own.bodies())], ids=str
 )
-def test_headers_are_taken(operation: Operation, client: TestClient, study: str) -> None:
+def test_headers_are_taken(operation: Operation, client: TestClient, study: str, log: str) -> None:
     _, _, example = next(operation.bodies())
     url, headers = operation.path.format(id=study), operation.parameters("header")
     # a key is for one request
     headers = {
         name: f"{value} {url}".replace(" ", "_") if name == KEY_HEADER else value for name, value in headers.items()
     }
-    answer = client.request(operation.method, url, json=example["value"], headers=headers)
+    value = example["value"] | ({"logs": [log]} if "logs" in example["value"] else {})
+    answer = client.request(operation.method, url, json=value, headers=headers)
     assert answer.is_success, answer.text
     operation.check(answer)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
+from app.schemas.errors.identifications import NoPowerChannel, NotExcited, NothingHeldOut, UnknownIdentification
 from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
@@ -100,6 +101,10 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     UnknownLog,
     LogTooLarge,
     TooManyLogs,
+    UnknownIdentification,
+    NotExcited,
+    NothingHeldOut,
+    NoPowerChannel,
     EffortNotUsable,
     ExcitationInfeasible,
     UnknownFigures,
@@ -150,13 +155,16 @@ __all__ = [
     "MalformedHttp",
     "MethodNotAllowed",
     "NoCollisionFreeTrajectory",
+    "NoPowerChannel",
     "NoSequence",
     "NoTrajectory",
     "NotAcceptable",
     "NotCertified",
+    "NotExcited",
     "NotFound",
     "NotOwner",
     "NotReady",
+    "NothingHeldOut",
     "OutsideLimits",
     "PathInfeasible",
     "ProblemDetails",
@@ -176,6 +184,7 @@ __all__ = [
     "Unauthenticated",
     "UnknownAnswer",
     "UnknownFigures",
+    "UnknownIdentification",
     "UnknownJob",
     "UnknownLog",
     "UnknownRobot",

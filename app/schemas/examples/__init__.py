@@ -10,6 +10,7 @@ from app.schemas.examples.evaluate import CSV_EXAMPLES, EVALUATE_EXAMPLES
 from app.schemas.examples.excitation import EXCITATION_EXAMPLES
 from app.schemas.examples.export import EXPORT_EXAMPLES
 from app.schemas.examples.figures import FIGURES_EXAMPLES
+from app.schemas.examples.identifications import IDENTIFY_EXAMPLES
 from app.schemas.examples.ik import IK_EXAMPLES, IK_PATH_EXAMPLES
 from app.schemas.examples.jobs import NEW_JOB_EXAMPLES
 from app.schemas.examples.logs import LOG_EXAMPLES
@@ -31,6 +32,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
     "/excitation": {JSON: EXCITATION_EXAMPLES},
+    "/identifications": {JSON: IDENTIFY_EXAMPLES},
     "/logs": {CSV: LOG_EXAMPLES},
     "/robots": {JSON: NEW_ROBOT_EXAMPLES},
     "/robots/{name}": {JSON: PUT_EXAMPLES},

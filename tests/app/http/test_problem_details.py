@@ -16,6 +16,7 @@ from app.http.problem_details import TABLE, problem_content, problem_type
 from app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
 from optimizer import exceptions
 from optimizer.exceptions import JoulepathError
+from optimizer.identification import errors as identification_errors
 from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
@@ -37,6 +38,9 @@ ERRORS: list[JoulepathError] = [
     exceptions.LogTooLarge(1_000_000, "rows"),
     exceptions.ExcitationInfeasible("clearance"),
     exceptions.EffortNotUsable("Log motor currents.", "external", {"elbow_joint": 0.02, "shoulder_lift_joint": None}),
+    identification_errors.NotExcited(["coulomb", "viscous"]),
+    identification_errors.NothingHeldOut(1),
+    identification_errors.NoPowerChannel(),
     exceptions.StartInCollision([COLLIDING]),
     exceptions.GoalInCollision([COLLIDING, replace(COLLIDING, depth=0.01)]),
     exceptions.NoCollisionFreeTrajectory([CANDIDATE], HIT, "left/up/flip", "left/up/no_flip"),
@@ -49,6 +53,8 @@ ERRORS: list[JoulepathError] = [
 ]
 
 
+OURS = ("app.exceptions.", "optimizer.exceptions", "optimizer.identification.errors")
+"""Modules of errors."""
 SERVICE_ERRORS: list[ServiceError] = [
     service.InvalidRequest([{"loc": ["body", "start"], "msg": "Field required"}]),
     *(kind() for kind in (service.Busy, service.NotReady, service.ShuttingDown, service.WorkerDied)),
@@ -65,7 +71,7 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.UnsupportedCoding, service.NotAcceptable, service.MalformedHttp)),
     *(kind() for kind in (service.TooManyRequests, service.TooManyConnections, service.TooManyConnectionsOfClient)),
     *(kind() for kind in (service.TooManyBytes, service.TooManyBytesOfClient)),
-    *(service.UnknownLog(), service.TooManyLogs(1 << 30)),
+    *(service.UnknownLog(), service.UnknownIdentification(), service.TooManyLogs(1 << 30)),
     *(service.HeadTooLarge(32_768), service.RequestTimeout(10.0)),
     *(kind() for kind in (service.TooManyWaiting, service.UnknownJob)),
     service.PartsNeeded(["/answers/7b5f3a52"]),
@@ -124,4 +130,4 @@ def test_an_unknown_distance_is_null() -> None:
 
 
 def test_every_exception_of_the_table_is_an_error_of_ours() -> None:
-    assert all(kind.__module__.startswith(("app.exceptions.", "optimizer.exceptions")) for kind in TABLE)
+    assert all(kind.__module__.startswith(OURS) for kind in TABLE)

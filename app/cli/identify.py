@@ -1,0 +1,118 @@
+"""`joulepath identify`."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+from typing import Any
+
+import click
+
+from app.cli import terminal
+from app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
+
+_GZIP = b"\x1f\x8b"
+# a stand-in for the ids of stored logs: the command's are files
+_FILE_ID = "file"
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  joulepath identify monday.csv --robot ur10e
+  joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json"""
+)
+@click.argument("logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@OUTPUT
+@click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
+@click.option(
+    "--validate",
+    "others",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a third of the motions.",
+)
+@click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
+@click.option("--estimator", type=click.Choice(["wls", "irls", "ols"]), default="wls", help="irls: against outliers.")
+@click.option("--payload", type=click.FloatRange(0), help="Mass at the flange [kg]. Default: what the logs say.")
+@click.option("--com", type=(float, float, float), default=(0.0, 0.0, 0.0), help="Its centre of mass [m].")
+@click.option("--units", type=click.Choice(["rad", "deg"]), default="rad", help="Units of all joint columns.")
+@click.option("--effort", type=click.Choice(["auto", "current", "torque"]), default="auto", help="What efforts are.")
+def identify(
+    logs: tuple[Path, ...],
+    output: Path | None,
+    robot: str,
+    others: tuple[Path, ...],
+    refit: bool,
+    estimator: str,
+    payload: float | None,
+    com: tuple[float, float, float],
+    units: str,
+    effort: str,
+) -> None:
+    """Finds friction, rotor inertia and power of one arm from its LOGS, with their standard deviations.
+
+    LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
+    is the `result` of `GET /identifications/{id}`; its `figures` can be sent to `PUT /figures`.
+    """
+    from app.schemas.identifications import IdentifyRequest
+    from app.schemas.logs import LogSettings
+
+    request_id = new_id()
+    carried = None if payload is None else {"mass": payload, "com": list(com)}
+    settings: dict[str, Any] = {"robot": robot, "payload": carried, "units": units, "effort": effort}
+    files = [*logs, *others]
+    read = tuple(
+        (_settings_of(LogSettings, settings | {"name": file.stem[:80]}, request_id), _packed(file)) for file in files
+    )
+    body: dict[str, Any] = {"logs": [_FILE_ID] * len(logs), "estimator": estimator}
+    body |= {"inertials": "refit"} if refit else {}
+    body |= {"validate": [_FILE_ID] * len(others)} if others else {}
+    asked = validated(IdentifyRequest, _json(body), request_id)
+    with terminal.progress(f"Identifying from {len(logs)} logs"):
+        answer = _answered(asked, read, request_id)
+    write(answer, output)
+    terminal.summary(lambda: summary_of(parsed(answer)))
+
+
+def _answered(asked: Any, read: Any, request_id: str) -> bytes:
+    from app.tasks.identify import IdentifyTask
+
+    return answered(IdentifyTask(asked, read, request_id), asked.deadline, request_id)
+
+
+def _settings_of(model: Any, fields: dict[str, Any], request_id: str) -> dict[str, Any]:
+    """Checked settings of a log, as they are stored."""
+    found: dict[str, Any] = validated(model, _json(fields), request_id).model_dump(mode="json")
+    return found
+
+
+def _json(content: dict[str, Any]) -> bytes:
+    import orjson
+
+    return orjson.dumps(content)
+
+
+def _packed(file: Path) -> bytes:
+    body = file.read_bytes()
+    return body if body.startswith(_GZIP) else gzip.compress(body, compresslevel=1)
+
+
+def summary_of(result: dict[str, Any]) -> dict[str, str]:
+    """The lines of the summary by their titles."""
+    fitted, own = result["validation"]["fitted"], result["validation"]["own"]
+    told = [each for each in result["parameters"] if each["identified"]]
+    lines = {"identified": f"{len(told)} of {len(result['parameters'])} figures"}
+    lines["validated on"] = f"{result['validation']['moves']} moves that no fit has seen"
+    if fitted["torque"] is not None:
+        lines["torque"] = f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own figures"
+    if fitted["power"] is not None:
+        lines["energy of a move"] = (
+            f"{fitted['power']['energy_mean']:.2g} % error, {own['power']['energy_mean']:.2g} % with the robot's own"
+        )
+    return lines
+
+
+def _percent(torque: dict[str, Any]) -> str:
+    """The joints' relative errors."""
+    return "/".join("-" if each is None else f"{each:.2g}" for each in torque["relative"]) + " %"

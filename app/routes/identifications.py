@@ -1,0 +1,106 @@
+"""POST /identifications, GET /identifications/{id}."""
+
+from __future__ import annotations
+
+import zlib
+from functools import partial
+from typing import Annotated, Any
+
+import orjson
+from fastapi import APIRouter, Path, Request, Response
+from sqlalchemy.orm import Session
+
+from app.exceptions import InvalidRequest, UnknownIdentification, UnknownJob
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceClient, ServiceJobs, ServiceStore
+from app.routes.later import deadlines
+from app.routes.parameters import CREATED_HEADERS, Key, set_location
+from app.schemas import errors as problems
+from app.schemas.examples.values import IDENTIFICATION_ID
+from app.schemas.identifications import Identification, IdentifyRequest
+from app.store import jobs as stored_jobs
+from app.store import logs as stored_logs
+from app.store.tables import JobRequest
+from app.tasks.job_body import job_of_one
+from app.tasks.job_request import IDENTIFY
+
+router = APIRouter(prefix="/identifications", tags=["logs"])
+
+IdentificationId = Annotated[str, Path(description="The identification's id.", examples=[IDENTIFICATION_ID])]
+_STATES = {"waiting": "queued"}
+
+
+@router.post(
+    "",
+    summary="Identify an arm's own figures from logs",
+    status_code=202,
+    response_model=Identification,
+    responses={
+        202: {"headers": CREATED_HEADERS},
+        **problem_responses(
+            problems.Validation,
+            problems.UnknownLog,
+            problems.KeyReused,
+            problems.Busy,
+            problems.StoreUnavailable,
+        ),
+    },
+)
+async def add(
+    request: Request,
+    response: Response,
+    body: IdentifyRequest,
+    jobs: ServiceJobs,
+    store: ServiceStore,
+    client: ServiceClient,
+    key: Key = None,
+) -> Identification:
+    """Finds friction, rotor inertia and power of one arm from its logs, and says how well they predict moves that no
+    fit has seen. The work is a job, whose id is the identification's: `GET /jobs/{id}` knows it, too."""
+    robots = set()
+    for each in body.all_logs:
+        robots.add((await store.read(partial(stored_logs.about, log_id=each))).robot)
+    if len(robots) > 1:
+        raise InvalidRequest([{"loc": ["body", "logs"], "msg": "All logs must be of one robot."}])
+    job_id, again = await jobs.create(job_of_one(IDENTIFY, body, deadlines(jobs.settings)), key, client.owner)
+    set_location(request, response, f"/identifications/{job_id}", again)
+    return await _shown(store, job_id)
+
+
+@router.get(
+    "/{id}",
+    summary="An identification",
+    response_model=Identification,
+    responses=problem_responses(problems.UnknownIdentification, problems.StoreUnavailable),
+)
+async def show(id: IdentificationId, store: ServiceStore) -> Identification:
+    """The state of an identification and, once it is done, what was found."""
+    return await _shown(store, id)
+
+
+async def _shown(store: ServiceStore, job_id: str) -> Identification:
+    content = await store.read(partial(_content, job_id=job_id))
+    return Identification.model_validate_json(orjson.dumps(content))
+
+
+def _content(session: Session, job_id: str) -> dict[str, Any]:
+    """The fields of an identification. Raises UnknownIdentification."""
+    try:
+        job = stored_jobs.view(session, job_id).job
+        request, body = stored_jobs.outcome(session, job_id, 0)
+    except UnknownJob:
+        raise UnknownIdentification from None
+    if request.kind != IDENTIFY:
+        raise UnknownIdentification
+    return {
+        "id": job.id,
+        "state": _state(request),
+        "created": job.created,
+        "owner": job.owner,
+        "problem": request.problem,
+        "result": None if body is None else orjson.Fragment(zlib.decompress(body)),
+    }
+
+
+def _state(request: JobRequest) -> str:
+    return _STATES.get(request.state, request.state)

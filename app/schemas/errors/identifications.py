@@ -1,0 +1,46 @@
+"""Types of error about identifications. A docstring is the text of the type's page."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from app.schemas.common import described
+from app.schemas.errors.problem_details import ProblemDetails, fixed
+
+
+class NotExcited(ProblemDetails):
+    """Nothing that was asked for can be identified from the logs. Log motions in which every joint moves, at several
+    speeds and in both directions, with motor currents or the power of the arm's bus."""
+
+    type: Literal["/problems/not-excited"] = fixed("type", "/problems/not-excited")
+    title: Literal["Not excited"] = fixed("title", "Not excited")
+    status: Literal[422] = fixed("status", 422)
+    parameters: list[str] = described("What cannot be identified.", None, ["coulomb", "viscous"])
+
+
+class NothingHeldOut(ProblemDetails):
+    """The logs have fewer than two different motions, so that no move can be held out for the validation. A motion and
+    its repetitions, in either direction, count as one. Log more motions, or name other logs in `validate`."""
+
+    type: Literal["/problems/nothing-held-out"] = fixed("type", "/problems/nothing-held-out")
+    title: Literal["Nothing held out"] = fixed("title", "Nothing held out")
+    status: Literal[422] = fixed("status", 422)
+    moves: int = described("Number of moves in the logs.", "1", 1)
+
+
+class NoPowerChannel(ProblemDetails):
+    """Power is to be identified, and no log has the power of the arm's bus. Log `actual_robot_voltage` and
+    `actual_robot_current`, or a column `P`. Joint currents are not taken for it: they are no DC currents."""
+
+    type: Literal["/problems/no-power-channel"] = fixed("type", "/problems/no-power-channel")
+    title: Literal["No power channel"] = fixed("title", "No power channel")
+    status: Literal[422] = fixed("status", 422)
+
+
+class UnknownIdentification(ProblemDetails):
+    """No identification has this id. It never existed, or it was deleted: an identification is a job, which is kept as
+    long as `JOULEPATH_ANSWERS_MAX_AGE` says."""
+
+    type: Literal["/problems/unknown-identification"] = fixed("type", "/problems/unknown-identification")
+    title: Literal["Unknown identification"] = fixed("title", "Unknown identification")
+    status: Literal[404] = fixed("status", 404)

@@ -1,0 +1,19 @@
+"""Examples of POST /identifications."""
+
+from __future__ import annotations
+
+from fastapi.openapi.models import Example
+
+from app.schemas.examples.values import LOG_ID
+
+IDENTIFY_EXAMPLES: dict[str, Example] = {
+    "friction_and_power": {
+        "summary": "Friction, rotors and power from one log",
+        "description": "A third of the motions is held out, and says how well the figures predict.",
+        "value": {"logs": [LOG_ID]},
+    },
+    "robust_refit": {
+        "summary": "With the links' inertials, and outliers that count less",
+        "value": {"logs": [LOG_ID], "inertials": "refit", "estimator": "irls", "validate": "moves"},
+    },
+}

@@ -1,0 +1,217 @@
+"""What POST /identifications and GET /identifications/{id} take and answer."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from app.schemas.common import Request, Response, described, part
+from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
+
+MOST_LOGS = 32
+Target = Literal["friction", "rotor", "power"]
+Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
+LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
+DEADLINE = 60.0
+
+
+class Fraction(Request):
+    """The part of the moves that is held out."""
+
+    fraction: float = described(
+        "Fraction of the moving time; whole motions are held out.", "1", 0.3, default=0.3, ge=0.05, le=0.8
+    )
+
+
+class FrictionTerms(Request):
+    """The friction law that is fitted."""
+
+    terms: Annotated[list[Term], Field(min_length=1, max_length=5)] = described(
+        "Terms of the law. `curved` is the concave rise of strain-wave gears, at the speed that fits best.",
+        None,
+        ["coulomb", "viscous", "load", "offset"],
+        default=["coulomb", "viscous", "load", "offset"],
+    )
+    knee: float | None = described(
+        "Speed over which Coulomb friction reverses. Null: the robot's own.",
+        "rad/s",
+        0.001,
+        default=None,
+        ge=1e-6,
+        le=1,
+    )
+
+
+class IdentifyRequest(Request):
+    """Logs of one robot, and what is to be found from them."""
+
+    logs: LogIds = described("Ids of logs, all of one robot.", None, [LOG_ID])
+    validate_: LogIds | Fraction | Literal["moves"] = described(
+        "What the figures are validated on, which no fit sees: other logs, a fraction of the moves, or `moves`: each "
+        "motion in its turn. Moves along the same motion stay together.",
+        None,
+        {"fraction": 0.3},
+        default=Fraction(),
+        alias="validate",
+    )
+    fit: Annotated[list[Target], Field(min_length=1, max_length=3)] = described(
+        "What is found. Power is added by itself where the logs have it; asking for it refuses logs without.",
+        None,
+        ["friction", "rotor"],
+        default=["friction", "rotor"],
+    )
+    inertials: Literal["keep", "refit"] = described(
+        "`keep`: the robot's own. `refit`: they are found, too, as those of real bodies near the robot's own.",
+        None,
+        "keep",
+        default="keep",
+    )
+    friction: FrictionTerms = Field(description="The friction law that is fitted.", default=FrictionTerms())
+    estimator: Literal["wls", "irls", "ols"] = described(
+        "Weighted, reweighted (outliers count less) or ordinary least squares.", None, "wls", default="wls"
+    )
+    velocity_threshold: float = described(
+        "Slower samples of a joint do not count for its friction.", "rad/s", 0.02, default=0.02, ge=0.0, le=10.0
+    )
+    prior_weight: float = described(
+        "Weight of the robot's own inertials where they are refitted.", "1", 1.0, default=1.0, ge=1e-6, le=1e6
+    )
+    deadline: float = described("Longest time of the fit.", "s", DEADLINE, default=DEADLINE, gt=0, le=3600)
+
+    @property
+    def all_logs(self) -> list[str]:
+        """Ids of the logs of the fit, then of those of the validation."""
+        return [*self.logs, *(self.validate_ if isinstance(self.validate_, list) else [])]
+
+
+class IdentifiedParameter(Response):
+    """A figure of a joint or of the whole arm."""
+
+    figure: str = described("Its name, as in `GET /robots/{name}`.", None, "coulomb")
+    joint: int | None = described("Number of the joint, from 0; null: of the whole arm.", "1", 1)
+    value: float = described("The value that is used.", "SI", 7.1)
+    sd: float = described("Its standard deviation.", "SI", 0.2)
+    previous: float = described("The robot's own value.", "SI", 6.5)
+    identified: bool = described("Whether the logs tell it.", None, True)
+    why: str = described("Why not; empty if they do.", None, "")
+
+
+class TorqueErrors(Response):
+    """Errors of predicted torques on held-out moves. Arrays are over joints; null where nothing moved."""
+
+    rmse: list[float] = described("Root mean square while the joint moves.", "N·m", [0.7, 0.8, 0.4, 0.2, 0.2, 0.1])
+    relative: list[float | None] = described(
+        "Size of the error over that of the torque, while the joint moves.", "%", [6.7, 1.4, 1.5, 2.9, 5.7, 5.6]
+    )
+    relative_all: list[float | None] = described("The same over all rows.", "%", [8.0, 2.0, 1.9, 4.0, 25.0, 49.0])
+    shaft_energy: float | None = described("Error of the energy at the shafts.", "%", 2.7)
+    copper_energy: float | None = described("Error of the energy lost in copper.", "%", 1.1)
+
+
+class PowerErrors(Response):
+    """Errors of predicted power on held-out moves."""
+
+    rmse: float = described("Root mean square while the arm moves.", "W", 1.8)
+    energy_mean: float = described("Mean error of the energy of a move.", "%", 1.2)
+    energy_p90: float = described("90th percentile of it.", "%", 2.2)
+    energy_max: float = described("Greatest of it.", "%", 2.8)
+
+
+class Prediction(Response):
+    """Errors of one set of figures."""
+
+    torque: TorqueErrors | None = part("Of torques; null without efforts.")
+    power: PowerErrors | None = part("Of power; null without power.")
+
+
+class Validation(Response):
+    """How figures predict moves that their fit has not seen."""
+
+    moves: int = described("Number of these moves.", "1", 6)
+    fitted: Prediction = part("The identified figures.")
+    own: Prediction = part("The robot's own figures.")
+    constant: PowerErrors | None = part("A constant power; null without power.")
+    coverage: float | None = described("Share of the energies between their P5 and P95.", "1", 0.95)
+    half_width: float | None = described("Half of P5 to P95, on average.", "%", 2.0)
+
+
+class Structure(Response):
+    """What the torques of the links depend on."""
+
+    standard: int = described("Number of parameters of bodies and rotors.", "1", 66)
+    base: int = described("Number of their combinations that matter.", "1", 40)
+    base_expressions: list[str] = described("These combinations.", None, ["Izz1 +1·Ia1"])
+    condition: float | None = described(
+        "Condition number of their columns in these logs, each scaled to length 1; null without a refit.", "1", 33.0
+    )
+    excited: int | None = described("How many of them the logs excite; null without a refit.", "1", 40)
+
+
+class Physical(Response):
+    """Whether refitted links are real bodies."""
+
+    consistent: bool = described("Whether all of them are.", None, True)
+    min_eigenvalue: list[float] = described("Least eigenvalue of each link's pseudo-inertia.", "SI", [0.01, 0.002])
+
+
+class Residuals(Response):
+    """What the fit leaves over."""
+
+    torque_lag_one: list[float | None] = described(
+        "Correlation of neighbouring residuals of each joint's torque.", "1", [0.8, 0.9, 0.9, 0.7, 0.7, 0.6]
+    )
+    power_lag_one: float | None = described("The same of the power; null without power.", "1", 0.1)
+    white: bool = described("Whether all of them are below 0.3.", None, False)
+    sessions: list[float] = described("Size of each log's friction relative to the fit's.", "1", [0.98, 1.02])
+
+
+class Temperatures(Response):
+    """Friction over temperature: friction(T) = friction(T0)·exp(-k (T - T0)). Arrays are over joints."""
+
+    reference: list[float | None] = described("T0, the mean of the logs [°C]; null if not logged.", None, [34.4, 35.7])
+    span: list[float | None] = described("Greatest less least temperature of the logs.", "K", [0.1, 0.1])
+    k: list[float | None] = described("k; null where the logs span less than 8 K.", "1/K", [None, 0.011])
+    sd: list[float | None] = described("Its standard deviation.", "1/K", [None, 0.001])
+
+
+class Advice(Response):
+    """What would help most."""
+
+    figure: str = described("The figure whose error has the largest share of the energy's variance.", None, "copper")
+    joint: int | None = described("Its joint, from 0; null: of the whole arm.", "1", 1)
+    share: float = described("This share.", "1", 0.4)
+    do: str = described("What to log. Four times as many such moves halve its standard deviation.", None, "Log rests.")
+
+
+class Identification(Response):
+    """An identification: its state and, once it is done, what was found."""
+
+    id: str = described("Its id.", None, IDENTIFICATION_ID)
+    state: Literal["queued", "running", "done", "failed", "cancelled"] = described("Its state.", None, "done")
+    created: datetime = described("Time at which it was sent, in UTC.", None, CREATED)
+    owner: str | None = described("Name of the API key that sent it; null without one.", None, "press_shop")
+    problem: dict[str, Any] | None = described(
+        "Why it failed (RFC 9457); null otherwise.", None, {"type": "/problems/not-excited", "status": 422}
+    )
+    result: IdentificationResult | None = part("What was found; null before it is done.")
+
+
+class IdentificationResult(Response):
+    """What was found from logs."""
+
+    robot: str = described("Name of the robot.", None, "ur5e")
+    figures: dict[str, Any] = described(
+        "The identified figures in the form of the robot's own: value, unit, source, trust, `sd`; `covariance`, "
+        "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power of a move).",
+        None,
+        {"robot": "ur5e", "electronics": {"idle_power": {"value": 36.4, "unit": "W", "sd": 0.3}}},
+    )
+    parameters: list[IdentifiedParameter] = part("Every figure that was sought.")
+    structure: Structure = part("What the torques of the links depend on.")
+    physical: Physical | None = part("Whether refitted links are real bodies; null if they are kept.")
+    validation: Validation = part("Errors on moves that the fit has not seen.")
+    residuals: Residuals = part("What the fit leaves over.")
+    temperatures: Temperatures = part("Friction over temperature.")
+    advice: Advice | None = part("What would help most; null if nothing is known of it.")

@@ -1,0 +1,43 @@
+"""POST /identifications in a worker: fits the figures of an arm to stored logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from app.convert.arm import robot_named
+from app.convert.fields import location
+from app.convert.identification import identification_fields, to_options
+from app.convert.logs import stored_log
+from app.engine.result import TaskResult
+from app.exceptions import InvalidRequest
+from app.schemas.identifications import IdentifyRequest
+from optimizer.exceptions import InvalidProblem
+from optimizer.identification.identify import fit
+
+Stored = tuple[dict[str, Any], bytes]
+"""Settings and packed file of a log."""
+
+
+@dataclass(frozen=True)
+class IdentifyTask:
+    """A validated request, and the logs that it names: those of the fit, then those of the validation."""
+
+    request: IdentifyRequest
+    logs: tuple[Stored, ...]
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """What was found. `deadline` is not watched: whoever runs the task ends it.
+
+        Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel or InvalidRequest.
+        """
+        logs = [stored_log(settings, body) for settings, body in self.logs]
+        count, robot = len(self.request.logs), robot_named(logs[0].robot)
+        try:
+            found = fit(robot, logs[:count], to_options(self.request))
+            others = found.validate(logs[count:]) if logs[count:] else found.validation
+        except InvalidProblem as error:
+            raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None
+        assert others is not None
+        return TaskResult.of_json(identification_fields(found, others))

@@ -1,0 +1,216 @@
+"""Identification on real logs and on simulated arms, against its gates. The exit code is 1 if one is missed.
+
+    JOULEPATH_TEST_DATA=FOLDER python -m benchmarks.identification
+    python -m benchmarks.identification --only structure synthetic time --runs 200
+
+- `structure`: numbers of base parameters, without and with rotors.
+- `ur3e`: power from motion alone. Each motion is left out with its reverse and predicted; then five random moves at a
+  time predict the rest of the log.
+- `tx40`: friction against published values from the same log, and each half of the log predicted from the other.
+- `synthetic`: simulated UR10e with known figures: how many figures lie within three standard deviations, and how many
+  energies of moves that no fit has seen between P5 and P95.
+- `time`: of a fit to 30 s of log on one core.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.command import on_one_core, parser, write_json
+from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
+from models.registry import load_robot
+from models.robot import Robot
+from optimizer.identification.base_fit import BaseFit, base_arm, fit_base
+from optimizer.identification.base_parameters import base_parameters
+from optimizer.identification.clusters import clusters_of
+from optimizer.identification.fit_rows import Rows, rows_of
+from optimizer.identification.fitting import fit_rows
+from optimizer.identification.grouped import P95
+from optimizer.identification.identify import fit
+from optimizer.identification.interval import energy_sd, spread_of
+from optimizer.identification.options import Options
+from optimizer.identification.validation import power_errors
+from tests.identification_logs import recorded, truth_of
+
+DRAWS = 100
+MOVES_OF_A_DRAW = 5
+TX40_OPTIONS = Options(terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), held_out=0.0)
+
+
+@dataclass(frozen=True)
+class Gate:
+    """A measured figure and the range it must lie in."""
+
+    what: str
+    value: float
+    least: float
+    most: float
+
+    @property
+    def kept(self) -> bool:
+        """Whether it does."""
+        return self.least <= self.value <= self.most
+
+
+def structure(_: Path | None, __: int) -> list[Gate]:
+    """Numbers of base parameters."""
+    found = list[Gate]()
+    for name, counts in (("ur10e", (36, 40)), ("ur5e", (36, 40)), ("panda", (43, 48))):
+        for rotors, count in zip((False, True), counts, strict=True):
+            value = base_parameters(load_robot(name).model, rotors).count
+            found.append(Gate(f"{name}: base parameters{' with rotors' * rotors}", value, count, count))
+    return found
+
+
+def ur3e_power(place: Path | None, _: int) -> list[Gate]:
+    """Power of the UR3e from its motion."""
+    assert place is not None
+    robot, log = ur3e(place)
+    rows = rows_of(robot, [replace(log, effort=None, effort_meaning=None)])
+    options = Options(held_out=0.0)
+    predicted, inside, half = np.full(len(rows.power), np.nan), list[bool](), list[float]()
+    for group in rows.groups:
+        out = rows.group == group
+        blind = fit_rows(robot, rows.take(~out), options)
+        predicted[out] = blind.arm.power(rows.take(out))[0]
+        spread = replace(spread_of(blind, rows.take(~out)), session=0.0)
+        for move in np.unique(rows.move[out & ~rows.rest]):
+            part = rows.take((rows.move == move) & ~rows.rest)
+            energy, sd = energy_sd(blind, spread, part)
+            inside.append(abs(float(part.weight @ part.power) - energy) <= P95 * sd)
+            half.append(100 * P95 * sd / energy)
+    errors = power_errors([(rows, predicted)])
+    return [
+        Gate("ur3e, left out with its reverse: RMSE [W]", errors.rmse, 0.0, 2.0),
+        Gate("ur3e, same: mean error of energy [%]", errors.energy_mean, 0.0, 1.3),
+        Gate("ur3e, same: greatest error of energy [%]", errors.energy_max, 0.0, 4.0),
+        Gate("ur3e, same: share between P5 and P95", float(np.mean(inside)), 0.85, 1.0),
+        Gate("ur3e, same: half of P5 to P95 [%]", float(np.mean(half)), 0.0, 2.5),
+        Gate("ur3e, five moves: P90 of the error of the rest's energy [%]", _draws(robot, rows, options), 0.0, 1.5),
+    ]
+
+
+def _draws(robot: Robot, rows: Rows, options: Options) -> float:
+    """P90 [%] of the error of the energy of all other motions, predicted from five moves at random."""
+    random, errors = np.random.default_rng(0), list[float]()
+    moves = np.unique(rows.move)
+    for _ in range(DRAWS):
+        seen = np.isin(rows.move, random.choice(moves, MOVES_OF_A_DRAW, replace=False))
+        rest = rows.take(~np.isin(rows.group, rows.group[seen]))
+        blind = fit_rows(robot, rows.take(seen), options)
+        errors.append(float(rest.weight @ blind.arm.power(rest)[0] / (rest.weight @ rest.power)) - 1)
+    return 100 * float(np.percentile(np.abs(errors), 90))
+
+
+def tx40_torque(place: Path | None, _: int) -> list[Gate]:
+    """Friction and torques of the TX40."""
+    assert place is not None
+    robot, log = tx40(place)
+    rows = rows_of(robot, [log], regressor=True)
+    near = agreeing(base_of(robot, rows), tx40_reference(place))
+    found = [Gate("tx40: published friction figures met, of 13", near, 12, 13)]
+    first = np.arange(len(rows.q)) < len(rows.q) // 2
+    for name, half in (("first", first), ("second", ~first)):
+        fitted = base_of(robot, rows.take(half))
+        other = base_arm(robot, rows.take(~half), rows.effort[~half], clusters_of(rows.take(~half)), TX40_OPTIONS)
+        error = other.values - fitted.torque(other)
+        for joint, most in enumerate((10.0, 8.0, 13.0, 12.0, 22.0, 20.0)):
+            of = other.block.joint == joint
+            relative = 100 * float(np.linalg.norm(error[of]) / np.linalg.norm(other.values[of]))
+            found.append(Gate(f"tx40, {name} half predicts the other: J{joint + 1} [%]", relative, 0.0, most))
+    return found
+
+
+def base_of(robot: Robot, rows: Rows) -> BaseFit:
+    """The base fit of rows with torques."""
+    clusters = clusters_of(rows)
+    arm = base_arm(robot, rows, rows.effort, clusters, TX40_OPTIONS)
+    return fit_base(robot, arm, clusters, TX40_OPTIONS)
+
+
+def agreeing(fitted: BaseFit, reference: dict[str, tuple[float, float]]) -> int:
+    """How many published friction figures with a standard deviation below 5 % are met within 3 of them, or 3 %.
+
+    The published terms of joints 5 and 6 have the coupling's viscous friction in them.
+    """
+    values = dict(zip(fitted.names, fitted.value.tolist(), strict=True))
+    shared = values["coupling.viscous", 0]
+    ours = {"fvm6": shared, "fsm6": values["coupling.coulomb", 0]}
+    for joint in range(6):
+        ours[f"fv{joint + 1}"] = values["viscous", joint] + (shared if joint >= 4 else 0.0)
+        ours[f"fs{joint + 1}"] = values["coulomb", joint]
+    told = [name for name in ours if reference[name][1] < 0.05 * abs(reference[name][0])]
+    return sum(abs(ours[n] - reference[n][0]) <= max(3 * reference[n][1], 0.03 * abs(reference[n][0])) for n in told)
+
+
+def synthetic(_: Path | None, runs: int) -> list[Gate]:
+    """Simulated arms with known figures."""
+    robot, within, shares = load_robot("ur10e"), list[bool](), list[float]()
+    for seed in range(runs):
+        truth = truth_of(robot, seed)
+        found = fit(robot, [recorded(robot, truth, moves=14, seed=seed).log()])
+        assert found.validation is not None and found.validation.coverage is not None
+        shares.append(found.validation.coverage)
+        for each in found.parameters:
+            if each.identified:
+                true = truth.idle_power if each.joint is None else getattr(truth, each.figure)[each.joint]
+                within.append(abs(each.value - float(true)) <= 3 * each.sd)
+    return [
+        Gate(f"synthetic, {runs} runs: figures within 3 standard deviations", float(np.mean(within)), 0.95, 1.0),
+        Gate(f"synthetic, {runs} runs: share between P5 and P95", float(np.mean(shares)), 0.85, 0.95),
+    ]
+
+
+def times(_: Path | None, __: int) -> list[Gate]:
+    """Seconds of a fit to 30 s of log, with its validation; the least of three."""
+    robot = load_robot("ur10e")
+    log = recorded(robot, truth_of(robot), moves=10).log()
+    found = list[Gate]()
+    for what, options, most in (("without", Options(), 1.0), ("with", Options(refit=True), 3.0)):
+        spent = list[float]()
+        for _repeat in range(3):
+            start = time.perf_counter()
+            fit(robot, [log], options)
+            spent.append(time.perf_counter() - start)
+        found.append(Gate(f"fit of {log.duration:.0f} s of log {what} inertials [s]", min(spent), 0.0, most))
+    return found
+
+
+PARTS: dict[str, Callable[[Path | None, int], list[Gate]]] = {
+    "structure": structure,
+    "ur3e": ur3e_power,
+    "tx40": tx40_torque,
+    "synthetic": synthetic,
+    "time": times,
+}
+OF_LOGS = ("ur3e", "tx40")
+
+
+def main() -> int:
+    """Prints every gate. Returns 1 if one is missed."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="parts (all)")
+    arguments.add_argument("--runs", type=int, default=20, help="simulated arms (%(default)s)")
+    given, place = arguments.parse_args(), folder()
+    on_one_core()
+    gates = list[Gate]()
+    for part in given.only:
+        if part in OF_LOGS and place is None:
+            print(f"{part}: left out. {MISSING}")
+            continue
+        for gate in PARTS[part](place, given.runs):
+            gates.append(gate)
+            limits = f"{gate.least:g} to {gate.most:g}"
+            print(f"{'kept  ' if gate.kept else 'MISSED'}  {gate.what}: {gate.value:.4g} ({limits})", flush=True)
+    write_json(given.json, {"gates": [gate.__dict__ | {"kept": gate.kept} for gate in gates]})
+    return 0 if all(gate.kept for gate in gates) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

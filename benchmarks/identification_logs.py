@@ -1,0 +1,69 @@
+"""Real logs of two arms, from the folder that the environment variable JOULEPATH_TEST_DATA names."""
+
+from __future__ import annotations
+
+import csv
+import os
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from models.own_arm.description import Description
+from models.own_arm.figures import own_figures
+from models.own_arm.robots import own_robot
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer.identification.log import Log
+from optimizer.identification.options import Coupling
+from optimizer.identification.reading import read_log
+
+PLACE = "JOULEPATH_TEST_DATA"
+MISSING = f"{PLACE} does not name the folder of the real logs."
+
+# Stäubli TX40: motor turns per joint turn, of which the last motor is driven through joint 5, too; and its rate [Hz]
+RATIOS = (32.0, 32.0, 45.0, -48.0, 45.0, 32.0)
+TX40_RATE = 5000.0
+# rad; of joints 2 and 3 where the motors' positions are 0
+ZEROS = np.array([0.0, -np.pi / 2, np.pi / 2, 0.0, 0.0, 0.0])
+WRIST = Coupling(np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0]))
+
+
+def folder() -> Path | None:
+    """The folder of the real logs; None if there is none."""
+    place = Path(os.environ.get(PLACE, "")) / "logs"
+    return place if os.environ.get(PLACE) and place.is_dir() else _directly(os.environ.get(PLACE))
+
+
+def _directly(place: str | None) -> Path | None:
+    return Path(place) if place and (Path(place) / "ur3e_rad").is_dir() else None
+
+
+def ur3e(place: Path) -> tuple[Robot, Log]:
+    """A UR3e at 25 Hz over 19 moves, with currents and the power of its bus."""
+    robot = load_robot("ur3e")
+    return robot, read_log(place / "ur3e_rad" / "ur3e_power.csv", robot, name="ur3e")
+
+
+def tx40(place: Path) -> tuple[Robot, Log]:
+    """A TX40 at 5 kHz over 9 s: positions and torques of the motors, turned into those of the joints."""
+    files = place / "staubli_tx40"
+    urdf = (files / "tx40.urdf").read_text()
+    figures, _ = own_figures("tx40", Description(urdf=urdf, tip="tool0", acceleration=20.0, payload=2.0))
+    robot = own_robot("tx40", figures)
+    motors, torques = (np.loadtxt(files / name, delimiter=",", skiprows=1) for name in ("pos.csv", "curr.csv"))
+    turns = np.diag(RATIOS)
+    turns[5, 4] = RATIOS[5]
+    q = np.linalg.solve(turns, motors.T).T + ZEROS
+    table = np.column_stack([np.arange(len(q)) / TX40_RATE, q, torques @ turns])
+    text = StringIO()
+    text.write(",".join(["t", *(f"{part}{k}" for part in ("q", "tau") for k in range(1, 7))]) + "\n")
+    np.savetxt(text, table, delimiter=",", fmt="%.9g")
+    return robot, read_log(text.getvalue().encode(), robot, effort="torque", name="tx40")
+
+
+def tx40_reference(place: Path) -> dict[str, tuple[float, float]]:
+    """Published base parameters of this log by weighted least squares: value and standard deviation."""
+    with (place / "staubli_tx40" / "bp5.csv").open() as file:
+        found: dict[str, Array] = {row[0]: np.array(row[1:], dtype=float) for row in csv.reader(file)}
+    return {name: (float(row[2]), abs(float(row[2] * row[3] / 100))) for name, row in found.items()}

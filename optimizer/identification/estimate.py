@@ -1,0 +1,56 @@
+"""Estimates of figures, and how well they are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.identification.grouped import jackknife
+
+Name = tuple[str, int | None]
+"""A figure, and the number of the joint from 0; None for a figure of the whole arm."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Values (p,) of the figures `names`, and their values (G, p) with each cluster of moves left out.
+
+    `drift` (p, p) is the covariance that an assumption before the fit adds. `why` (p,) says why the robot's own value
+    was kept, or is empty for a figure that was found.
+    """
+
+    names: tuple[Name, ...]
+    value: Array
+    replicates: Array
+    why: tuple[str, ...]
+    drift: Array
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance (p, p) of the values."""
+        return jackknife(self.replicates) + self.drift
+
+    def of(self, figure: str, nq: int) -> tuple[Array, Array]:
+        """Values (nq,) of a figure over joints, NaN for joints without, and (G, nq) with each cluster left out."""
+        value, replicates = np.full(nq, np.nan), np.full((len(self.replicates), nq), np.nan)
+        for k, (name, joint) in enumerate(self.names):
+            if name == figure and joint is not None:
+                value[joint], replicates[:, joint] = self.value[k], self.replicates[:, k]
+        return value, replicates
+
+
+def joined(estimates: list[Estimate]) -> Estimate:
+    """Several estimates from the same clusters as one."""
+    sizes = np.cumsum([0, *(len(each.names) for each in estimates)])
+    drift = np.zeros((sizes[-1], sizes[-1]))
+    for each, start, end in zip(estimates, sizes[:-1], sizes[1:], strict=True):
+        drift[start:end, start:end] = each.drift
+    return Estimate(
+        names=tuple(name for each in estimates for name in each.names),
+        value=np.concatenate([each.value for each in estimates]),
+        replicates=np.hstack([each.replicates for each in estimates]),
+        why=tuple(why for each in estimates for why in each.why),
+        drift=drift,
+    )

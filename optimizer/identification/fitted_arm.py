@@ -1,0 +1,115 @@
+"""An arm with fitted figures: its torques and its power on rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Array, Robot
+from optimizer.identification.block import COUPLED
+from optimizer.identification.estimate import Name
+from optimizer.identification.fit_rows import Rows
+from optimizer.identification.friction_columns import column
+from optimizer.identification.options import Coupling
+from optimizer.identification.power_model import Electrics, Motion, power
+
+FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
+
+
+@dataclass(frozen=True, eq=False)
+class FittedArm:
+    """Figures (nq,) of an arm: those of the friction law, `rotor_inertia`, `torque_constant`; and its electrics.
+
+    `couplings` has the terms of motors that several joints share, `bodies` (10 nq,) the change of the links' parameters
+    from the robot's own; None for its own links.
+    """
+
+    coulomb: Array
+    viscous: Array
+    load: Array
+    curved: Array
+    speed: Array
+    offset: Array
+    rotor_inertia: Array
+    torque_constant: Array
+    electrics: Electrics
+    regeneration: float
+    knee: float
+    couplings: tuple[tuple[Coupling, dict[str, float]], ...] = ()
+    bodies: Array | None = None
+
+    def rigid_torque(self, rows: Rows) -> Array:
+        """Torque (n, nq) [N·m] of rigid bodies."""
+        if self.bodies is None:
+            return rows.rigid
+        assert rows.regressor is not None
+        return np.asarray(rows.rigid + rows.regressor @ self.bodies)
+
+    def friction_torque(self, rows: Rows) -> Array:
+        """Friction torque and offset (n, nq) [N·m]."""
+        v, a, rigid = rows.v, rows.a, self.rigid_torque(rows)
+        total = np.zeros_like(v)
+        for joint in range(v.shape[1]):
+            for term in FRICTION_TERMS:
+                coefficient = float(getattr(self, term)[joint])
+                if coefficient:
+                    part = column(term, v[:, joint], a[:, joint], rigid[:, joint], self.knee, float(self.speed[joint]))
+                    total[:, joint] += coefficient * part
+        for coupling, terms in self.couplings:
+            at, by = v @ coupling.ratios, a @ coupling.ratios
+            motor = sum(value * column(term, at, by, at, self.knee) for term, value in terms.items())
+            total += np.outer(motor, coupling.ratios)
+        return total
+
+    def link_torque(self, rows: Rows) -> Array:
+        """Torque (n, nq) [N·m] of rigid bodies and rotors."""
+        return self.rigid_torque(rows) + self.rotor_inertia * rows.a
+
+    def torque(self, rows: Rows) -> Array:
+        """Motor torque (n, nq) [N·m]."""
+        return self.link_torque(rows) + self.friction_torque(rows)
+
+    def motion(self, rows: Rows) -> Motion:
+        """What the power follows from, with friction apart."""
+        return Motion(rows.v, self.link_torque(rows), self.friction_torque(rows))
+
+    def power(self, rows: Rows) -> tuple[Array, Array]:
+        """Power (n,) [W] on the bus, and its derivatives (n, 1 + 3 nq) by the electrics."""
+        return power(self.electrics, self.motion(rows), self.torque_constant, self.regeneration)
+
+
+def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
+    """The arm with the robot's own figures."""
+    law, drives, nq = robot.friction, robot.drives, robot.nq
+    idle = robot.electronics.idle_power + float(drives.inverter_constant.sum())
+    return FittedArm(
+        coulomb=law.coulomb,
+        viscous=law.viscous,
+        load=np.zeros(nq) if law.load is None else law.load,
+        curved=law.curved,
+        speed=law.speed,
+        offset=np.zeros(nq),
+        rotor_inertia=drives.rotor_inertia,
+        torque_constant=drives.torque_constant,
+        electrics=Electrics(idle, drives.copper, drives.inverter_linear, np.ones(nq)),
+        regeneration=robot.electronics.regeneration,
+        knee=law.knee if knee is None else knee,
+    )
+
+
+def with_torques(arm: FittedArm, names: tuple[Name, ...], value: Array, couplings: tuple[Coupling, ...]) -> FittedArm:
+    """The arm with the figures `names` at these values (p,). A joint whose viscous friction is among them, and is not
+    the arm's own, has no other curved part than a fitted one."""
+    parts = {name: getattr(arm, name).copy() for name in (*FRICTION_TERMS, "rotor_inertia", "torque_constant", "speed")}
+    shared = [(each, dict[str, float]()) for each in couplings]
+    fitted = {name for name, _ in names}
+    for (figure, joint), found in zip(names, value.tolist(), strict=True):
+        assert joint is not None
+        if figure.startswith(COUPLED):
+            shared[joint][1][figure.removeprefix(COUPLED)] = found
+        else:
+            if figure == "viscous" and "curved" not in fitted and found != float(arm.viscous[joint]):
+                parts["curved"][joint] = 0.0
+            parts[figure][joint] = found
+    return replace(arm, **parts, couplings=tuple(shared))

@@ -1,0 +1,144 @@
+"""One fit: from rows of logs to an arm with fitted figures, and how well they are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Array, Robot
+from optimizer.identification.clusters import Clusters, clusters_of
+from optimizer.identification.estimate import Estimate, Name, joined
+from optimizer.identification.fit_rows import Rows
+from optimizer.identification.fitted_arm import FittedArm, own_arm, with_torques
+from optimizer.identification.options import Options
+from optimizer.identification.power_fit import fit_power, prior_of
+from optimizer.identification.power_model import Electrics
+from optimizer.identification.torque_fit import fit_torques
+from optimizer.identification.whole_fit import fit_whole
+
+# variances below it are rounding
+LEAST_ERROR = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The arm with the fitted figures, the estimate behind it, and the arms (G,) with each cluster left out.
+
+    `drift` is the covariance of the packed electrics that the robot's own figures add, `mean_power` [W] that of the
+    rows, NaN without power.
+    """
+
+    arm: FittedArm
+    estimate: Estimate
+    clusters: Clusters
+    without: tuple[FittedArm, ...]
+    drift: Array
+    mean_power: float
+
+
+def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
+    """Fits what the rows have: torques, power or both."""
+    clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
+    estimates, without, tilted = list[Estimate](), [arm] * clusters.count, list[FittedArm]()
+    torque, drift = motor_torque(arm, rows), np.zeros((1 + 3 * robot.nq,) * 2)
+    with_torque, with_power = bool(np.isfinite(torque).any()), bool(np.isfinite(rows.power).any())
+    if with_torque:
+        found, arm, without, tilted = _fit_torque(robot, rows, torque, arm, clusters, options)
+        estimates.append(found)
+    if with_power:
+        found, arm, without, drift = _fit_power(robot, rows, arm, without, tilted, clusters, options)
+        estimates.append(found)
+    mean = float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest])) if with_power else np.nan
+    return Fitted(arm, joined(estimates), clusters, tuple(without), drift, mean)
+
+
+def _fit_torque(
+    robot: Robot, rows: Rows, torque: Array, arm: FittedArm, clusters: Clusters, options: Options
+) -> tuple[Estimate, FittedArm, list[FittedArm], list[FittedArm]]:
+    """The torques' estimate, the arm with it, the arms without each cluster, and those with one error each by what was
+    held at the robot's own figures."""
+    couplings = tuple(options.couplings)
+    if not options.refit:
+        found = fit_torques(robot, rows, torque, clusters, options)
+        arms = [with_torques(arm, found.names, values, couplings) for values in found.replicates]
+        sizes, directions = np.linalg.eigh(found.drift)
+        errors = [np.sqrt(size) * directions[:, k] for k, size in enumerate(sizes) if size > LEAST_ERROR]
+        tilted = [with_torques(arm, found.names, found.value + each, couplings) for each in errors]
+        return found, with_torques(arm, found.names, found.value, couplings), arms, tilted
+    whole = fit_whole(robot, rows, torque, clusters, options)
+    found, terms = whole.estimate, len(whole.estimate.names) - len(whole.change)
+    names = found.names[:terms]
+    arms = [
+        replace(with_torques(arm, names, values[:terms], couplings), bodies=change)
+        for values, change in zip(found.replicates, whole.changes, strict=True)
+    ]
+    return found, replace(with_torques(arm, names, found.value[:terms], couplings), bodies=whole.change), arms, []
+
+
+def motor_torque(arm: FittedArm, rows: Rows) -> Array:
+    """The logged motor torques (n, nq) [N·m], NaN where there are none."""
+    return rows.effort * arm.torque_constant if rows.current else rows.effort
+
+
+def _fit_power(
+    robot: Robot,
+    rows: Rows,
+    arm: FittedArm,
+    without: list[FittedArm],
+    tilted: list[FittedArm],
+    clusters: Clusters,
+    options: Options,
+) -> tuple[Estimate, FittedArm, list[FittedArm], Array]:
+    """The power's estimate, the arms with it, and the covariance of the electrics that the prior adds."""
+    use = np.isfinite(rows.power)
+    part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
+    friction_known = arm is not without[0]
+    prior = prior_of(robot, friction_known)
+    fit = fit_power(
+        arm.motion(part), part.power, arm.torque_constant, arm.regeneration, prior, of_row, options.estimator == "irls"
+    )
+    replicates, drift = fit.replicates, fit.drift
+    if friction_known:
+        # the error of the friction moves the electrics, too: one step of the fit with each friction
+        here = replace(arm, electrics=Electrics.unpacked(fit.value)).power(part)[0]
+        moved = [
+            fit.gain @ (here - replace(each, electrics=Electrics.unpacked(fit.value)).power(part)[0])
+            for each in (*without, *tilted)
+        ]
+        replicates = replicates + np.array(moved[: clusters.count])
+        errors = np.array(moved[clusters.count :]).reshape(-1, len(fit.value))
+        drift = drift + errors.T @ errors
+    arms = [_with_electrics(each, values, friction_known) for each, values in zip(without, replicates, strict=True)]
+    estimate = _power_estimate(robot, fit.value, replicates, drift, friction_known)
+    # of factors on the friction as it is scaled in the arm. What the held terms' errors add to the electrics is not
+    # in it: the electrics make up for it in the energy
+    relative = np.ones(1 + 3 * robot.nq)
+    relative[1 + 2 * robot.nq :] /= np.maximum(fit.value[1 + 2 * robot.nq :], 1e-3)
+    return estimate, _with_electrics(arm, fit.value, friction_known), arms, np.outer(relative, relative) * fit.drift
+
+
+def _with_electrics(arm: FittedArm, values: Array, friction_known: bool) -> FittedArm:
+    electrics = Electrics.unpacked(values)
+    if friction_known:
+        return replace(arm, electrics=replace(electrics, factor=np.ones_like(electrics.factor)))
+    factor = electrics.factor
+    scaled = {term: factor * getattr(arm, term) for term in ("coulomb", "viscous", "load", "curved")}
+    return replace(arm, **scaled, electrics=replace(electrics, factor=np.ones_like(factor)))
+
+
+def _power_estimate(robot: Robot, value: Array, replicates: Array, drift: Array, friction_known: bool) -> Estimate:
+    """The packed figures as an estimate; the friction's factors, if they are fitted, as its coefficients."""
+    nq, own = robot.nq, own_arm(robot)
+    names: list[Name] = [("idle_power", None)]
+    names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]
+    turn = [np.eye(1 + 3 * nq)[: 1 + 2 * nq]]
+    if not friction_known:
+        for figure in ("coulomb", "viscous", "load", "curved"):
+            for joint in np.flatnonzero(getattr(own, figure)).tolist():
+                names.append((figure, joint))
+                row = np.zeros((1, 1 + 3 * nq))
+                row[0, 1 + 2 * nq + joint] = getattr(own, figure)[joint]
+                turn.append(row)
+    matrix = np.concatenate(turn)
+    return Estimate(tuple(names), matrix @ value, replicates @ matrix.T, ("",) * len(names), matrix @ drift @ matrix.T)

@@ -1,0 +1,121 @@
+"""Linear least squares over rows in groups: whole moves, each of which can be left out.
+
+Residuals of neighbouring rows are alike, so the plain formula takes far too many rows for independent ones. What varies
+independently is the move. The covariance here is the jackknife's over moves (Quenouille, Tukey; for clustered rows it
+is the estimate "CV3" of MacKinnon, Nielsen and Webb 2023): each move is left out once, and the spread of the estimates
+says how well they are known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import lsq_linear
+from scipy.stats import t as student
+
+from models.robot import Array, Mask
+
+Numbers = npt.NDArray[np.int64]
+
+# columns shorter than this, after scaling by the longest of all, do not move
+LEAST_COLUMN = 1e-9
+# of the eigenvalues of the column-scaled normal matrix: below it, a combination of columns does not move
+LEAST_EIGENVALUE = 1e-9
+# P95 of the normal distribution over its standard deviation
+P95 = 1.6448536269514722
+
+
+@dataclass(frozen=True, eq=False)
+class Grouped:
+    """Normal equations of each group: `gram` (G, p, p), `moment` (G, p)."""
+
+    gram: Array
+    moment: Array
+
+    @staticmethod
+    def of(columns: Array, values: Array, group: Numbers, count: int) -> Grouped:
+        """From columns (n, p), values (n,) and the group (n,) of each row, of `count`."""
+        p = columns.shape[1]
+        gram, moment = np.zeros((count, p, p)), np.zeros((count, p))
+        order = np.argsort(group, kind="stable")
+        edges = np.searchsorted(group[order], np.arange(count + 1))
+        for k in range(count):
+            rows = order[edges[k] : edges[k + 1]]
+            part = columns[rows]
+            gram[k], moment[k] = part.T @ part, part.T @ values[rows]
+        return Grouped(gram, moment)
+
+    def __add__(self, other: Grouped) -> Grouped:
+        return Grouped(self.gram + other.gram, self.moment + other.moment)
+
+    def scaled(self, factor: float) -> Grouped:
+        """With all rows weighted alike."""
+        return Grouped(factor * self.gram, factor * self.moment)
+
+    def without_column(self, column: int, value: float) -> Grouped:
+        """With a parameter held at a value."""
+        kept = np.delete(np.arange(self.moment.shape[1]), column)
+        moment = self.moment[:, kept] - value * self.gram[:, kept, column]
+        return Grouped(self.gram[:, kept][:, :, kept], moment)
+
+
+def solve(gram: Array, moment: Array, lower: Array) -> Array:
+    """The x (p,) ≥ lower that minimises xᵀ gram x / 2 - momentᵀ x.
+
+    Columns that do not move give 0 where they may, and a combination that does not move its shortest solution.
+    """
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    scale = np.where(scale > LEAST_COLUMN * max(scale.max(initial=0.0), 1e-300), scale, np.inf)
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    roots = np.sqrt(np.where(values > LEAST_EIGENVALUE, values, np.inf))
+    target = (vectors / roots).T @ (moment / scale)
+    found = (vectors / roots) @ target / scale
+    if (found >= lower).all():
+        return np.asarray(found)
+    matrix = (vectors * np.where(np.isfinite(roots), roots, 0.0)).T
+    bounds = np.where(np.isfinite(scale), lower * np.where(np.isfinite(scale), scale, 1.0), -np.inf)
+    bounded = lsq_linear(matrix, target, bounds=(bounds, np.full(len(bounds), np.inf)), method="bvls")
+    return np.asarray(np.maximum(bounded.x / scale, np.where(np.isfinite(scale), lower, -np.inf)))
+
+
+def left_out(grouped: Grouped, found: Array, free: Mask, prior: Array | None = None) -> Array:
+    """Estimates (G, p) with each group left out; parameters that are not `free` stay where `found` has them.
+
+    `prior` (p, p) is a precision to which all of them are held besides the rows.
+    """
+    total = grouped.gram.sum(axis=0) + (0.0 if prior is None else prior)
+    estimates = np.tile(found, (len(grouped.gram), 1))
+    at = np.flatnonzero(free)
+    scale = np.sqrt(np.maximum(np.diag(total)[at], 1e-300))
+    for k, (gram, moment) in enumerate(zip(grouped.gram, grouped.moment, strict=True)):
+        rest = (total - gram)[np.ix_(at, at)] / np.outer(scale, scale)
+        pull = (gram @ found - moment)[at] / scale
+        if prior is None:
+            step = np.linalg.pinv(rest, rcond=LEAST_EIGENVALUE, hermitian=True) @ pull
+        else:
+            step = np.linalg.solve(rest, pull)
+        estimates[k, at] += step / scale
+    return estimates
+
+
+def jackknife(estimates: Array) -> Array:
+    """The covariance (p, p) of an estimate from those (G, p) without each of the groups.
+
+    Few groups are a small sample: the covariance is widened so that ± 1.645 standard deviations cover 90 %, as with
+    Student's distribution. Of one group it is infinite.
+    """
+    groups = len(estimates)
+    if groups < 2:
+        return np.full((estimates.shape[1],) * 2, np.inf)
+    centred = estimates - estimates.mean(axis=0)
+    wider = float(student.ppf(0.95, groups - 1)) / P95
+    return np.asarray(wider**2 * (groups - 1) / groups * centred.T @ centred)
+
+
+def lag_one(residuals: Array, group: Numbers) -> float:
+    """Correlation of each residual (n,) with the one before, within groups of neighbouring rows; 0 if all are 0."""
+    near = group[1:] == group[:-1]
+    square = float(residuals @ residuals)
+    return float(residuals[1:][near] @ residuals[:-1][near] / square) if square > 0 else 0.0

@@ -1,0 +1,202 @@
+"""`fit(robot, logs, options)`: an arm's own figures from its logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Mask, Robot
+from optimizer.exceptions import EffortNotUsable
+from optimizer.identification.advice import advice_of
+from optimizer.identification.block import own_value
+from optimizer.identification.errors import NoPowerChannel, NotExcited
+from optimizer.identification.estimate import Estimate, Name
+from optimizer.identification.fit_rows import Rows, rows_of
+from optimizer.identification.fitting import Fitted, fit_rows, motor_torque
+from optimizer.identification.grouped import lag_one
+from optimizer.identification.interval import Spread, sessions, spread_of
+from optimizer.identification.log import Log
+from optimizer.identification.options import Options
+from optimizer.identification.regressor import BODY, body_parameters
+from optimizer.identification.results import (
+    Advice,
+    IdentifiedFigures,
+    Parameter,
+    Physical,
+    Residuals,
+    Structure,
+    Temperatures,
+    Validation,
+)
+from optimizer.identification.split import held_out
+from optimizer.identification.structure import inertials_of, physical_of, structure_of
+from optimizer.identification.temperature import temperatures_of
+from optimizer.identification.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
+from optimizer.identification.validation import Fold, validate
+from optimizer.identification.whole_fit import LINK, PARTS
+from optimizer.linear_algebra import one_thread
+
+WHITE = 0.3
+"""Correlation of neighbouring residuals up to which they count as independent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """An arm's figures from logs. `validation` is of a fit without the held-out moves; None if none was asked for."""
+
+    robot: Robot
+    options: Options
+    fitted: Fitted
+    spread: Spread
+    parameters: tuple[Parameter, ...]
+    structure: Structure
+    physical: Physical | None
+    residuals: Residuals
+    temperatures: Temperatures
+    advice: Advice | None
+    validation: Validation | None
+    logs: tuple[str, ...]
+
+    @one_thread()
+    def validate(self, logs: Sequence[Log]) -> Validation:
+        """Errors of the figures on other logs, none of whose moves may be in the fit. Raises InvalidProblem."""
+        rows = rows_of(self.robot, logs, self.options.refit)
+        return validate(self.robot, [Fold(self.fitted, self.spread, rows)], self.options.velocity_threshold)
+
+    def figures(self) -> IdentifiedFigures:
+        """The figures, complete over all joints, with their covariance."""
+        arm, estimate = self.fitted.arm, self.fitted.estimate
+        covariance, fitted = estimate.covariance, {figure for figure, _ in estimate.names}
+        names = [name for name in (*LAW, "rotor_inertia", "torque_constant") if name in fitted]
+        if fitted & set(LAW):
+            names += [name for name in (*LAW, "speed") if name not in names]
+        values = {name: np.array(getattr(arm, name)) for name in names}
+        if "idle_power" in fitted:
+            electrics = arm.electrics
+            values |= {"idle_power": np.array(electrics.idle), "copper": electrics.copper}
+            values["inverter_linear"] = electrics.inverter
+        if arm.bodies is not None:
+            values |= inertials_of(self.robot, arm.bodies)
+        # those that the logs tell only together with others count, too: their errors go with the others'
+        known = np.array([figure in values or figure.startswith(LINK) for figure, _ in estimate.names])
+        told = np.flatnonzero(known & (np.diag(covariance) > 0)).tolist()
+        return IdentifiedFigures(
+            robot=self.robot.name,
+            values=values,
+            parameters=tuple(estimate.names[k] for k in told),
+            sd=np.sqrt(np.diag(covariance)[told]),
+            covariance=covariance[np.ix_(told, told)],
+            session_sd=self.spread.session,
+            move_sd=self.spread.move,
+            logs=self.logs,
+        )
+
+
+LAW = ("coulomb", "viscous", "load", "curved")
+"""Figures of the friction law: given for all joints, or not at all."""
+
+
+@one_thread()
+def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Identification:
+    """The figures of an arm from at least one log of it.
+
+    They are fitted to all moves. Before that, a fit without the held-out moves is validated on these, unless `held_out`
+    is 0. Raises InvalidProblem, EffortNotUsable, NoPowerChannel, NotExcited, and NothingHeldOut.
+    """
+    options = options or Options()
+    rows = rows_of(robot, logs, options.refit)
+    _check(rows, logs, options)
+    validation = None
+    if options.held_out:
+        folds = [_fold(robot, rows, out, options) for out in held_out(rows, options.held_out)]
+        validation = validate(robot, folds, options.velocity_threshold)
+    fitted = fit_rows(robot, rows, options)
+    parameters = _parameters(robot, fitted.estimate)
+    if not any(each.identified for each in parameters):
+        raise NotExcited([each.figure for each in parameters])
+    return Identification(
+        robot=robot,
+        options=options,
+        fitted=fitted,
+        spread=spread_of(fitted, rows),
+        parameters=parameters,
+        structure=structure_of(robot, rows, options),
+        physical=physical_of(robot, fitted.arm),
+        residuals=_residuals(fitted, rows, options),
+        temperatures=temperatures_of(
+            rows, motor_torque(fitted.arm, rows), fitted.arm, fitted.clusters, options.velocity_threshold
+        ),
+        advice=advice_of(fitted, rows),
+        validation=validation,
+        logs=tuple(log.name or "" for log in logs),
+    )
+
+
+def _fold(robot: Robot, rows: Rows, out: Mask, options: Options) -> Fold:
+    """The rows that are held `out` (n,), and a fit to the others, which are of the same days."""
+    blind = fit_rows(robot, rows.take(~out), options)
+    return Fold(blind, replace(spread_of(blind, rows.take(~out)), session=0.0), rows.take(out))
+
+
+def _check(rows: Rows, logs: Sequence[Log], options: Options) -> None:
+    """Whether the logs have what was asked for."""
+    if any(log.effort_meaning == "external" for log in logs):
+        raise EffortNotUsable(
+            "The efforts of these logs are without gravity and identify nothing: log motor currents or torques.",
+            "external",
+            {},
+        )
+    power = bool(np.isfinite(rows.power).any())
+    if "power" in options.fit and not power:
+        raise NoPowerChannel
+    if not power and not np.isfinite(rows.effort).any():
+        raise NotExcited(list(options.fit))
+
+
+def _parameters(robot: Robot, estimate: Estimate) -> tuple[Parameter, ...]:
+    deviations = np.sqrt(np.diag(estimate.covariance))
+    return tuple(
+        _parameter(robot, name, value, sd, why)
+        for name, value, sd, why in zip(
+            estimate.names, estimate.value.tolist(), deviations.tolist(), estimate.why, strict=True
+        )
+    )
+
+
+def _parameter(robot: Robot, name: Name, value: float, sd: float, why: str) -> Parameter:
+    if not why and value == 0:
+        why = ZERO
+    elif not why and not sd <= MOST_RELATIVE_SD * abs(value):
+        why = UNSURE.format(sd / abs(value))
+    return Parameter(*name, value, sd, _previous(robot, name), not why, why)
+
+
+def _previous(robot: Robot, name: Name) -> float:
+    figure, joint = name
+    if figure.startswith(LINK):
+        assert joint is not None
+        return float(body_parameters(robot.model).reshape(-1, BODY)[joint, PARTS.index(figure.removeprefix(LINK))])
+    if figure == "idle_power":
+        return float(robot.electronics.idle_power)
+    if figure in ("copper", "inverter_linear", "torque_constant"):
+        return float(getattr(robot.drives, figure)[joint])
+    return own_value(robot, name)
+
+
+def _residuals(fitted: Fitted, rows: Rows, options: Options) -> Residuals:
+    """What the fit leaves over, of moving rows."""
+    error = motor_torque(fitted.arm, rows) - fitted.arm.torque(rows)
+    moving = np.abs(rows.v) > options.velocity_threshold
+    lags = np.full(rows.v.shape[1], np.nan)
+    for joint in range(len(lags)):
+        use = moving[:, joint] & np.isfinite(error[:, joint])
+        if use.any():
+            lags[joint] = lag_one(error[use, joint], rows.move[use])
+    with_power, lag = np.isfinite(rows.power), np.nan
+    if with_power.any():
+        part = rows.take(with_power)
+        lag = lag_one(part.power - fitted.arm.power(part)[0], part.move)
+    every = np.append(lags, lag)
+    return Residuals(lags, lag, bool((every[np.isfinite(every)] < WHITE).all()), sessions(fitted, rows))

@@ -1,0 +1,80 @@
+"""What an identification is to find, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem
+
+Target = Literal["friction", "rotor", "inertials", "torque_constant", "power", "payload"]
+Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
+Estimator = Literal["ols", "wls", "irls"]
+DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """A motor that turns with several joints: its speed is `ratios` (nq,) times theirs.
+
+    Its inertia and friction act on all of them. An example is a wrist whose last motor is driven through the joint
+    before it.
+    """
+
+    ratios: Array
+
+    def __post_init__(self) -> None:
+        ratios = np.array(self.ratios, dtype=float)
+        if ratios.ndim != 1 or (ratios != 0).sum() < 2 or not np.isfinite(ratios).all():
+            raise InvalidProblem("couplings", "A coupling must have a ratio other than 0 for at least two joints.")
+        ratios.setflags(write=False)
+        object.__setattr__(self, "ratios", ratios)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Numbers of the joints that it couples."""
+        return tuple(np.flatnonzero(self.ratios).tolist())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """`fit`: the figures to find; power is added by itself where the logs have it. `refit`: the links' inertials, too.
+
+    `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn. `terms` are those of the
+    friction law, `knee` [rad/s] that of its step (None: the robot's own). `velocity_threshold` [rad/s]: slower samples
+    of a joint do not enter its rows. `prior_weight` is that of the robot's own inertials in a refit. Raises
+    InvalidProblem.
+    """
+
+    fit: Sequence[Target] = ("friction", "rotor")
+    refit: bool = False
+    held_out: float = 0.3
+    terms: Sequence[Term] = DEFAULT_TERMS
+    knee: float | None = None
+    estimator: Estimator = "wls"
+    velocity_threshold: float = 0.02
+    prior_weight: float = 1.0
+    couplings: Sequence[Coupling] = field(default_factory=tuple)
+
+    def __post_init__(self) -> None:
+        for name, allowed in (("fit", get_args(Target)), ("terms", get_args(Term))):
+            given = tuple(getattr(self, name))
+            if not given or not set(given) <= set(allowed) or len(set(given)) < len(given):
+                raise InvalidProblem(name, f"{name} must name some of {', '.join(allowed)}, each once.")
+            object.__setattr__(self, name, given)
+        if self.estimator not in get_args(Estimator):
+            raise InvalidProblem("estimator", f"estimator must be one of {', '.join(get_args(Estimator))}.")
+        for name, least, most in (
+            ("held_out", 0.0, 1.0),
+            ("velocity_threshold", 0.0, 10.0),
+            ("prior_weight", 1e-6, 1e6),
+        ):
+            if not least <= getattr(self, name) <= most:
+                raise InvalidProblem(name, f"{name} must be from {least:g} to {most:g}.")
+        if self.knee is not None and not 1e-6 <= self.knee <= 1.0:
+            raise InvalidProblem("knee", "knee must be from 1e-6 to 1 rad/s.")
+        object.__setattr__(self, "couplings", tuple(self.couplings))

@@ -1,0 +1,137 @@
+"""Identifications over HTTP: from a log to figures, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.schemas import errors as problems
+from app.schemas.identifications import Identification, IdentificationResult
+from models.registry import load_robot
+from tests.app.routes.test_problems import refused
+from tests.identification_logs import csv_of, recorded, truth_of
+
+ROBOT = load_robot("ur5e")
+TRUTH = truth_of(ROBOT)
+CSV = {"Content-Type": "text/csv"}
+# of the standard deviations: what one of a thousand figures exceeds
+FAR = 4.0
+NOBODY = "3d0b7c55-8e0a-4a6b-b1f0-7a5d9c2e4f18"
+
+
+def add_log(client: TestClient, moves: int = 8, seed: int = 0, **options: Any) -> str:
+    body = csv_of(recorded(ROBOT, TRUTH, moves=moves, seed=seed), **options)
+    answer = client.post("/logs", content=body, params={"payload": '{"mass": 0.0, "com": [0, 0, 0]}'}, headers=CSV)
+    assert answer.status_code == 201, answer.text
+    return str(answer.json()["id"])
+
+
+def ended(client: TestClient, **body: Any) -> Identification:
+    """The identification that a body asks for, after its end."""
+    answer = client.post("/identifications", json=body)
+    assert answer.status_code == 202, answer.text
+    made = Identification.model_validate_json(answer.content)
+    assert answer.headers["location"] == f"/identifications/{made.id}"
+    assert made.state in ("queued", "running", "done")
+    with client.stream("GET", f"/jobs/{made.id}/events") as events:
+        for _ in events.iter_lines():
+            pass  # the stream ends with the job
+    found = Identification.model_validate_json(client.get(f"/identifications/{made.id}").content)
+    assert found.state in ("done", "failed")
+    return found
+
+
+def done(client: TestClient, **body: Any) -> IdentificationResult:
+    found = ended(client, **body)
+    assert found.problem is None and found.result is not None, found.problem
+    return found.result
+
+
+@pytest.fixture(scope="module")
+def log(client: TestClient) -> str:
+    return add_log(client)
+
+
+def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
+    result = done(client, logs=[log])
+    found = {(each.figure, each.joint): each for each in result.parameters}
+    coulomb = found["coulomb", 1]
+    assert coulomb.identified and abs(coulomb.value - TRUTH.coulomb[1]) <= FAR * coulomb.sd
+    assert coulomb.previous == ROBOT.friction.coulomb[1]
+    assert found["load", 1].identified
+    torque, own = result.validation.fitted.torque, result.validation.own.torque
+    assert torque is not None and own is not None and max(torque.rmse) < min(own.rmse[:3])
+    assert result.validation.coverage is not None
+    law = result.figures["friction_laws"]["identified"]
+    assert law["coulomb"]["value"][1] == coulomb.value and law["coulomb"]["sd"][1] == pytest.approx(coulomb.sd)
+    assert (law["coulomb"]["trust"], law["coulomb"]["unit"]) == ("B", "N·m")
+    names = result.figures["covariance"]["names"]
+    matrix = np.array(result.figures["covariance"]["matrix"])
+    assert "friction_laws.identified.coulomb.1" in names and "electronics.idle_power" in names
+    assert matrix.shape == (len(names), len(names)) and np.linalg.eigvalsh(matrix)[0] > -1e-9
+
+
+def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log: str) -> None:
+    other = add_log(client, moves=4, seed=5)
+    result = done(client, logs=[log], validate=[other], inertials="refit", estimator="irls")
+    assert result.validation.moves == 4
+    assert result.physical is not None and result.physical.consistent
+    assert (result.structure.base, result.structure.excited) == (40, 40)
+    assert {"mass", "center_of_mass", "inertia"} <= result.figures["inertials"].keys()
+
+
+def test_each_motion_in_its_turn(client: TestClient, log: str) -> None:
+    assert done(client, logs=[log], validate="moves").validation.moves == 8
+
+
+@pytest.mark.parametrize(
+    ("moves", "options", "body", "problem"),
+    [
+        (1, {}, {}, problems.NothingHeldOut),
+        (2, {"without": "P"}, {"fit": ["power"]}, problems.NoPowerChannel),
+        (4, {"without": "iP"}, {}, problems.NotExcited),
+    ],
+)
+def test_what_logs_do_not_tell_is_a_problem(
+    client: TestClient,
+    moves: int,
+    options: dict[str, Any],
+    body: dict[str, Any],
+    problem: type[problems.ProblemDetails],
+) -> None:
+    found = ended(client, logs=[add_log(client, moves, **options)], **body)
+    assert found.state == "failed" and found.result is None and found.problem is not None
+    problem.model_validate(found.problem)
+
+
+def test_unknown_logs_are_refused_at_once(client: TestClient, log: str) -> None:
+    refused(client.post("/identifications", json={"logs": [log, NOBODY]}), problems.UnknownLog)
+    refused(client.get(f"/identifications/{NOBODY}"), problems.UnknownIdentification)
+    refused(client.get("/identifications/x"), problems.UnknownIdentification)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {},
+        {"logs": []},
+        {"logs": "all"},
+        {"logs": [NOBODY], "validate": {"fraction": 2.0}},
+        {"logs": [NOBODY], "validate_": "moves"},
+        {"logs": [NOBODY], "fit": []},
+        {"logs": [NOBODY], "estimator": "best"},
+    ],
+)
+def test_malformed_requests_name_the_field(client: TestClient, body: dict[str, Any]) -> None:
+    refused(client.post("/identifications", json=body), problems.Validation)
+
+
+def test_other_jobs_are_no_identifications(client: TestClient) -> None:
+    home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+    job = client.post(
+        "/jobs", json={"requests": [{"evaluate": {"configurations": [home, home], "time_per_segment": 1.0}}]}
+    ).json()
+    refused(client.get(f"/identifications/{job['id']}"), problems.UnknownIdentification)

@@ -1,0 +1,196 @@
+"""Friction, rotor inertia and power from logs of simulated arms whose figures are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.exceptions import EffortNotUsable
+from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
+from optimizer.identification.identify import Identification, fit
+from optimizer.identification.log import Log, Move
+from optimizer.identification.options import Options
+from tests.identification_logs import Noise, Recording, Truth, recorded, truth_of
+
+ROBOT = load_robot("ur10e")
+WITHOUT_SPLIT = Options(held_out=0.0)
+# of the standard deviations: what one of a thousand figures exceeds
+FAR = 4.0
+# joints of which the load term is told
+LOADED = (1, 2)
+
+
+def run(seed: int = 0, moves: int = 14, options: Options = WITHOUT_SPLIT) -> tuple[Truth, Identification]:
+    truth = truth_of(ROBOT, seed)
+    return truth, fit(ROBOT, [recorded(ROBOT, truth, moves=moves, seed=seed).log()], options)
+
+
+def true_value(truth: Truth, figure: str, joint: int | None) -> float:
+    return float(truth.idle_power if joint is None else getattr(truth, figure)[joint])
+
+
+def without_power(log: Log, **changed: object) -> Log:
+    return replace(log, power=None, **changed)  # type: ignore[arg-type]
+
+
+def test_every_friction_figure_is_found_within_its_standard_deviations() -> None:
+    truth, found = run()
+    # a load term that is left out biases the others of its joint
+    told = [each for each in found.parameters if each.identified and each.joint in (*LOADED, 3, 4, 5)]
+    figures = [each for each in told if each.figure in ("coulomb", "viscous", "load", "rotor_inertia")]
+    assert len(figures) >= 3 * 5
+    assert {each.joint for each in figures if each.figure == "load"} == set(LOADED)
+    for each in figures:
+        assert abs(each.value - true_value(truth, each.figure, each.joint)) <= FAR * each.sd, each
+
+
+def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() -> None:
+    _, found = run(options=Options())
+    errors = found.validation
+    assert errors is not None and errors.fitted.torque is not None and errors.own.torque is not None
+    # what is left is the noise of the current
+    assert (errors.fitted.torque.relative < 0.5 * errors.own.torque.relative).all()
+    assert errors.fitted.power is not None and errors.own.power is not None and errors.constant is not None
+    assert errors.fitted.power.energy_max < errors.own.power.energy_max < errors.constant.energy_max
+
+
+def test_another_log_validates() -> None:
+    truth, found = run()
+    other = recorded(ROBOT, truth, moves=6, seed=77).log()
+    errors = found.validate([other])
+    assert errors.moves == 6
+    assert errors.fitted.torque is not None
+    # noise of the current is all that is left
+    assert errors.fitted.torque.shaft_energy < 0.5
+
+
+def test_load_friction_makes_the_difference_where_there_is_load() -> None:
+    _, with_load = run(options=Options())
+    _, without = run(options=Options(terms=("coulomb", "viscous", "offset")))
+    assert with_load.validation is not None and without.validation is not None
+    better, worse = with_load.validation.fitted.torque, without.validation.fitted.torque
+    assert better is not None and worse is not None
+    assert (better.rmse[list(LOADED)] < 0.5 * worse.rmse[list(LOADED)]).all()
+
+
+def test_power_alone_gives_idle_power_and_the_size_of_friction() -> None:
+    truth = truth_of(ROBOT, 3)
+    log = recorded(ROBOT, truth, moves=14, seed=3).log()
+    found = fit(ROBOT, [replace(log, effort=None, effort_meaning=None)])
+    idle = next(each for each in found.parameters if each.figure == "idle_power")
+    assert idle.identified and abs(idle.value - truth.idle_power) <= FAR * idle.sd
+    assert found.validation is not None
+    fitted, own = found.validation.fitted.power, found.validation.own.power
+    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+
+
+def still(recording: Recording, joint: int) -> Log:
+    """The log of the recording as if a joint had not moved: its torque is only that of holding."""
+    log = recording.log()
+    q, v, a, effort = (np.array(each) for each in (log.q, log.v, log.a, log.effort))
+    q[:, joint], v[:, joint], a[:, joint] = 0.3, 0.0, 0.0
+    effort[:, joint] = 0.1
+    return without_power(log, q=q, v=v, a=a, effort=effort)
+
+
+def test_a_joint_that_does_not_move_keeps_the_robots_own_figures() -> None:
+    truth = truth_of(ROBOT)
+    found = fit(ROBOT, [still(recorded(ROBOT, truth, moves=8), 5)], WITHOUT_SPLIT)
+    kept = [each for each in found.parameters if each.joint == 5 and each.figure != "offset"]
+    assert kept and not any(each.identified for each in kept)
+    assert all(each.why and each.value == each.previous for each in kept)
+    figures = found.figures()
+    for name in ("coulomb", "viscous", "curved", "speed"):
+        assert figures.values[name][5] == getattr(ROBOT.friction, name)[5]
+
+
+def at_rest(log: Log) -> Log:
+    zeros = np.zeros_like(log.v)
+    still = {"q": np.tile(log.q[:1], (len(log.q), 1)), "v": zeros, "a": zeros}
+    return without_power(log, **still, moves=(Move(0, len(log.q), True),))
+
+
+def test_a_log_at_rest_identifies_nothing() -> None:
+    log = recorded(ROBOT, truth_of(ROBOT), moves=2).log()
+    with pytest.raises(NotExcited) as caught:
+        fit(ROBOT, [at_rest(log)], WITHOUT_SPLIT)
+    assert "coulomb" in caught.value.parameters
+
+
+@pytest.mark.parametrize("moves", [1, 2])
+def test_moves_along_one_motion_are_no_validation(moves: int) -> None:
+    """The second of two moves is the first one backwards."""
+    log = recorded(ROBOT, truth_of(ROBOT), moves=moves).log()
+    with pytest.raises(NothingHeldOut) as caught:
+        fit(ROBOT, [log])
+    assert caught.value.moves == moves
+
+
+def test_one_long_move_is_fitted_by_its_seconds() -> None:
+    """There is nothing to hold out, but other logs can validate."""
+    truth = truth_of(ROBOT)
+    log = without_power(recorded(ROBOT, truth, moves=6).log())
+    one = replace(log, moves=(Move(0, len(log.q), False),))
+    found = fit(ROBOT, [one], WITHOUT_SPLIT)
+    assert found.validation is None
+    coulomb = [each for each in found.parameters if each.figure == "coulomb" and each.joint in LOADED]
+    assert all(each.identified for each in coulomb)
+    assert all(abs(each.value - truth.coulomb[each.joint or 0]) <= FAR * each.sd for each in coulomb)
+
+
+def test_a_repeated_log_is_on_one_side_of_the_split() -> None:
+    recording = recorded(ROBOT, truth_of(ROBOT), moves=2)
+    with pytest.raises(NothingHeldOut):
+        fit(ROBOT, [recording.log(), recording.log()])
+
+
+def test_gravity_compensated_efforts_are_refused() -> None:
+    log = recorded(ROBOT, truth_of(ROBOT), moves=2).log("torque")
+    with pytest.raises(EffortNotUsable):
+        fit(ROBOT, [replace(log, effort_meaning="external")])
+
+
+def test_power_is_asked_of_logs_that_have_it() -> None:
+    log = without_power(recorded(ROBOT, truth_of(ROBOT), moves=2).log())
+    with pytest.raises(NoPowerChannel):
+        fit(ROBOT, [log], Options(fit=("friction", "power")))
+
+
+def with_outliers(log: Log) -> Log:
+    random = np.random.default_rng(1)
+    assert log.effort is not None
+    effort: Array = np.array(log.effort)
+    hit = random.random(effort.shape) < 0.02
+    effort[hit] += random.uniform(5, 20, int(hit.sum()))
+    return without_power(log, effort=effort)
+
+
+def test_reweighting_keeps_outliers_out() -> None:
+    truth = truth_of(ROBOT)
+    # at the rate of the rows, where no average over samples spreads an outlier
+    log = with_outliers(recorded(ROBOT, truth, moves=10, rate=100.0).log())
+
+    def error(found: Identification) -> Array:
+        # of the offset, which one-sided outliers move most
+        return np.abs(found.fitted.arm.offset - truth.offset)[list(LOADED)]
+
+    plain, robust = (fit(ROBOT, [log], replace(WITHOUT_SPLIT, estimator=each)) for each in ("wls", "irls"))
+    assert (error(robust) < 0.2 * error(plain)).all()
+
+
+def test_more_noise_gives_larger_standard_deviations() -> None:
+    truth = truth_of(ROBOT)
+    loud = Noise(current=0.2)
+    quiet_log, loud_log = (without_power(recorded(ROBOT, truth, noise=each).log()) for each in (None, loud))
+    quiet_sd, loud_sd = (
+        {(each.figure, each.joint): each.sd for each in fit(ROBOT, [log], WITHOUT_SPLIT).parameters if each.identified}
+        for log in (quiet_log, loud_log)
+    )
+    shared = quiet_sd.keys() & loud_sd.keys()
+    assert len(shared) > 12
+    # ten times the noise: some ten times the standard deviation
+    assert 3 < np.median([loud_sd[key] / quiet_sd[key] for key in shared]) < 20
