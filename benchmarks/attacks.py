@@ -37,7 +37,7 @@ async def connect(port: int) -> Streams:
 
 def post(path: str, body: bytes, declared: int | None = None) -> bytes:
     """A request, whose declared size may be larger."""
-    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nCache-Control: no-cache\r\n"
     return f"{head}Content-Length: {declared or len(body)}\r\n\r\n".encode() + body
 
 

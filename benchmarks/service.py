@@ -41,6 +41,10 @@ class Answer:
         return orjson.loads(self.raw)
 
 
+COMPUTED = {"Cache-Control": "no-cache"}
+"""Headers of a request whose answer is to be computed, although an equal request was answered before."""
+
+
 class Client:
     """One persistent connection from a loopback address; not thread-safe."""
 
@@ -52,8 +56,8 @@ class Client:
         return self._exchange("GET", path, None)
 
     def optimize(self, body: dict[str, Any]) -> Answer:
-        """`POST /optimize`. Raises the same errors as `get`."""
-        return self._exchange("POST", "/optimize", orjson.dumps(body))
+        """`POST /optimize`, computed now. Raises the same errors as `get`."""
+        return self._exchange("POST", "/optimize", orjson.dumps(body), **COMPUTED)
 
     def send_raw(self, content: bytes) -> None:
         """Sends bytes as they are."""
@@ -68,10 +72,12 @@ class Client:
         """Closes the connection."""
         self._connection.close()
 
-    def _exchange(self, method: str, path: str, body: bytes | None) -> Answer:
+    def _exchange(self, method: str, path: str, body: bytes | None, **headers: str) -> Answer:
         began = time.perf_counter()
+        if body:
+            headers["Content-Type"] = "application/json"
         try:
-            self._connection.request(method, path, body, {"Content-Type": "application/json"} if body else {})
+            self._connection.request(method, path, body, headers)
             response = self._connection.getresponse()
             raw = response.read()
         except (OSError, http.client.HTTPException):

@@ -9,6 +9,8 @@ from typing import Any
 
 import orjson
 
+_ID = b'{"id":"'
+
 
 @dataclass(frozen=True)
 class StoredAnswer:
@@ -33,12 +35,15 @@ class TaskResult:
 
     `stored` are complete answers that belong into the database before the document is sent: it refers to them.
     `kept_as` is the id under which the document itself is to be kept; its last field, `answer`, has the path.
+    `is_optimal`: no more time would make it better. `age` [s] is that of a document that was computed before.
     """
 
     document: bytes
     media_type: str
     stored: tuple[StoredAnswer, ...] = ()
     kept_as: str | None = None
+    is_optimal: bool = False
+    age: int | None = None
 
     @classmethod
     def of_json(cls, content: Mapping[str, Any], stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
@@ -49,7 +54,8 @@ class TaskResult:
     def of_kept_json(cls, content: Mapping[str, Any]) -> TaskResult:
         """A JSON document that is to be kept, with its path as the last field, `answer`."""
         kept = StoredAnswer(str(uuid.uuid4()), b"")
-        return cls(json_document({**content, "answer": kept.path}), "application/json", kept_as=kept.id)
+        document = json_document({**content, "answer": kept.path})
+        return cls(document, "application/json", kept_as=kept.id, is_optimal=content.get("status") == "optimal")
 
     def without_path(self) -> TaskResult:
         """The same document, which was not kept: its field `answer` is null."""
@@ -57,6 +63,13 @@ class TaskResult:
         end = _last_field(self.kept_as)
         assert self.document.endswith(end)
         return replace(self, document=self.document[: -len(end)] + b',"answer":null}', kept_as=None)
+
+    def with_id(self, request_id: str) -> TaskResult:
+        """The same document for another request: its first field, `id`, is that of the request."""
+        assert self.document.startswith(_ID)
+        # no id has a quotation mark
+        rest = self.document[self.document.index(b'"', len(_ID)) :]
+        return replace(self, document=_ID + request_id.encode() + rest)
 
     @classmethod
     def of_csv(cls, table: str, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:

@@ -24,6 +24,7 @@ from app.http.problem_details import invalid_request, problem_content, problem_t
 from app.http.refused_body import RefusedBody
 from optimizer.exceptions import JoulepathError
 
+CACHE_HEADER = "Joulepath-Cache"
 PROBLEM_MEDIA_TYPE = "application/problem+json"
 
 
@@ -64,7 +65,8 @@ def _encoded(error: Exception, request_id: str) -> bytes:
 
 def result_response(result: TaskResult) -> Response:
     """The response with a task's result."""
-    return Response(result.document, media_type=result.media_type)
+    cached = {} if result.age is None else {"Age": str(result.age), CACHE_HEADER: "hit"}
+    return Response(result.document, headers=cached, media_type=result.media_type)
 
 
 def _is_not_json(request: Request, error: RequestValidationError) -> bool:

@@ -14,6 +14,7 @@ from app.http.metrics import Metrics
 from app.jobs.jobs import Jobs
 from app.settings import Settings
 from app.store.store import Store
+from app.tasks.answer_cache import AnswerCache
 from app.tasks.arm_engine import ArmEngine
 
 # coroutines, because FastAPI would run plain functions in a thread
@@ -76,4 +77,11 @@ async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEn
     return ArmEngine(engine, store)
 
 
+async def _cache(request: Request, store: ServiceStore, client: ServiceClient) -> AnswerCache:
+    by_passed = "no-cache" in request.headers.get("cache-control", "").lower()
+    return AnswerCache(store, client.owner, by_passed)
+
+
+ServiceCache = Annotated[AnswerCache, Depends(_cache)]
+"""Answers that this client was given before."""
 ServiceArmEngine = Annotated[ArmEngine, Depends(_arm_engine)]

@@ -6,10 +6,10 @@ from fastapi import APIRouter, Request, Response
 
 from app.engine.result import TaskResult
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceCache, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.later import ACCEPTED, ServiceLater
-from app.routes.parameters import deadline_of
+from app.routes.parameters import CACHED_HEADERS, deadline_of
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.routes.reply import BY_EVENTS, ServiceReply
 from app.schemas import errors as problems
@@ -27,7 +27,7 @@ router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
     summary="The motion of least energy",
     response_model=OptimizeResponse,
     responses={
-        200: {"content": BY_EVENTS},
+        200: {"content": BY_EVENTS, "headers": CACHED_HEADERS},
         **ACCEPTED,
         **problem_responses(*MOTION_PROBLEMS, problems.PathInfeasible, problems.KeyReused),
     },
@@ -41,16 +41,23 @@ async def optimize(
     client: ServiceClient,
     later: ServiceLater,
     reply: ServiceReply,
+    cache: ServiceCache,
 ) -> Response:
     """Finds the motion of least energy from standstill at `start` to standstill at `goal`, over all arm configurations.
     The answer has its energy breakdown, and a certificate that the motion is within all limits. `GET /answers/{id}`
-    returns it again. `Accept: text/event-stream` returns events while the search runs, and then the answer."""
+    returns it again. The same request is answered from the database the next time; with `Cache-Control: no-cache` it is
+    computed again. `Accept: text/event-stream` returns events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("optimize", body)
     task = OptimizeTask(body, request.state.id)
 
     async def work(tell: Tell) -> TaskResult:
-        result = await engine.run(task, deadline_of(body, settings.max_deadline), tell)
-        return await keep_answer(store, settings, "optimize", result, client.owner)
+        deadline = deadline_of(body, settings.max_deadline)
+        asked = await cache.asked("optimize", body, deadline)
+        known = await cache.find(asked, request.state.id)
+        if known is not None:
+            return known
+        result = await engine.run(task, deadline, tell)
+        return await keep_answer(store, settings, "optimize", result, client.owner, asked)
 
     return await reply.of(work)

@@ -8,6 +8,7 @@ from fastapi import Depends, Header, Path, Request, Response
 
 from app.exceptions import InvalidRequest
 from app.http.event_stream import EVENT_STREAM
+from app.http.handlers import CACHE_HEADER
 from app.schemas.common import KEY_HEADER
 from app.schemas.examples.values import STUDY_ID
 from app.schemas.studies import IdempotencyKey
@@ -59,6 +60,14 @@ Key = Annotated[
         examples=["2f6f3d0c-try-1"],
     ),
 ]
+CACHED_HEADERS = {
+    CACHE_HEADER: {
+        "description": "`hit` if the answer was computed for an equal request before.",
+        "schema": {"type": "string"},
+    },
+    "Age": {"description": "Time since then [s].", "schema": {"type": "integer", "minimum": 0}},
+}
+"""Headers of an answer that may come from the database."""
 REPLAYED = "Idempotency-Replayed"
 """Header of a response to a request that was sent before."""
 LOCATION_HEADER = {"Location": {"description": "Path of the created resource.", "schema": {"type": "string"}}}

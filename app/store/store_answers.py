@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from app.engine.result import StoredAnswer, TaskResult
 from app.exceptions import StoreUnavailable
 from app.settings import Settings
-from app.store import answers
+from app.store import answers, cache
+from app.store.cache import Asked
 from app.store.store import Store
 from app.store.tables import Answer
 
@@ -34,12 +36,26 @@ async def store_answers(
     return replace(result, stored=())
 
 
-async def keep_answer(store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None) -> TaskResult:
-    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without a path of its own."""
+async def keep_answer(
+    store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None, asked: Asked | None = None
+) -> TaskResult:
+    """The result, once it is stored as `result.kept_as`. If it cannot be, the result without a path of its own.
+
+    It then answers what was `asked`, too.
+    """
     assert result.kept_as is not None
     kept = StoredAnswer(result.kept_as, result.document)
+
+    def remember(session: Session) -> None:
+        if asked is not None:
+            cache.remember(session, asked, kept.id, result.is_optimal)
+
+    put = partial(_put, store, settings, kind, [kept], owner, most=settings.answers_max_bytes)
     try:
-        await _put(store, settings, kind, [kept], owner, most=settings.answers_max_bytes)
+        try:
+            await put(also=remember)
+        except IntegrityError:  # an equal request was answered elsewhere at the same time
+            await put()
     except (StoreUnavailable, _TooLarge):
         return result.without_path()
     return replace(result, kept_as=None)
@@ -52,8 +68,12 @@ async def _put(
     stored: Sequence[StoredAnswer],
     owner: str | None,
     most: int | None = None,
+    also: Callable[[Session], None] | None = None,
 ) -> None:
-    """Stores answers, and prunes if it is time. Raises StoreUnavailable, or _TooLarge above `most` bytes."""
+    """Stores answers, and prunes if it is time; does something else in the same transaction.
+
+    Raises StoreUnavailable, or _TooLarge above `most` bytes.
+    """
 
     def put(session: Session) -> int:
         for answer in stored:
@@ -62,6 +82,8 @@ async def _put(
         size = sum(session.get_one(Answer, answer.id).size for answer in stored)
         if most is not None and size > most:
             raise _TooLarge
+        if also is not None:
+            also(session)
         return size
 
     if not store.pruning.due(await store.write(put), settings.answers_max_bytes):

@@ -140,6 +140,18 @@ class Answer(Table):
     body: Mapped[bytes] = mapped_column(LargeBinary)
 
 
+class CachedAnswer(Table):
+    """The answer to a request, whose canonical form has the hash `key`."""
+
+    __tablename__ = "cached_answers"
+    __table_args__ = (Index(None, "answer_id"),)
+
+    key: Mapped[str] = mapped_column(String(64), primary_key=True)
+    answer_id: Mapped[str] = mapped_column(ForeignKey("answers.id", ondelete="CASCADE"))
+    deadline: Mapped[float | None]
+    """Longest deadline [s] of a request that it answers; null if that does not matter, because it is optimal."""
+
+
 class Iteration(Table):
     """One step of a study: the request and the energies [J] of its motion. The complete answer is in `answers`."""
 

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.app.live import GRACE, LOCAL, WARM_UP, Server, serving
+from tests.app.live import COMPUTED, GRACE, LOCAL, WARM_UP, Server, serving
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -28,6 +28,7 @@ def client() -> Iterator[TestClient]:
         create_app(Settings(workers=2, queue_size=4, deadline_grace=GRACE)),
         base_url=LOCAL,
         raise_server_exceptions=False,
+        headers=COMPUTED,
     ) as client:
         end = time.monotonic() + WARM_UP
         while client.get("/readyz").status_code != 200:

@@ -30,7 +30,9 @@ GRACE = 60.0
 """`deadline_grace` [s]: on a busy machine, no worker that is about to answer is killed."""
 ANSWER = 120.0
 """Most that an answer may take on a busy machine [s]."""
-CLIENT = httpx2.Client(timeout=ANSWER, limits=httpx2.Limits(max_keepalive_connections=0))
+COMPUTED = {"Cache-Control": "no-cache"}
+"""Headers of a request whose answer is to be computed, although an equal request was answered before."""
+CLIENT = httpx2.Client(timeout=ANSWER, limits=httpx2.Limits(max_keepalive_connections=0), headers=COMPUTED)
 """For any thread, with a connection of its own for every request. To make one loads the certificates of all issuers."""
 
 
@@ -74,7 +76,8 @@ class Server:
         """A POST whose answer nobody waits for, over a connection of its own."""
         host, port = self.url.removeprefix("http://").split(":")
         content = json.dumps(body).encode()
-        head = {"Host": host, "Content-Type": "application/json", "Content-Length": str(len(content)), **headers}
+        head = {"Host": host, "Content-Type": "application/json", "Content-Length": str(len(content))}
+        head |= COMPUTED | headers
         lines = [f"POST {path} HTTP/1.1", *(f"{name}: {value}" for name, value in head.items()), "", ""]
         connection = socket.create_connection((host, int(port)), timeout=ANSWER)
         connection.sendall("\r\n".join(lines).encode() + content)

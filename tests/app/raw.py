@@ -45,8 +45,8 @@ def connected(server: Server, address: str = "127.0.0.1", receive_buffer: int | 
 def post(path: str, body: bytes = b"", declared: int | None = None, kind: str = "application/json") -> bytes:
     """A request, whose declared size may be larger than what is sent."""
     size = len(body) if declared is None else declared
-    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {kind}\r\nContent-Length: {size}\r\n\r\n"
-    return head.encode() + body
+    head = f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: {kind}\r\nContent-Length: {size}\r\n"
+    return f"{head}Cache-Control: no-cache\r\n\r\n".encode() + body
 
 
 def answer_on(connection: socket.socket) -> RawAnswer:

@@ -1,0 +1,182 @@
+"""Answers that were computed before: found by the canonical form of a request, by nobody else, and not for ever."""
+
+from __future__ import annotations
+
+import asyncio
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+from starlette.testclient import TestClient
+
+from app.engine.result import TaskResult
+from app.schemas.request import OptimizeRequest
+from app.settings import Settings
+from app.store import cache
+from app.store.answers import prune
+from app.store.cache import Asked
+from app.store.store import Store
+from app.store.store_answers import keep_answer
+from app.store.tables import CachedAnswer
+from app.tasks.answer_cache import AnswerCache
+from app.tasks.read_body import HeldBody
+from tests.app.requests import HOME, NEAR, move
+from tests.app.store.test_store import with_store
+
+KNOWN = {"Cache-Control": "max-age=60"}
+
+
+def sent(client: TestClient, body: Any, **headers: str) -> Any:
+    answer = client.post(
+        "/optimize", content=orjson.dumps(body), headers={"Content-Type": "application/json"} | headers
+    )
+    assert answer.status_code == 200, answer.text
+    return answer
+
+
+def load(mass: float) -> dict[str, Any]:
+    return {"mass": mass, "com": [0.0, 0.0, 0.05]}
+
+
+def is_hit(answer: Any) -> bool:
+    cached = answer.headers.get("joulepath-cache") == "hit"
+    assert cached == ("age" in answer.headers)
+    return cached
+
+
+def test_an_equal_request_has_the_same_answer(client: TestClient) -> None:
+    body = move(method="time_scaling", payload=load(0.123))
+    first = sent(client, body, **KNOWN)
+    assert not is_hit(first)
+    again = sent(client, body, **KNOWN | {"X-Request-ID": "another-one"})
+    assert is_hit(again) and 0 <= int(again.headers["age"]) < 1000
+    assert again.json()["id"] == "another-one"
+    assert again.content == first.content.replace(first.json()["id"].encode(), b"another-one", 1)
+    spelled_out = {"windings": True, "payload": load(0.123), "goal": {"q": NEAR}, "start": {"q": HOME}}
+    assert is_hit(sent(client, spelled_out | {"method": "time_scaling", "robot": "ur5e", "deadline": 17}, **KNOWN))
+    assert not is_hit(sent(client, body | {"payload": load(0.124)}, **KNOWN))
+    assert not is_hit(sent(client, body | {"candidates": "all"}, **KNOWN))
+    events = sent(client, body, **KNOWN, Accept="text/event-stream").text
+    assert events.startswith("event: answer\n") and events.count("event:") == 1
+
+
+def test_it_is_computed_again_if_asked_for(client: TestClient) -> None:
+    body = move(method="time_scaling", payload=load(0.125))
+    first = sent(client, body).json()
+    fresh = sent(client, body, **{"Cache-Control": "no-cache"})
+    assert not is_hit(fresh) and fresh.json()["answer"] != first["answer"]
+    again = sent(client, body, **KNOWN)
+    assert is_hit(again) and again.json()["answer"] == fresh.json()["answer"], "the last one"
+
+
+def test_what_is_deleted_is_computed_again(client: TestClient) -> None:
+    body = move(method="time_scaling", payload=load(0.126))
+    first = sent(client, body).json()
+    assert is_hit(sent(client, body, **KNOWN))
+    assert client.delete(first["answer"]).status_code == 204
+    assert not is_hit(sent(client, body, **KNOWN))
+
+
+def test_a_body_that_a_worker_reads_is_computed(client: TestClient) -> None:
+    points = [[1.0 + 1e-3 * k, 2.0, 3.0] for k in range(5000)]
+    obstacle = {"name": "x", "shape": "points", "points": points, "radius": 0.01}
+    body = move(method="time_scaling", scene={"obstacles": [obstacle]})
+    for _ in range(2):
+        assert not is_hit(sent(client, body, **KNOWN))
+
+
+def result(number: int, status: str) -> TaskResult:
+    return TaskResult.of_kept_json({"id": "first", "status": status, "number": number})
+
+
+def numbers(document: bytes) -> Any:
+    return orjson.loads(document)["number"]
+
+
+def test_one_that_is_not_optimal_does_for_shorter_deadlines(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        async def keep(number: int, status: str, deadline: float) -> None:
+            asked = Asked("key", deadline)
+            await keep_answer(store, Settings(), "optimize", result(number, status), None, asked)
+
+        async def found(deadline: float) -> Any:
+            known = await AnswerCache(store, None, False).find(Asked("key", deadline), "mine")
+            return None if known is None else numbers(known.document)
+
+        assert await found(1.0) is None
+        await keep(1, "feasible", 10.0)
+        assert [await found(each) for each in (5.0, 10.0, 10.5)] == [1, 1, None]
+        await keep(2, "optimal", 20.0)
+        assert [await found(each) for each in (5.0, 100.0)] == [2, 2]
+        await keep(3, "feasible", 200.0)
+        assert await found(1.0) == 2
+        await keep(4, "optimal", 1.0)
+        assert await found(100.0) == 4
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_two_services_that_answer_at_the_same_time_lose_nothing(tmp_path: Path) -> None:
+    """The row of the first comes between the look and the write of the second."""
+
+    async def test(store: Store) -> None:
+        asked, settings = Asked("key", 1.0), Settings()
+        remember, raced = cache.remember, [False]
+
+        def late(session: Any, *args: Any) -> None:
+            if not raced[0]:
+                raced[0] = True
+                session.add(CachedAnswer(key="key", answer_id="00000000-0000-0000-0000-000000000000", deadline=1.0))
+                session.flush()
+            remember(session, *args)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(cache, "remember", late)
+            answered = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
+        assert raced == [True] and not answered.document.endswith(b'"answer":null}')
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_what_is_pruned_is_forgotten(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        asked = Asked("key", 1.0)
+        await keep_answer(store, Settings(), "optimize", result(1, "optimal"), None, asked)
+        await store.write(lambda session: prune(session, 0, timedelta(days=1)))
+        assert await AnswerCache(store, None, False).find(asked, "mine") is None
+        assert await store.read(lambda session: session.query(CachedAnswer).count()) == 0
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_keys_tell_clients_kinds_and_robots_apart(tmp_path: Path) -> None:
+    body = OptimizeRequest.model_validate(move())
+
+    async def test(store: Store) -> None:
+        async def key(owner: str | None = None, kind: str = "optimize", **fields: Any) -> str | None:
+            asked = await AnswerCache(store, owner, False).asked(kind, body.model_copy(update=fields), 1.0)
+            return None if asked is None else asked.key
+
+        keys = [await key(), await key("a"), await key("b"), await key(kind="pareto"), await key(robot="ur10e")]
+        assert len(set(keys)) == 5 and None not in keys
+        assert await key() == await key(deadline=77.0)
+        assert await key(robot="nobodys") is None
+        cache_of_large = AnswerCache(store, None, False)
+        assert await cache_of_large.asked("optimize", HeldBody(b"", {}, set()), 1.0) is None
+        assert await cache_of_large.find(None, "mine") is None
+
+    with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
+
+
+def test_a_database_that_hangs_is_not_waited_for(tmp_path: Path) -> None:
+    class Hanging(Store):
+        async def read(self, work: Any) -> Any:
+            await asyncio.Event().wait()
+
+    async def test() -> None:
+        store = Hanging(f"sqlite:///{tmp_path}/joulepath.db")
+        assert await AnswerCache(store, None, False).find(Asked("key", 1.0), "mine") is None
+
+    asyncio.run(test())
