@@ -20,8 +20,7 @@ from optimizer.exports.ros_messages import Encoding, RosOptions, to_moveit, to_r
 from optimizer.exports.urscript import UrscriptOptions, to_urscript
 
 
-def check_options(request: ExportRequest, format: ExportFormat) -> None:
-    """Raises InvalidRequest for options of another format."""
+def _check_options(request: ExportRequest, format: ExportFormat) -> None:
     others = sorted(set(OPTIONS_OF.values()) - {OPTIONS_OF.get(format)})
     wrong = [name for name in others if getattr(request, name) is not None]
     if wrong:
@@ -31,7 +30,7 @@ def check_options(request: ExportRequest, format: ExportFormat) -> None:
 
 def to_file(request: ExportRequest, format: ExportFormat, as_json: bool, program: Program) -> ExportedFile:
     """The file. Raises InvalidRequest for options of another format, and FormatUnsuitable."""
-    check_options(request, format)
+    _check_options(request, format)
     return _WRITERS[format](request, "json" if as_json else "yaml", program)
 
 

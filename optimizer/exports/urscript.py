@@ -22,6 +22,7 @@ from optimizer.exports.pieces import pieces
 from optimizer.exports.program import Move, Program, Timed
 from optimizer.exports.urscript_parts import CHECKS, serving
 from optimizer.problem.arm import Payload
+from optimizer.trajectories.spline import peak_rates
 
 MOST_PIECES = 2_000
 """Most polynomials of a program: about a megabyte."""
@@ -52,9 +53,7 @@ def to_urscript(program: Program, options: UrscriptOptions | None = None) -> Exp
     options = options or UrscriptOptions()
     check_joints(program, "urscript", 6, "Universal Robots", "robots of Universal Robots, with six joints")
     _check_size(program, options)
-    fastest = max(
-        float(np.abs(move.spline.curve(np.linspace(0, move.duration, 201), 1)).max()) for move in program.moves
-    )
+    fastest = max(float(peak_rates(move.spline)[0].max()) for move in program.moves)
     tracking = LEAST_TRACKING + fastest * (options.lookahead_time + TRACKING_TIME)
     notes = (
         f"set points every {1000 / options.rate:g} ms by servoj, within {SET_POINT_ERROR:.0e} rad of the spline",
@@ -68,11 +67,11 @@ def to_urscript(program: Program, options: UrscriptOptions | None = None) -> Exp
     lines = ["def joulepath():"]
     lines += [f"  # {line}" for line in header(program, "program for Universal Robots controllers", notes)]
     lines += [*CHECKS, *serving(options.rate, options.lookahead_time, options.gain, tracking, degree)]
-    lines += [*_beginning(program), *_body(program, options, degree), "  stopj(2.0)", "end"]
+    lines += [*_beginning(program), *_body(program, options, degree), "end"]
     return ExportedFile.of_text("\n".join(lines) + "\n", "text/plain", "script", notes)
 
 
-def numbers(values: Array) -> str:
+def _numbers(values: Array) -> str:
     """A list of numbers in positional notation, to 1e-12."""
     return "[" + ", ".join(_number(x) for x in values) + "]"
 
@@ -106,13 +105,13 @@ def _output_notes(program: Program, options: UrscriptOptions) -> tuple[str, ...]
 
 def _beginning(program: Program) -> list[str]:
     """Checks, payload, and the slow way to the start."""
-    start = numbers(program.start)
+    start = _numbers(program.start)
     return [
         f"  # {comment(program.timed[0].step.label)}: the start, in joint space",
         f"  local jp_start = {start}",
         f"  if norm(get_target_payload() - {program.payload.mass:.6f}) > 0.05:",
-        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} kg. Continue sets '
-        'it.", "joulepath", True, False, blocking=True)',
+        f'    popup("The payload in force is not that of the motion, {program.payload.mass:.3f} kg. Continue sets it."'
+        ', "joulepath", True, False, blocking=True)',
         "  end",
         *_payload(program.payload),
         "  if jp_far(get_actual_joint_positions(), jp_start) > 0.01:",
@@ -127,7 +126,7 @@ def _beginning(program: Program) -> list[str]:
 
 
 def _payload(payload: Payload) -> list[str]:
-    return [f"  jp_payload({payload.mass:.6f}, {numbers(payload.com)})"]
+    return [f"  jp_payload({payload.mass:.6f}, {_numbers(payload.com)})"]
 
 
 def _body(program: Program, options: UrscriptOptions, degree: int) -> list[str]:
@@ -161,13 +160,13 @@ def _polynomials(move: Move, degree: int) -> list[str]:
     padded = np.zeros((len(coefficients), degree + 1, coefficients.shape[2]))
     padded[:, : coefficients.shape[1]] = coefficients
     calls = [
-        f"  jp_piece({begin:.12f}, {end:.12f}, {numbers(each.ravel())})"
+        f"  jp_piece({begin:.12f}, {end:.12f}, {_numbers(each.ravel())})"
         for begin, end, each in zip(edges[:-1], edges[1:], padded, strict=True)
     ]
-    return ["  jp_tick = 1", *calls, f"  jp_arrive({numbers(move.spline.control_points[-1])})"]
+    return ["  jp_tick = 1", *calls, f"  jp_arrive({_numbers(move.spline.control_points[-1])})"]
 
 
 def _points(move: Move, rate: int) -> list[str]:
     ticks = np.arange(1, int(np.ceil(move.duration * rate - 1e-6)) + 1) / rate
     q = move.spline.curve(np.minimum(ticks, move.duration))
-    return [*(f"  jp_servo({numbers(row)})" for row in q), f"  jp_arrive({numbers(move.spline.control_points[-1])})"]
+    return [*(f"  jp_servo({_numbers(row)})" for row in q), f"  jp_arrive({_numbers(move.spline.control_points[-1])})"]

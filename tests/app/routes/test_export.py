@@ -28,10 +28,15 @@ BOX = {
     "pose": {"position": [-0.6, -0.6, 0.2], "rpy": [0, 0, 0]},
 }
 EVIL = "pick\"] end # ' {x}; $(reboot)"
+LINES = {
+    "approach": {"direction": [0, 0, 1], "distance": 0.04, "speed": 0.2},
+    "limits": {"velocity": 1.5, "tcp_speed": 0.5},
+    "obstacles_ignored": ["box"],
+}
 ROUND = {
     "start": {"q": HOME},
     "stops": [
-        {"name": EVIL, "target": {"q": NEAR}, "payload": LOAD, "dwell": 0.2, "obstacles_ignored": ["box"]},
+        {"name": EVIL, "target": {"q": NEAR}, "payload": LOAD, "dwell": 0.2, **LINES},
         {"name": "place", "target": {"q": [0.5, -1.3, 1.3, -1.5, -1.57, 0.2]}, "payload": None},
     ],
     "scene": {"obstacles": [BOX]},
@@ -290,3 +295,14 @@ def test_absurd_durations_are_refused(client: TestClient, answer: Json, factor: 
 def test_a_slow_table_has_a_bounded_number_of_rows(client: TestClient, answer: Json) -> None:
     told = export(client, "csv", answer["answer"], speed_scale=0.01, table={"period": 1e-4})
     assert refused(told, problems.FormatUnsuitable)["format"] == "csv"
+
+
+def test_an_arm_too_large_to_be_repeated_is_sent_with_the_export(client: TestClient) -> None:
+    points = {"name": "cloud", "shape": "points", "radius": 0.01, "pose": {"position": [5, 0, 0], "rpy": [0, 0, 0]}}
+    cloud = points | {"points": [[0.0, 0.001 * k, 0.0005 * k] for k in range(4000)]}
+    arm = {"payload": LOAD, "scene": {"obstacles": [cloud]}}
+    found = client.post("/optimize", json=move(**arm)).json()
+    assert found["arm"] is None
+    refused(export(client, "csv", found["answer"]), problems.Validation)
+    assert export(client, "csv", found["answer"], arm=arm).status_code == 200
+    assert export(client, "csv", found, arm=arm).status_code == 200
