@@ -26,18 +26,12 @@ def add(session: Session, log: StoredLog, most: int) -> None:
 
 def get(session: Session, log_id: str) -> StoredLog:
     """A log with its file. Raises UnknownLog."""
-    log = session.get(StoredLog, log_id) if is_id(log_id) else None
-    if log is None:
-        raise UnknownLog
-    return log
+    return _found(session.get(StoredLog, log_id) if is_id(log_id) else None)
 
 
 def about(session: Session, log_id: str) -> StoredLog:
     """A log without its file. Raises UnknownLog."""
-    log = session.get(StoredLog, log_id, options=[_LIGHT]) if is_id(log_id) else None
-    if log is None:
-        raise UnknownLog
-    return log
+    return _found(session.get(StoredLog, log_id, options=[_LIGHT]) if is_id(log_id) else None)
 
 
 def page(session: Session, limit: int, after: str | None) -> tuple[list[StoredLog], str | None]:
@@ -56,3 +50,9 @@ def delete(session: Session, log_id: str, client: Client) -> None:
     log = about(session, log_id)
     check_owner(client, log.owner)
     session.execute(delete_from(StoredLog).where(StoredLog.id == log.id))
+
+
+def _found(log: StoredLog | None) -> StoredLog:
+    if log is None:
+        raise UnknownLog
+    return log

@@ -54,7 +54,8 @@ class Excitation:
     `centre` (nq,) [rad], `a`, `b` (nq, harmonics) [rad/s] and `period` [s] are those of the series; `trajectory` is the
     same motion as a spline, with samples, and `energy` what it needs. `condition` and `scaled_condition` are those of
     the columns over the noise, as they are and scaled to one length. `names` and `predicted_sd` are the parameters and
-    their standard deviations after one period. `starts` were completed, of which `feasible` gave a motion.
+    their standard deviations after one period. `cost` is what the criterion lowers. `starts` were completed, of which
+    `feasible` gave a motion.
     """
 
     period: float
@@ -67,6 +68,7 @@ class Excitation:
     scaled_condition: float
     names: tuple[str, ...]
     predicted_sd: Array
+    cost: float
     certificate: Certificate
     starts: int
     feasible: int
@@ -91,7 +93,7 @@ def excite(problem: ExcitationProblem) -> Excitation:
         if motion is None:
             continue
         feasible += 1
-        if best is None or motion.scaled_condition < best.scaled_condition:
+        if best is None or motion.cost < best.cost:
             best = motion
     if best is None:
         raise DeadlineExceeded([]) if limit is None else ExcitationInfeasible(limit)
@@ -212,6 +214,7 @@ class _Design:
             scaled_condition=information.condition(scaled=True),
             names=tuple(self.columns.names[k] for k in self.columns.wanted),
             predicted_sd=information.deviations(INDEPENDENT_RATE * spline.duration * self.arm.robot.nq),
+            cost=information.criterion(self.problem.criterion)[0],
             certificate=certificate,
             starts=0,
             feasible=0,

@@ -38,11 +38,11 @@ def _times(grid: Grid) -> Iterator[str]:
     if len(grid.gaps):
         lengths = np.diff(grid.gaps, axis=1) / grid.rate
         yield (
-            f"The log has {len(grid.gaps)} gaps, the longest of {lengths.max():.3g} s at "
-            f"{grid.time[grid.gaps[lengths.argmax(), 0]]:.3g} s: no move reaches across one."
+            f"Gaps in the log: {len(grid.gaps)}, the longest of {lengths.max():.3g} s at "
+            f"{grid.time[grid.gaps[lengths.argmax(), 0]]:.3g} s. No move reaches across one."
         )
     if grid.repeated:
-        yield f"{grid.repeated} rows repeat the time of the row before: the first of each time counts."
+        yield f"Rows with the time of the row before: {grid.repeated}. The first row of each time counts."
 
 
 def _constant(log: Log) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from app.schemas.logs import LogDetail, LogList
 from app.settings import Settings
 from models.registry import load_robot
 from tests.app.access.test_key_file import add
-from tests.app.live import LOCAL
+from tests.app.live import CLIENT, LOCAL, Server
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import Recording, csv_of, recorded, rigid_torques, truth_of, with_current
 
@@ -195,3 +196,17 @@ def test_unknown_columns_are_not_echoed(client: TestClient, recording: Recording
     answer = client.post("/logs", content=body, headers=CSV)
     refused(answer, problems.InvalidTable)
     assert b"SECRET" not in answer.content
+
+
+def test_over_a_real_socket(server: Server, recording: Recording) -> None:
+    """Good and broken logs at the same time: each gets its own answer, and a stored one survives."""
+    good = csv_of(recording)
+    bodies = [good, good[: len(good) // 2] + b"\0" * 100, gzip.compress(good), b"t,q1\n" * 40_000, good[::-1]]
+    with ThreadPoolExecutor(len(bodies)) as pool:
+        answers = [*pool.map(lambda body: CLIENT.post(f"{server.url}/logs", content=body, headers=CSV), bodies)]
+    assert [answer.status_code for answer in answers] == [201, 422, 201, 422, 422]
+    first, third = answers[0].json(), answers[2].json()
+    assert {name: first[name] for name in ("rows", "moves", "channels")} == {
+        name: third[name] for name in ("rows", "moves", "channels")
+    }
+    assert server.get(f"/logs/{first['id']}").json() == first

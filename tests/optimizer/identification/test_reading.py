@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import os
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from optimizer.identification.reading import LogOptions, read, read_log
 from optimizer.problem.arm import Payload
 from tests.identification_logs import SILENT, Form, Recording, csv_of, recorded, rigid_torques, truth_of, with_current
 
+ROOT = Path(__file__).parents[3]
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
 # nine digits are written
@@ -205,7 +208,7 @@ def test_oddities_are_reported(recording: Recording) -> None:
     reading = read("\n".join(broken).encode(), ROBOT, LogOptions())
     assert reading.report.dropped == 1
     words = " ".join(reading.report.warnings)
-    assert "1 gaps" in words and "1 rows repeat" in words and "No payload" in words
+    assert "Gaps in the log: 1," in words and "row before: 1." in words and "No payload" in words
     # two rests are two parts, with the hole between them
     assert any(
         after.start > before.end for before, after in zip(reading.log.moves, reading.log.moves[1:], strict=False)
@@ -307,3 +310,30 @@ def test_a_controllers_full_record(real_logs: Path) -> None:
     assert log.effort_meaning == "current" and log.payload.mass == 1.07
     assert log.power is not None and 30 < log.power.min() < log.power.max() < 200
     assert reading.report.dropped == 0 and reading.report.warnings == ()
+
+
+# of a log of 25 channels, 200 MB as arrays, and what reading it needs beside them; the interpreter's own not counted
+MOST_MEMORY = 400e6
+
+
+@pytest.mark.long
+def test_a_million_rows_stay_within_memory(tmp_path: Path) -> None:
+    """In a process of its own, whose peak counts nothing else."""
+    file, rows = tmp_path / "long.csv", 1_000_000
+    header = ",".join(["t", *(f"{kind}{joint}" for kind in "qvai" for joint in range(1, 7))])
+    with file.open("w") as out:
+        out.write(header + "\n")
+        for begin in range(0, rows, 10_000):
+            t = np.arange(begin, begin + 10_000) / 500
+            q = np.sin(np.outer(t, [0.1, 0.13, 0.17, 0.21, 0.23, 0.29]))
+            np.savetxt(out, np.column_stack([t, q, q, q, q]), fmt="%.7g", delimiter=",")
+    script = (
+        "import resource, sys\nfrom pathlib import Path\nfrom models.registry import load_robot\n"
+        "from optimizer.identification.reading import read_log\nrobot = load_robot('ur5e')\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "log = read_log(Path(sys.argv[1]), robot, effort='external')\n"
+        "print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)"
+    )
+    done = subprocess.run([sys.executable, "-c", script, file], capture_output=True, text=True, check=True, cwd=ROOT)
+    count, memory = (int(each) for each in done.stdout.split())
+    assert count == rows and memory < MOST_MEMORY
