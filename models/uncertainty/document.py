@@ -46,7 +46,7 @@ REPLACEABLE: dict[str, dict[str, tuple[float, float]]] = {
 }
 _WIDTHS = {"center_of_mass": 3, "inertia_frame_rpy": 3, "inertia": 6}
 _WORDS = ("unit", "source", "trust", "note")
-MOST_LAWS, MOST_WORD, MOST_PARAMETERS = 8, 2000, 200
+MOST_LAWS, MOST_WORD, MOST_PARAMETERS, MOST_VARIANCE = 8, 2000, 200, 1e12
 # relative: a principal moment below zero, or above the sum of the others, by rounding of a figure
 ROUNDED = 1e-3
 
@@ -244,6 +244,8 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())
+    if scale > MOST_VARIANCE:
+        raise InvalidFigures("covariance.matrix", f"must have entries of at most {MOST_VARIANCE:g}.")
     if np.abs(matrix - matrix.T).max() > 1e-9 * scale or np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale:
         raise InvalidFigures("covariance.matrix", "must be symmetric and positive semidefinite.")
     return result | {"covariance": {"names": list(names), "matrix": matrix.tolist()}}

@@ -37,23 +37,23 @@ _CERTAIN = 1e-9
 def energy_sensitivity(weights: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread) -> Sensitivity:
     """That of a motion to the errors of `spread`; the other arguments as in `losses.breakdown`."""
     rates, joints = _power_rates(v, a, tau, arm)
-    nq, count = tau.shape[1], len(PER_JOINT)
-    # by joint and figure; PER_JOINT comes figure by figure
-    root = spread.root[1:].reshape(count, nq, -1)
-    mean = spread.mean[1:].reshape(count, nq)
-    of_joints = joints + np.einsum("ckj,cj->kj", rates, mean)
-    factors = np.einsum("ckj,cjr->kjr", rates, root)
-    base = np.full(len(joints), arm.base_power)
+    count, size, nq = rates.shape
+    base = np.full(size, arm.base_power)
+    # by figure and joint, as PER_JOINT orders them
+    root, mean = spread.root[1:].reshape(count, nq, -1), spread.mean[1:].reshape(count, nq)
     if arm.bus.mode == "isolated":
-        worth, expected = _expected(of_joints, factors, np.zeros(nq))
+        means = joints + np.einsum("ckj,cj->kj", rates, mean)
+        factors = (rates.transpose(2, 1, 0) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
+        worth, expected = _expected(means, factors, np.zeros(nq))
         drawn, plain = base + spread.mean[0] + expected.sum(axis=1), base + np.maximum(joints, 0.0).sum(axis=1)
-        electronics = np.ones(len(joints))
+        electronics, gradient = np.ones(size), np.einsum("kj,ckj->cj", weights[:, None] * worth, rates)
     else:
         net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
-        means = base + spread.mean[0] + of_joints.sum(axis=1)
-        electronics, drawn = _expected(means, factors.sum(axis=1) + spread.root[0], taken)
-        worth, plain = electronics[:, None], np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
-    gradient = np.einsum("kj,ckj->cj", weights[:, None] * worth, rates)
+        flat = rates.transpose(1, 0, 2).reshape(size, -1)
+        means = net + spread.mean[0] + flat @ mean.ravel()
+        electronics, drawn = _expected(means, flat @ spread.root[1:] + spread.root[0], taken)
+        plain = np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
+        gradient = (weights * electronics) @ flat
     shift = float(weights @ (drawn - plain))
     return Sensitivity(np.concatenate([[float(weights @ electronics)], gradient.ravel()]), shift)
 

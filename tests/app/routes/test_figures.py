@@ -156,6 +156,7 @@ BAD: dict[str, tuple[dict[str, Any], list[str]]] = {
     "twice": (changed("covariance", "names", 0, to=FIGURES["covariance"]["names"][1]), ["covariance", "names"]),
     "not symmetric": (changed("covariance", "matrix", to=[[1.0, 0.5], [0.0, 1.0]]), ["covariance", "matrix"]),
     "indefinite": (changed("covariance", "matrix", to=[[1.0, 2.0], [2.0, 1.0]]), ["covariance", "matrix"]),
+    "endless": (changed("covariance", "matrix", to=[[1e308, 0.0], [0.0, 1.0]]), ["covariance", "matrix"]),
     "ragged": (changed("covariance", "matrix", to=[[1.0], [2.0, 1.0]]), ["covariance", "matrix"]),
     "no body": (FIGURES | {"inertials": {"inertia": NO_BODY}}, ["inertials", "inertia"]),
     "an unknown field": (FIGURES | {"frictions": {}}, []),
