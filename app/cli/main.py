@@ -16,6 +16,7 @@ from app.cli.export import export
 from app.cli.interrupts import interruptible
 from app.cli.keys import keys
 from app.cli.optimize import optimize
+from app.cli.replay import replay
 from app.cli.robots import robots
 from app.cli.serve import serve
 
@@ -43,7 +44,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, cycle, evaluate, export, robots, keys, cluster_worker):
+for command in (serve, optimize, cycle, evaluate, export, replay, robots, keys, cluster_worker):
     joulepath.add_command(command)
 
 
