@@ -1,4 +1,4 @@
-"""All benchmarks in one run of about eleven minutes on two cores; writes benchmarks/RESULTS.md with a plot.
+"""All benchmarks in one run of about a quarter of an hour on two cores; writes benchmarks/RESULTS.md with a plot.
 
     make bench                                all sections
     make bench BENCH_ARGS="--fraction 0.1"    a tenth of the tasks, to test the benchmarks
@@ -38,6 +38,7 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "starts": ("starts", (), 0),
     "success": ("requests", ("--clients", "2", "--line-every", "20", "--seed", "3"), 1000),
     "quality": ("quality", (), 100),
+    "simulation": ("simulation", (), 200),
     "load": ("load", (), 0),
     "scaling": ("scaling", (), 25),
     **{f"planner-{name}": ("planners", (name,), PLANNER_TASKS) for name in PLANNERS},

@@ -85,6 +85,10 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
         for name, points in (("excess", "control_points"), ("fine_excess", "fine_control_points")):
             task = f"best of {quality['starts']} starts, {quality[points]} control points"
             yield _spread(task, "energy above it [%]", quality[name], PERCENT, 2)
+    if simulation := results.get("simulation"):
+        for run, title in (("feed_forward", "known torques and PD"), ("pd", "PD alone"), ("changed", "changed arms")):
+            for quantity, spread in simulation[run].items():
+                yield _spread(f"answers replayed in MuJoCo, {title}", quantity, spread, 1, 4)
     if load := results.get("load"):
         yield _spread(f"{load['clients']} clients", "time [ms]", load["wall"], MS, 0)
 

@@ -9,6 +9,16 @@ from typing import Any
 Results = dict[str, Any]
 
 MS, PERCENT = 1e3, 1e2
+# what the documentation promises of answers that MuJoCo plays with torques known in advance and a PD loop
+PROMISES = {
+    "torque [1e-9 of the limit]": 1.0,
+    "joints [mrad]": 0.3,
+    "TCP [mm]": 0.25,
+    "electrical [%]": 0.05,
+    "mechanical [%]": 0.1,
+    "contacts": 0.0,
+    "accelerations, MuJoCo and Pinocchio [1e-9]": 1.0,
+}
 
 
 @dataclass(frozen=True)
@@ -125,6 +135,12 @@ def _load(found: Results) -> Iterator[Requirement]:
     yield Requirement(task, "runs with an answer 429 without `Retry-After`", "count", unnamed, 0)
 
 
+def _simulation(found: Results) -> Iterator[Requirement]:
+    for quantity, bound in PROMISES.items():
+        most = found["feed_forward"][quantity]["maximum"]
+        yield Requirement("answers replayed in MuJoCo", quantity, "maximum", most, bound, digits=4)
+
+
 SECTIONS: dict[str, Callable[[Results], Iterator[Requirement]]] = {
     "solver": _solver,
     "http": _http,
@@ -132,5 +148,6 @@ SECTIONS: dict[str, Callable[[Results], Iterator[Requirement]]] = {
     "starts": _starts,
     "success": _success,
     "quality": _quality,
+    "simulation": _simulation,
     "load": _load,
 }

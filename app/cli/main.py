@@ -17,6 +17,7 @@ from app.cli.identify import identify
 from app.cli.interrupts import interruptible
 from app.cli.keys import keys
 from app.cli.optimize import optimize
+from app.cli.replay import replay
 from app.cli.robots import robots
 from app.cli.serve import serve
 
@@ -44,7 +45,7 @@ def joulepath() -> None:
     """
 
 
-for command in (serve, optimize, cycle, evaluate, export, identify, robots, keys, cluster_worker):
+for command in (serve, optimize, cycle, evaluate, export, identify, replay, robots, keys, cluster_worker):
     joulepath.add_command(command)
 
 

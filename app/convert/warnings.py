@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from optimizer.collision.close_pass import CLOSE
 from optimizer.replay.nearest_contact import LeastClearance
+from optimizer.simulation.outcome import Outcome
+from optimizer.simulation.planned import PlannedMotion
+from optimizer.simulation.replay import Replay
+from optimizer.simulation.shapes import unsimulated
 from optimizer.solution import Solution
 
 ADVICE = "Make sure that the arm and its cell are known as accurately, or ask for a margin."
 
 
+LITTLE_LEFT = 0.9
+"""Part of a torque limit above which a plan leaves a controller too little."""
 MISSED = (
     "The inverse kinematics of this arm may have missed arm configurations: the answer is the best of those found, its "
     "status is not `optimal`, and its lower bound covers those that may be missing."
@@ -31,6 +37,37 @@ def certified_warnings(solution: Solution) -> list[str]:
 def sampled_warnings(close_pass: LeastClearance | None) -> list[str]:
     """The warnings of a motion whose distances were sampled."""
     return [] if close_pass is None else [_close(close_pass.pair, close_pass.distance, close_pass.time, "")]
+
+
+def replay_warnings(planned: PlannedMotion, found: Replay) -> list[str]:
+    """The warnings of a replayed motion."""
+    arm = planned.arm
+    said = [
+        f"{name} has many parts and is not simulated: contacts with it are not found. The certificate counts it."
+        for name in unsimulated(arm)
+    ]
+    for control, run in found.runs.items():
+        said += _of_run(f"Under {control}", planned, found, run)
+    for change in found.changes:
+        said += _of_run(f"With {change.quantity} times {change.factor:.4g}", planned, found, change.outcome)
+    return said
+
+
+def _of_run(what: str, planned: PlannedMotion, found: Replay, run: Outcome) -> list[str]:
+    said = []
+    for joint, time, ratio in zip(planned.arm.robot.joint_names, run.saturated, found.planned_ratio, strict=True):
+        if time > 0:
+            advice = ": plan with a tighter limits.torque." if ratio > LITTLE_LEFT else "."
+            said.append(
+                f"{what}, {joint} asks for more than its torque limit for {time:.4g} s. "
+                f"It is planned at {ratio:.1%} of this limit{advice}"
+            )
+    if run.collides and run.contact is not None:
+        first, second = run.contact.pair
+        said.append(
+            f"{what}, {first} and {second} touch: {_mm(run.contact.depth)} mm deep at {run.contact.time:.3f} s."
+        )
+    return said
 
 
 def _close(pair: tuple[str, str], distance: float, time: float, proven: str) -> str:

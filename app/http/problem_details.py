@@ -83,6 +83,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.NoTrajectory: problems.NoTrajectory,
     optimizer_errors.NotCertified: problems.NotCertified,
     optimizer_errors.FormatUnsuitable: problems.FormatUnsuitable,
+    optimizer_errors.SimulatorMissing: problems.SimulatorMissing,
     optimizer_errors.DeadlineExceeded: problems.DeadlineExceeded,
     Busy: problems.Busy,
     TooManyRequests: problems.TooManyRequests,

@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Request, Response
 
-from app.exceptions import PartsNeeded
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.kept_answers import with_kept_answers
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.schemas import errors as problems
 from app.schemas.export import FORMATS, ExportFormat, ExportRequest
-from app.store import answers
-from app.store.store import Store
-from app.tasks.arm_engine import ArmEngine
 from app.tasks.export import ExportResult, ExportTask
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
-_PREFIX = "/answers/"
-# an id, then the moves of a round
-_LOOK_UPS = 2
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9._-]")
 _FORMAT = Path(
     description="The format. " + " ".join(f"`{name}`: {text}" for name, text in FORMATS.items()),
@@ -71,27 +64,10 @@ async def export(
     for the speed asked for: what fails it is not exported. No format was run on hardware."""
     as_json = "application/json" in request.headers.get("accept", "").lower()
     task = ExportTask(body, format, as_json, request.state.id)
-    work = _with_parts(task, engine, store, settings.max_deadline)
-    return _response(await unless_disconnected(request, work))
-
-
-async def _with_parts(task: ExportTask, engine: ArmEngine, store: Store, deadline: float) -> ExportResult:
-    """The task's result, once it has the kept answers that it needs. Raises what it raises, and UnknownAnswer."""
-    for _ in range(_LOOK_UPS + 1):
-        try:
-            result = await engine.run(task, deadline)
-        except PartsNeeded as needed:
-            found = {name: await _kept(store, name) for name in dict.fromkeys(needed.names)}
-            task = task.with_kept(found)
-        else:
-            assert isinstance(result, ExportResult)
-            return result
-    raise AssertionError("an answer needs its own parts only")
-
-
-async def _kept(store: Store, name: str) -> bytes:
-    _, body = await store.read(partial(answers.get, answer_id=name.removeprefix(_PREFIX)))
-    return body
+    work = with_kept_answers(task, engine, store, settings.max_deadline)
+    result = await unless_disconnected(request, work)
+    assert isinstance(result, ExportResult)
+    return _response(result)
 
 
 def _response(result: ExportResult) -> Response:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
-import orjson
 from pydantic import ValidationError
 
 from app.convert.exported_answer import paths_of_moves, to_program
 from app.convert.exported_file import to_file
 from app.engine.result import TaskResult
-from app.exceptions import InvalidRequest, PartsNeeded
 from app.http.problem_details import invalid_request
 from app.schemas.export import ExportFormat, ExportRequest
+from app.tasks.kept_answers import WithKeptAnswers
 from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.exceptions import DeadlineExceeded
 from optimizer.exports.certified import certified
@@ -32,8 +30,8 @@ class ExportResult(TaskResult):
 
 
 @dataclass(frozen=True)
-class ExportTask:
-    """A validated request, its format, and its id. `kept` holds kept answers (JSON) by their ids or paths.
+class ExportTask(WithKeptAnswers):
+    """A validated request, its format, and its id.
 
     `as_json`: the client accepts JSON.
     """
@@ -42,7 +40,6 @@ class ExportTask:
     format: ExportFormat
     as_json: bool
     request_id: str
-    kept: dict[str, bytes] = field(default_factory=dict)
 
     def run(self, deadline: float) -> ExportResult:
         """The file. Raises PartsNeeded with the answers that must be kept at hand first, and what its parts raise."""
@@ -58,29 +55,12 @@ class ExportTask:
         worst = max(ratio for each in certificates for ratio in each.worst_ratio.values())
         return _result(program, file, worst)
 
-    def with_kept(self, found: dict[str, bytes]) -> ExportTask:
-        """The same task with more kept answers at hand."""
-        return replace(self, kept=self.kept | found)
-
     def _program(self) -> Program:
         given = self.asked.answer
-        answer = self._kept([given])[0] if isinstance(given, str) else given
-        self._kept(paths_of_moves(answer))
-        program = to_program(answer, self.asked.arm, self._kept)
+        answer = self.answers([given])[0] if isinstance(given, str) else given
+        self.answers(paths_of_moves(answer))
+        program = to_program(answer, self.asked.arm, self.answers)
         return program if self.asked.speed_scale == 1 else program.slowed(self.asked.speed_scale)
-
-    def _kept(self, names: list[str]) -> list[Any]:
-        missing = [name for name in names if name not in self.kept]
-        if missing:
-            raise PartsNeeded(missing)
-        return [_document(self.kept[name]) for name in names]
-
-
-def _document(body: bytes) -> Any:
-    content = orjson.loads(body)
-    if not isinstance(content, dict):
-        raise InvalidRequest([{"loc": ["body", "answer"], "msg": "This kept answer is no motion"}])
-    return content
 
 
 def _result(program: Program, file: ExportedFile, worst: float) -> ExportResult:

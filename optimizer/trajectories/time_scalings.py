@@ -99,16 +99,20 @@ def controller_default(limits: Limits, default: DefaultMotion, q_start: Array, q
     The joint that needs longest moves with a trapezoid of speed; the others keep in step with it (UR script manual,
     `movej`).
     """
-    displacement = np.abs(q_goal - q_start)
+    duration, blend = default_times(limits, default, q_goal - q_start)
+    return _trapezoid(q_start, q_goal, duration, blend) if duration > 0 else standstill(q_start, 0.0)
+
+
+def default_times(limits: Limits, default: DefaultMotion, displacement: Array) -> tuple[float, float]:
+    """Duration and time of acceleration [s] of the controller's default motion over `displacement` (nq,) [rad]."""
+    distance = np.abs(displacement)
     # 1 / (greatest speed and acceleration of the time scaling s(t) from 0 to 1 that all joints share)
-    slow = float((displacement / np.minimum(limits.v_max, default.velocity)).max())
-    lazy = float((displacement / np.minimum(limits.a_max, default.acceleration)).max())
+    slow = float((distance / np.minimum(limits.v_max, default.velocity)).max())
+    lazy = float((distance / np.minimum(limits.a_max, default.acceleration)).max())
     if slow == 0:
-        return standstill(q_start, 0.0)
+        return 0.0, 0.0
     blend = lazy / slow
-    if blend < slow:
-        return _trapezoid(q_start, q_goal, slow + blend, blend)
-    return _trapezoid(q_start, q_goal, 2 * math.sqrt(lazy), math.sqrt(lazy))
+    return (slow + blend, blend) if blend < slow else (2 * math.sqrt(lazy), math.sqrt(lazy))
 
 
 def quintic_spline(q_start: Array, q_goal: Array, duration: float) -> Spline:
@@ -121,20 +125,29 @@ def _trapezoid(q_start: Array, q_goal: Array, duration: float, blend: float) -> 
     """Constant acceleration for `blend` [s], constant speed, and the same back to rest."""
     tau, weights = lobatto_nodes(np.unique([0.0, blend / duration, 1 - blend / duration, 1.0]))
     t = tau * duration
-    speed = 1 / (duration - blend)
-    acceleration = speed / blend
     # by panel, not by node: at a jump of acceleration the nodes of either side belong to their own phase
     middle = np.repeat(t.reshape(-1, len(LOBATTO)).mean(axis=1), len(LOBATTO))
-    left = duration - t
-    phases = [middle < blend, middle > duration - blend]
-    law = np.stack(
+    speed = 1 / (duration - blend)
+    law, peaks = trapezoid_law(t, duration, blend, middle), np.array([speed, speed / blend, np.inf])
+    return _sampled(t, weights * duration, q_start, q_goal - q_start, law, peaks)
+
+
+def trapezoid_law(t: Array, duration: float, blend: float, phase: Array | None = None) -> Array:
+    """s, ds/dt, d²s/dt² (3, k) of a trapezoid of speed from 0 to 1 at times t (k,) [s], with ramps of `blend` [s].
+
+    `phase` (k,) [s] are times in the phases that the instants count to: by default they themselves.
+    """
+    phase = t if phase is None else phase
+    speed, left = 1 / (duration - blend), duration - t
+    acceleration = speed / blend
+    phases = [phase < blend, phase > duration - blend]
+    return np.stack(
         [
             np.select(phases, [acceleration * t**2 / 2, 1 - acceleration * left**2 / 2], speed * (t - blend / 2)),
             np.select(phases, [acceleration * t, acceleration * left], speed),
             np.select(phases, [acceleration, -acceleration], 0.0),
         ]
     )
-    return _sampled(t, weights * duration, q_start, q_goal - q_start, law, np.array([speed, acceleration, np.inf]))
 
 
 def _sampled(t: Array, weights: Array, q_start: Array, displacement: Array, law: Array, peaks: Array) -> SampledMotion:

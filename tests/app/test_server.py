@@ -17,6 +17,7 @@ import httpx2
 import pytest
 
 from app.schemas.errors import BodyTooLarge, Busy, DeadlineExceeded, Internal, MalformedHttp, ShuttingDown
+from app.schemas.replay import ReplayResponse
 from app.schemas.response import OptimizeResponse
 from tests.app.live import CLIENT, EXIT, ROOT, WARM_UP, Server, alive, processor_time, serving, until
 from tests.app.requests import EXAMPLES, long_search, move
@@ -64,6 +65,18 @@ def until_replaced(server: Server, before: list[int], count: int) -> None:
         return len(now) == len(before) and len(set(before) - set(now)) == count
 
     until(replaced)
+
+
+def test_an_answer_is_played_in_mujoco(server: Server) -> None:
+    """By its path alone: the payload is in the answer."""
+    found = server.post("/optimize", move(payload={"mass": 2.0, "com": [0.0, 0.0, 0.06]})).json()
+    answer = server.post("/replay", {"answer": found["answer"], "perturb": {"payload": 0.1}, "step": 1e-3})
+    (motion,) = ReplayResponse.model_validate_json(answer.content).motions
+    assert motion.planned.electrical == found["energy"]["electrical"]["total"]
+    assert max(motion.runs[0].joint_error) < 3e-4 < max(motion.changes[0].joint_error)
+    assert not motion.runs[0].collides
+    refusal = server.post("/replay", {"answer": found | {"arm": {}}})
+    assert refusal.json()["type"] == "/problems/not-certified"
 
 
 def test_answers(server: Server) -> None:

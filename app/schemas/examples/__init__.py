@@ -17,6 +17,7 @@ from app.schemas.examples.logs import LOG_EXAMPLES
 from app.schemas.examples.optimize import OPTIMIZE_EXAMPLES
 from app.schemas.examples.own_arm import NEW_ROBOT_EXAMPLES, PUT_EXAMPLES
 from app.schemas.examples.pareto import PARETO_EXAMPLES
+from app.schemas.examples.replay import REPLAY_EXAMPLES
 from app.schemas.examples.studies import ITERATION_EXAMPLES, STUDY_EXAMPLES
 from app.schemas.examples.whatif import WHATIF_EXAMPLES
 
@@ -29,6 +30,7 @@ BODY_EXAMPLES: dict[str, dict[str, dict[str, Example]]] = {
     "/whatif": {JSON: WHATIF_EXAMPLES},
     "/evaluate": {JSON: EVALUATE_EXAMPLES, CSV: CSV_EXAMPLES},
     "/export/{format}": {JSON: EXPORT_EXAMPLES},
+    "/replay": {JSON: REPLAY_EXAMPLES},
     "/ik": {JSON: IK_EXAMPLES},
     "/ik/path": {JSON: IK_PATH_EXAMPLES},
     "/excitation": {JSON: EXCITATION_EXAMPLES},

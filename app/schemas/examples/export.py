@@ -9,7 +9,7 @@ from fastapi.openapi.models import Example
 from app.schemas.examples.values import HOME, NEAR, STANDING_STILL
 
 _DURATION = 1.5
-_ANSWER: dict[str, Any] = {
+ANSWER: dict[str, Any] = {
     "robot": "ur5e",
     "arm": {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
     "trajectory": {
@@ -32,11 +32,11 @@ _ANSWER: dict[str, Any] = {
 EXPORT_EXAMPLES: dict[str, Example] = {
     "urscript": {
         "summary": "A program for a UR5e that follows the motion at a tenth of its speed",
-        "value": {"answer": _ANSWER, "speed_scale": 0.1, "urscript": {"digital_output": 0}},
+        "value": {"answer": ANSWER, "speed_scale": 0.1, "urscript": {"digital_output": 0}},
     },
     "ros2": {
         "summary": "A trajectory for ros2_control, for rosbridge",
-        "value": {"answer": _ANSWER, "ros2": {"message": "trajectory", "encoding": "json"}},
+        "value": {"answer": ANSWER, "ros2": {"message": "trajectory", "encoding": "json"}},
     },
-    "csv": {"summary": "A table with a row every 4 ms", "value": {"answer": _ANSWER, "table": {"period": 0.004}}},
+    "csv": {"summary": "A table with a row every 4 ms", "value": {"answer": ANSWER, "table": {"period": 0.004}}},
 }

@@ -161,7 +161,7 @@ def test_robots_are_listed_with_their_trust() -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["", "serve", "optimize", "cycle", "evaluate", "robots", "robots add", "robots remove"]
+    "command", ["", "serve", "optimize", "cycle", "evaluate", "replay", "robots", "robots add", "robots remove"]
 )
 def test_every_help_has_an_example(here: Here, command: str) -> None:
     code, out, _ = here.run(*command.split(), "--help")

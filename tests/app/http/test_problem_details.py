@@ -49,6 +49,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.RoundTooShort(5.5, 0.9),
     exceptions.NotCertified(2, "its velocity is at 1.2 of the limit", {"velocity": 1.2, "torque": np.nan}),
     exceptions.FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
+    exceptions.SimulatorMissing(),
     exceptions.PathInfeasible(0.5, [exceptions.PathAttempt("left/up/flip", 0.6, "singular")]),
 ]
 

@@ -13,7 +13,7 @@ from tests.app.live import ROOT
 from tests.app.requests import PATIENT
 
 EXAMPLES = ROOT / "examples"
-WITH_DEADLINE = ("optimize", "compare", "pareto", "cycle", "whatif")
+WITH_DEADLINE = ("optimize", "compare", "pareto", "cycle", "whatif", "replay")
 FILES = {file.relative_to(EXAMPLES).with_suffix("").as_posix(): file for file in sorted(EXAMPLES.rglob("*.json"))}
 IN_THE_DOCUMENT = {
     f"{path[1:]}/{name}": example["value"]

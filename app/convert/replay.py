@@ -1,0 +1,154 @@
+"""POST /replay: from answers to planned motions, and from replays to the answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.convert.fields import fields
+from app.schemas.replay import DeepestContact, Perturb, SimulatedMotion
+from optimizer.exports.program import Move
+from optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
+from optimizer.simulation.outcome import Outcome
+from optimizer.simulation.planned import PlannedMotion, PlannedTorques
+from optimizer.simulation.reference import course_of
+from optimizer.simulation.replay import Quantity, Replay
+from optimizer.solution import BaselineName, Energy, Objective
+
+_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+
+
+class _Part(BaseModel):
+    """A part of an answer. Other fields are not looked at."""
+
+    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class _Electrical(_Part):
+    total: _Number
+    dwell: _Number = 0.0
+
+
+class _Mechanical(_Part):
+    total: _Number
+
+
+class _Energy(_Part):
+    electrical: _Electrical
+    mechanical: _Mechanical
+
+
+class _Baseline(_Part):
+    name: BaselineName
+    duration: Annotated[float, Field(ge=0, le=1e6)]
+    electrical: _Number
+    mechanical: _Number
+    saving: _Number
+
+
+class _Candidate(_Part):
+    q_goal: Annotated[list[_Number], Field(max_length=16)]
+
+
+class _Optimized(_Part):
+    """An answer of `POST /optimize`, but for its motion."""
+
+    objective: Objective = "electrical"
+    energy: _Energy
+    baselines: Annotated[list[_Baseline], Field(max_length=16)] = []
+    candidates: Annotated[list[_Candidate], Field(max_length=100_000)] = []
+
+
+class _Total(_Part):
+    energy: _Energy
+
+
+class _Evaluated(_Part):
+    """An answer of `POST /evaluate`, but for its motion."""
+
+    total: _Total
+
+
+def to_planned_motion(move: Move, answer: dict[str, Any]) -> PlannedMotion:
+    """The motion of an answer, whose samples are checked, with the energies that the answer reports.
+
+    Raises ValidationError (of pydantic).
+    """
+    arm, spline = move.arm, move.spline
+    if "trajectory" not in answer:
+        energy = _Evaluated.model_validate(answer).total.energy
+        return _planned(move, answer["samples"], energy)
+    given = _Optimized.model_validate(answer)
+    ends = spline.control_points[0], spline.control_points[-1]
+    named = [np.array(each.q_goal, dtype=float) for each in given.candidates if len(each.q_goal) == arm.robot.nq]
+    names = ReportedBaseline.__dataclass_fields__
+    reported = [ReportedBaseline(**{name: getattr(each, name) for name in names}) for each in given.baselines]
+    return replace(
+        _planned(move, answer["trajectory"], given.energy),
+        objective=given.objective,
+        waiting=given.energy.electrical.dwell,
+        compared=bool(reported),
+        baselines=planned_baselines(arm, ends[0], [ends[1], *named], spline.duration, reported),
+    )
+
+
+def _planned(move: Move, samples: dict[str, Any], energy: _Energy) -> PlannedMotion:
+    return PlannedMotion(
+        arm=move.arm,
+        course=course_of(move.spline),
+        duration=move.duration,
+        electrical=energy.electrical.total - energy.electrical.dwell,
+        mechanical=energy.mechanical.total,
+        torques=PlannedTorques(*(np.array(samples[name], dtype=float) for name in ("q", "v", "a", "tau"))),
+    )
+
+
+def to_perturbation(perturb: Perturb | None) -> dict[Quantity, float]:
+    """The fraction by which each quantity is changed."""
+    given: dict[Quantity, float | None] = (
+        {} if perturb is None else {"payload": perturb.payload, "friction": perturb.friction}
+    )
+    return {quantity: fraction for quantity, fraction in given.items() if fraction is not None}
+
+
+def to_replayed_motion(planned: PlannedMotion, found: Replay, leg: int | None) -> dict[str, Any]:
+    """The entry of one motion."""
+    return {
+        "leg": leg,
+        "duration": planned.duration,
+        "planned": {**fields(planned, "electrical", "mechanical"), "limit_ratio": found.planned_ratio},
+        "torque_error": found.torque_error,
+        "runs": [{**_outcome(planned, run), "control": control} for control, run in found.runs.items()],
+        "changes": [
+            {
+                **_outcome(planned, each.outcome),
+                **fields(each, "quantity", "factor"),
+                "savings": [{"name": name, "saving": saving} for name, saving in each.savings.items()],
+            }
+            for each in found.changes
+        ],
+        "savings": [
+            {
+                **fields(each, "name", "planned", "simulated", "least", "most", "persists"),
+                "range": 100 * (each.most - each.least),
+            }
+            for each in found.savings
+        ],
+    }
+
+
+def _outcome(planned: PlannedMotion, found: Outcome) -> dict[str, Any]:
+    """The fields of a SimulatedMotion."""
+    energy: Energy = found.energy
+    totals = {"electrical": energy.electrical.total, "mechanical": energy.mechanical.total}
+    errors = {f"{name}_error": _relative(total, getattr(planned, name)) for name, total in totals.items()}
+    contact = found.contact
+    own = {**totals, **errors, "contact": None if contact is None else fields(contact, *DeepestContact.model_fields)}
+    return own | fields(found, *(name for name in SimulatedMotion.model_fields if name not in own))
+
+
+def _relative(value: float, reference: float) -> float:
+    return (value - reference) / abs(reference) if reference else 0.0

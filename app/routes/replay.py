@@ -1,0 +1,38 @@
+"""POST /replay."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Request, Response
+
+from app.http.disconnect import unless_disconnected
+from app.http.handlers import result_response
+from app.http.openapi import problem_responses
+from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
+from app.routes.kept_answers import with_kept_answers
+from app.routes.large_bodies import LargeBodyRoute
+from app.routes.parameters import deadline_of
+from app.routes.problem_lists import WORKER_PROBLEMS
+from app.schemas import errors as problems
+from app.schemas.replay import ReplayRequest, ReplayResponse
+from app.tasks.replay import ReplayTask
+
+router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
+
+
+@router.post(
+    "/replay",
+    summary="A motion in an independent simulator",
+    response_model=ReplayResponse,
+    responses=problem_responses(
+        *WORKER_PROBLEMS, problems.UnknownAnswer, problems.NotCertified, problems.SimulatorMissing
+    ),
+)
+async def replay(
+    request: Request, body: ReplayRequest, settings: ServiceSettings, engine: ServiceArmEngine, store: ServiceStore
+) -> Response:
+    """Plays the motion of an answer in MuJoCo, with a controller, and puts what happens beside what the answer says:
+    deviation, torques, contacts and energy. With `perturb`, also on arms that are not quite the one planned with, and
+    with what is left of the savings there."""
+    task = ReplayTask(body, request.state.id)
+    work = with_kept_answers(task, engine, store, deadline_of(body, settings.max_deadline))
+    return result_response(await unless_disconnected(request, work))

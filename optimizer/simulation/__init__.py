@@ -1,0 +1,1 @@
+"""Motions played in MuJoCo: a second opinion on torques, energy, contacts and savings."""
