@@ -27,7 +27,7 @@ class Form:
 
 
 # brackets, underscores or points before the number of a joint
-_AT = r"[._\[]?([0-9]+)\]?"
+_AT = r"[._\[]?([0-9]{1,3})\]?"
 FORMS = (
     Form(
         "rtde",
@@ -46,7 +46,13 @@ FORMS = (
     Form(
         "own",
         "t",
-        {"q": "q([0-9]+)", "v": "v([0-9]+)", "a": "a([0-9]+)", "current": "i([0-9]+)", "torque": "tau([0-9]+)"},
+        {
+            "q": "q([0-9]{1,3})",
+            "v": "v([0-9]{1,3})",
+            "a": "a([0-9]{1,3})",
+            "current": "i([0-9]{1,3})",
+            "torque": "tau([0-9]{1,3})",
+        },
         ("p",),
     ),
     Form(

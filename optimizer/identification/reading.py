@@ -27,10 +27,12 @@ from optimizer.identification.rows import LONGEST_LINE, MOST_BYTES, Rows, Source
 from optimizer.identification.usable_effort import usable
 from optimizer.problem.arm import Payload
 from optimizer.problem.arrays import frozen
-from optimizer.replay.recording import FAR_OUT
+from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
 
 _OF_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
 _MOST_ANGLE = 20 * pi  # rad, ten turns
+_MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
+_MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
 
 
@@ -140,7 +142,7 @@ def _channels(source: Path | bytes, robot: Robot, options: LogOptions) -> tuple[
         used = columns.used
         rows = Rows(file, names, separator, used)
         where = {group: [used.index(k) for k in indices] for group, indices in columns.groups.items()}
-        scales = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
+        scales: dict[Group, float] = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
         scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
         # arrays that grow in place: a log can fill half of the memory
         parts = {group: array("d") for group in where}
@@ -150,10 +152,23 @@ def _channels(source: Path | bytes, robot: Robot, options: LogOptions) -> tuple[
             numbers.frombytes(lines.astype(float).tobytes())
             for group, indices in where.items():
                 parts[group].frombytes((block[:, indices] * scales.get(group, 1.0)).tobytes())
+            _check_sizes(block, lines, rows, where, scales)
             _check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
     grid = grid_of(np.frombuffer(times), np.frombuffer(numbers), names[columns.time])
     values = {group: np.frombuffer(part).reshape(-1, len(where[group])) for group, part in parts.items()}
     return _Channels(grid, columns, values), rows.dropped
+
+
+def _check_sizes(
+    block: Array, lines: Array, rows: Rows, where: Mapping[Group, Sequence[int]], scales: Mapping[Group, float]
+) -> None:
+    """Raises InvalidTable for a number that no arm has: it would spoil everything that is computed."""
+    for group, indices in where.items():
+        wrong = np.argwhere(np.abs(block[:, indices]) * scales.get(group, 1.0) > _MOST.get(group, _MOST_OF_OTHERS))
+        if len(wrong):
+            at, column = wrong[0].tolist()
+            row, name = int(lines[at]), rows.columns[rows.used[indices[column]]]
+            raise InvalidTable(f"{name} in line {row} is too large to be a robot's: correct or delete it.", row, name)
 
 
 def _check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> None:

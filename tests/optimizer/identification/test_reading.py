@@ -271,6 +271,9 @@ def broken(recording: Recording) -> dict[str, Case]:
         "broken gzip": (gzip.compress(good)[:-200], "broken gzip", None, None),
         "no gzip at all": (b"\x1f\x8b" + bytes(100), "broken gzip", None, None),
         "one long line": (b"t," + b"q" * 40_000, "longer than", 1, None),
+        "a joint's number": (b"t,q" + b"9" * 6000, "no joint positions", 1, None),
+        "huge": (with_line(10, b",".join([*cells[:-1], b"1e300"])), "i6 in line 10 is too large", 10, "i6"),
+        "infinite": (with_line(10, b",".join([*cells[:-1], b"1e400"])), "i6 in line 10 is no finite", 10, "i6"),
         "mostly cut": (b"\n".join([*lines[:50], *(line[:40] for line in lines[50:100])]), "columns", 51, None),
         "a week later": (b"\n".join([*lines[:50], b"6e5" + lines[50][lines[50].index(b",") :]]), "missing", 51, "t"),
     }
