@@ -61,7 +61,13 @@ def _kind_of(file: IO[bytes]) -> _Kind:
     responses={
         200: {"content": {"text/csv": {"schema": {"type": "string"}, "example": CSV_TABLE}}},
         **ACCEPTED,
-        **problem_responses(*WORKER_PROBLEMS, problems.InvalidTable, problems.UnsupportedMediaType, problems.KeyReused),
+        **problem_responses(
+            *WORKER_PROBLEMS,
+            problems.UnknownFigures,
+            problems.InvalidTable,
+            problems.UnsupportedMediaType,
+            problems.KeyReused,
+        ),
     },
     openapi_extra=_openapi(),
 )

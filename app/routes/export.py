@@ -49,7 +49,13 @@ _FILE: dict[int | str, dict[str, Any]] = {
     response_class=Response,
     responses={
         **_FILE,
-        **problem_responses(*WORKER_PROBLEMS, problems.UnknownAnswer, problems.NotCertified, problems.FormatUnsuitable),
+        **problem_responses(
+            *WORKER_PROBLEMS,
+            problems.UnknownFigures,
+            problems.UnknownAnswer,
+            problems.NotCertified,
+            problems.FormatUnsuitable,
+        ),
     },
 )
 async def export(

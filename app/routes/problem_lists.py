@@ -7,7 +7,6 @@ from app.schemas import errors as problems
 WORKER_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.Validation,
     problems.UnknownRobot,
-    problems.UnknownFigures,
     problems.BodyTooLarge,
     problems.RequestTimeout,
     problems.ShuttingDown,
@@ -29,6 +28,7 @@ ADDING_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
 
 MOTION_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     *WORKER_PROBLEMS,
+    problems.UnknownFigures,
     problems.UnreachablePose,
     problems.SingularPose,
     problems.UnreachableTargets,
@@ -44,6 +44,7 @@ MOTION_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
 
 CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     *WORKER_PROBLEMS,
+    problems.UnknownFigures,
     problems.UnreachablePose,
     problems.SingularPose,
     problems.UnreachableTargets,

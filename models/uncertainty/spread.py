@@ -89,13 +89,13 @@ class _Sources:
         draws = sum(self.deviations.values(), np.zeros((DRAWS, count(self.robot.nq))))
         move_sd = 0.0
         if known is not None and identified:
-            own = self._identified(known)
+            own, covariance = self._identified(known)
             draws, move_sd = draws + own, known.move_sd
             for name in sorted({figure for figure, _ in known.places(self.law)}):
-                mask = np.zeros(own.shape[1])
+                mask = np.zeros(len(covariance))
                 mask[place(name, self.robot.nq)] = 1.0
                 # what is shared with other figures counts half for each
-                covariances[name] = (np.cov(own.T) * (mask[:, None] + mask)) / 2
+                covariances[name] = covariance * (mask[:, None] + mask) / 2
             session = self._session(known.session_sd, identified)
             draws, covariances[SESSION] = draws + session, np.cov(session.T)
         certain = np.ones(count(self.robot.nq))
@@ -174,17 +174,18 @@ class _Sources:
         if "inverter_linear" not in identified and not nominal[place("inverter_linear", nq)].any():
             self._add("inverter_linear", "inverter_linear", np.tile(self._factor("inverter_linear")[:, None], nq))
 
-    def _identified(self, known: Covariance) -> Array:
-        """Draws (n, p) of the figures of the document's covariance."""
-        nq, result = self.robot.nq, np.zeros((DRAWS, count(self.robot.nq)))
-        places = known.places(self.law)
+    def _identified(self, known: Covariance) -> tuple[Array, Array]:
+        """Draws (n, p) of the figures of the document's covariance, and this (p, p)."""
+        nq = self.robot.nq
         chosen = [k for k, name in enumerate(known.names) if known.place_of(name, self.law) is not None]
-        size, vectors = np.linalg.eigh(known.matrix[np.ix_(chosen, chosen)])
-        root = vectors * np.sqrt(np.maximum(size, 0.0))
-        normal = np.stack([self._normal() for _ in chosen], axis=1)
-        for column, (name, joint) in zip((normal @ root.T).T, places, strict=True):
-            result[:, place(name, nq).start + joint] = column
-        return result
+        at = [place(name, nq).start + joint for name, joint in known.places(self.law)]
+        covariance = np.zeros((count(nq), count(nq)))
+        covariance[np.ix_(at, at)] = known.matrix[np.ix_(chosen, chosen)]
+        root = _root(covariance)
+        normal = np.empty((DRAWS, root.shape[1]))
+        for column in normal.T:
+            column[:] = self._normal()
+        return normal @ root.T, covariance
 
     def _session(self, session_sd: float, identified: set[str]) -> Array:
         """Draws (n, p) of the friction of another day: one factor for all joints."""

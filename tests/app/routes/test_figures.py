@@ -102,6 +102,9 @@ def test_every_request_about_a_motion_takes_them(client: TestClient, stored: str
     changes = [{"name": "lighter", "arm": {"link_mass_scale": 0.5}}]
     base = client.post("/whatif", json={"evaluate": motion | {"figures": stored}, "changes": changes}).json()["base"]
     assert base["electrical"]["friction"] == pytest.approx(energies[1], rel=1e-9)
+    # an answer says which figures it is of, so that others can compute with it
+    assert used["arm"]["figures"] == stored
+    assert client.post("/export/csv", json={"answer": used["answer"]}).status_code == 200
     job = client.post("/jobs", json={"requests": [{"optimize": move(figures=stored)}]})
     assert job.status_code in (201, 202), job.text
 
