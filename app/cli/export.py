@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +10,10 @@ import orjson
 
 from app.cli import terminal
 from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
+from app.cli.kept_answers import WithStore
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable
-
-    from app.engine.result import TaskResult
-    from app.store.store import Store
-    from app.tasks.export import ExportTask
+    pass
 
 # wall time [s] that an export may take; it takes milliseconds
 DEADLINE = 120.0
@@ -46,7 +41,7 @@ def export(format: str, file: str, output: Path | None, speed_scale: float, opti
     deviates, and what it leaves out.
     """
     from app.schemas.export import OPTIONS_OF, ExportFormat, ExportRequest
-    from app.tasks.export import ExportTask
+    from app.tasks.export import ExportResult, ExportTask
 
     chosen, request_id = ExportFormat(format), new_id()
     given = _given(options)
@@ -59,11 +54,13 @@ def export(format: str, file: str, output: Path | None, speed_scale: float, opti
         b"".join(b",%b:%b" % (orjson.dumps(name), orjson.dumps(value)) for name, value in beside.items()),
     )
     request = validated(ExportRequest, body, request_id)
-    task = _WithKept(ExportTask(request, chosen, False, request_id))
+    task = WithStore(ExportTask(request, chosen, False, request_id), request_id)
     with terminal.progress("Certifying the motion"):
         document = answered(task, DEADLINE, request_id)
     write(document, output)
-    terminal.summary(lambda: {f"note {k}": note for k, note in enumerate(task.notes, 1)})
+    assert isinstance(task.result, ExportResult)
+    notes = task.result.notes
+    terminal.summary(lambda: {f"note {k}": note for k, note in enumerate(notes, 1)})
 
 
 def _given(options: tuple[str, ...]) -> dict[str, Any]:
@@ -78,37 +75,3 @@ def _given(options: tuple[str, ...]) -> dict[str, Any]:
         except orjson.JSONDecodeError:
             given[name] = value
     return given
-
-
-@dataclass
-class _WithKept:
-    """An export that gets the answers of the moves of a round from the database; it holds the notes of the file."""
-
-    task: ExportTask
-    notes: tuple[str, ...] = ()
-
-    @property
-    def request_id(self) -> str:
-        """Id of the request."""
-        return self.task.request_id
-
-    def run(self, deadline: float) -> TaskResult:
-        """The file."""
-        from app.exceptions import PartsNeeded
-
-        try:
-            result = self.task.run(deadline)
-        except PartsNeeded as needed:
-            result = self.task.with_kept(_from_store(needed.names)).run(deadline)
-        self.notes = result.notes
-        return result
-
-
-def _from_store(names: list[str]) -> dict[str, bytes]:
-    from app.cli.store import in_store
-    from app.store import answers
-
-    def body_of(name: str, store: Store) -> Awaitable[bytes]:
-        return store.read(lambda session: answers.get(session, name.rpartition("/")[2])[1])
-
-    return {name: in_store(partial(body_of, name)) for name in names}

@@ -10,6 +10,7 @@ import orjson
 
 from app.cli import terminal
 from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, parsed, validated, write
+from app.cli.kept_answers import WithStore
 
 
 @click.command(
@@ -44,8 +45,9 @@ def replay(
 ) -> None:
     """Plays the motion of an answer in MuJoCo, with a controller.
 
-    FILE is an answer of `joulepath optimize`, or of `joulepath evaluate` with samples, or - for standard input. If
-    standard error is a terminal, a summary follows: deviations, energies, contacts, savings.
+    FILE is the JSON answer of `optimize`, of `evaluate` with a sample period, or of `POST /cycle`, whose moves must be
+    in the database; or - for standard input. If standard error is a terminal, a summary follows: deviations, energies,
+    contacts, savings.
     """
     from app.schemas.replay import ReplayRequest
     from app.tasks.replay import ReplayTask
@@ -56,7 +58,7 @@ def replay(
     request_id, deadline = new_id(), options["deadline"]
     request = validated(ReplayRequest, orjson.dumps(body), request_id)
     with terminal.progress(f"Replaying for at most {deadline:g} s"):
-        found = answered(ReplayTask(request, request_id), deadline, request_id)
+        found = answered(WithStore(ReplayTask(request, request_id), request_id), deadline, request_id)
     write(found, output)
     terminal.summary(lambda: summary_of(parsed(found)))
 
@@ -71,8 +73,10 @@ def _json(content: bytes, name: str) -> Any:
 
 def summary_of(answer: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
-    (motion,) = answer["motions"]
-    lines = {}
+    if len(answer["motions"]) > 1:
+        off = max(max(run["joint_error"]) for motion in answer["motions"] for run in motion["runs"][:1])
+        return {"moves": str(len(answer["motions"])), "largest deviation": f"{1e3 * off:.3g} mrad"}
+    (motion,), lines = answer["motions"], {}
     for run in motion["runs"]:
         off = f"{1e3 * max(run['joint_error']):.3g} mrad, {1e3 * run['tcp_error']:.3g} mm"
         contact = "touches" if run["collides"] else "no contact"

@@ -7,6 +7,7 @@ from typing import Any, Self
 
 import orjson
 
+from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest, PartsNeeded
 
 
@@ -15,6 +16,10 @@ class WithKeptAnswers:
     """Base of such a task. `kept` holds kept answers (JSON) by their ids or paths."""
 
     kept: dict[str, bytes] = field(default_factory=dict)
+
+    def run(self, deadline: float) -> TaskResult:
+        """The task's result, within about `deadline` seconds. Raises PartsNeeded."""
+        raise NotImplementedError
 
     def with_kept(self, found: dict[str, bytes]) -> Self:
         """The same task with more kept answers at hand."""
