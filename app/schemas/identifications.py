@@ -11,7 +11,7 @@ from app.schemas.common import Request, Response, described, part
 from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
 
 MOST_LOGS = 32
-Target = Literal["friction", "rotor", "power"]
+Target = Literal["friction", "rotor", "torque_constant", "power"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
 DEADLINE = 60.0
@@ -56,7 +56,7 @@ class IdentifyRequest(Request):
         default=Fraction(),
         alias="validate",
     )
-    fit: Annotated[list[Target], Field(min_length=1, max_length=3)] = described(
+    fit: Annotated[list[Target], Field(min_length=1, max_length=4)] = described(
         "What is found. Power is added by itself where the logs have it; asking for it refuses logs without.",
         None,
         ["friction", "rotor"],

@@ -18,6 +18,8 @@ from optimizer.identification.options import Coupling, Options
 Numbers = npt.NDArray[np.int64]
 COUPLED = "coupling."
 """Before the name of a term of a coupling, whose number takes the place of the joint's."""
+SCALE = "scale"
+"""The term by which the rigid torque is multiplied: the robot's own torque constant over the real one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,8 @@ class Block:
 def terms_of(options: Options) -> list[str]:
     """The terms of each joint that are fitted."""
     friction = options.terms if "friction" in options.fit else ()
-    return [*friction, "rotor_inertia"] if "rotor" in options.fit else [*friction]
+    scale = (SCALE,) if "torque_constant" in options.fit else ()
+    return [*friction, *(("rotor_inertia",) if "rotor" in options.fit else ()), *scale]
 
 
 def block_of(
@@ -102,6 +105,8 @@ def own_value(robot: Robot, name: Name) -> float:
     term, joint = name
     if joint is None or term.startswith(COUPLED):
         return 0.0
+    if term == SCALE:
+        return 1.0
     if term == "rotor_inertia":
         return float(robot.drives.rotor_inertia[joint])
     own = getattr(robot.friction, term, None)
@@ -110,7 +115,7 @@ def own_value(robot: Robot, name: Name) -> float:
 
 def _known(robot: Robot, rows: Rows, options: Options) -> Array:
     """Torque (n, nq) [N·m] of what is not fitted: rigid bodies, and the robot's own friction or rotors."""
-    known = rows.rigid.copy()
+    known = np.zeros_like(rows.rigid) if "torque_constant" in options.fit else rows.rigid.copy()
     if "friction" not in options.fit:
         known += robot.friction.torque(rows.v, rows.rigid)
     if "rotor" not in options.fit:

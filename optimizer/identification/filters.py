@@ -9,6 +9,9 @@ from models.robot import Array
 
 HIGHEST_CUTOFF = 20.0
 """Cut-off [Hz] of the filter at most: arms move more slowly than that."""
+CUTOFFS = (80.0, 40.0)
+"""Cut-offs [Hz] of derivatives where the noise is small, the highest first."""
+_CLEAN = 0.05  # share of the second derivative that may be noise
 _LEAST_RATIO = 5.0  # rate / cut-off at least
 _ORDER = 2  # of the filter, which runs forwards and backwards
 _ROBUST = 1.4826  # standard deviation / median absolute deviation of a normal distribution
@@ -21,17 +24,44 @@ def cutoff(rate: float) -> float:
 
 def low_passed(values: Array, rate: float) -> Array:
     """Channels (n, k) without what is above the cut-off, and without delay: a Butterworth filter, both ways."""
-    sections = butter(_ORDER, cutoff(rate), fs=rate, output="sos")
     smooth = np.empty_like(values)
     # one channel at a time: the filter copies what it is given
     for k, channel in enumerate(values.T):
-        smooth[:, k] = sosfiltfilt(sections, channel)
+        smooth[:, k] = _filtered(channel, rate, cutoff(rate))
     return smooth
 
 
+def _filtered(channel: Array, rate: float, highest: float) -> Array:
+    """A channel (n,) without what is above a frequency [Hz]."""
+    return np.asarray(sosfiltfilt(butter(_ORDER, highest, fs=rate, output="sos"), channel))
+
+
 def derivative(values: Array, rate: float) -> Array:
-    """Rates of change (n, k) of the low-passed channels (n, k), by central differences."""
-    return np.gradient(low_passed(values, rate), 1 / rate, axis=0)
+    """Rates of change (n, k) of the low-passed channels (n, k), by central differences.
+
+    The cut-off is the highest at which the noise leaves even the second derivative as it is: a low one flattens the
+    accelerations of fast moves.
+    """
+    rates = np.empty_like(values)
+    for k, channel in enumerate(values.T):
+        smooth = _filtered(channel, rate, _clean_cutoff(channel, rate))
+        rates[:, k] = np.gradient(smooth, 1 / rate)
+    return rates
+
+
+def _clean_cutoff(channel: Array, rate: float) -> float:
+    """The highest of the cut-offs [Hz] that the noise allows in a channel (n,)."""
+    lowest = cutoff(rate)
+    for highest in CUTOFFS:
+        if lowest < highest <= rate / _LEAST_RATIO:
+            smooth = _filtered(channel, rate, highest)
+            above = float(_ROBUST * np.median(np.abs(channel - smooth)))
+            second = np.gradient(np.gradient(smooth, 1 / rate), 1 / rate)
+            # of noise that is the same at all frequencies, what is below the cut-off, differentiated twice
+            share = 2 * highest**5 / (5 * (rate - 2 * highest))
+            if (2 * np.pi) ** 2 * above * np.sqrt(share) < _CLEAN * second.std():
+                return highest
+    return lowest
 
 
 def noise(values: Array, rate: float) -> Array:

@@ -21,8 +21,8 @@ Numbers = npt.NDArray[np.int64]
 
 # rate [Hz] of the rows: motions of arms and their torques are slower by far
 RATE = 100.0
-# of all logs together; residuals of neighbours are so alike that more rows tell nothing more
-MOST_ROWS = 20_000
+# of all logs together, and with regressors, which take 3 kB each; residuals of neighbours are so alike that more rows tell nothing more
+MOST_ROWS, MOST_REGRESSORS = 20_000, 8_000
 # a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s] between them is left out
 # rad; a joint that stays within it over a move does not move
 STILL = 1e-3
@@ -80,7 +80,7 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
     meanings = sorted({log.effort_meaning for log in logs if log.effort_meaning is not None})
     if len(meanings) > 1:
         raise InvalidProblem("logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}.")
-    every = _stride(logs)
+    every = _stride(logs, MOST_REGRESSORS if regressor else MOST_ROWS)
     pieces, moves, number = [], 0, 0
     for number, log in enumerate(logs):
         piece, moves = _rows_of_log(robot, log, number, moves, every)
@@ -94,10 +94,10 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
     return Rows(**joined, current=meanings == ["current"])
 
 
-def _stride(logs: Sequence[Log]) -> int:
-    """Every how many rows of `RATE` one is taken."""
+def _stride(logs: Sequence[Log], most: int) -> int:
+    """Every how many rows of `RATE` one is taken, so that there are at most so many."""
     rows = sum(log.duration * min(log.rate, RATE) for log in logs)
-    return max(1, int(np.ceil(rows / MOST_ROWS)))
+    return max(1, int(np.ceil(rows / most)))
 
 
 def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) -> tuple[dict[str, Array], int]:

@@ -21,6 +21,8 @@ def column(term: str, v: Array, a: Array, rigid: Array, knee: float, speed: floa
         return v
     if term == "rotor_inertia":
         return a
+    if term == "scale":
+        return rigid
     if term == "offset":
         return np.ones_like(v)
     if term == "curved":

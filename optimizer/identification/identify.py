@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Mask, Robot
-from optimizer.exceptions import EffortNotUsable
+from optimizer.exceptions import EffortNotUsable, InvalidProblem
 from optimizer.identification.advice import advice_of
 from optimizer.identification.block import own_value
 from optimizer.identification.errors import NoPowerChannel, NotExcited
@@ -147,6 +147,11 @@ def _check(rows: Rows, logs: Sequence[Log], options: Options) -> None:
             "The efforts of these logs are without gravity and identify nothing: log motor currents or torques.",
             "external",
             {},
+        )
+    if "torque_constant" in options.fit and (not rows.current or options.refit or options.couplings):
+        raise InvalidProblem(
+            "fit",
+            "torque_constant needs motor currents, and links that are known: leave it out, or keep the inertials.",
         )
     power = bool(np.isfinite(rows.power).any())
     if "power" in options.fit and not power:

@@ -11,7 +11,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 
-Target = Literal["friction", "rotor", "inertials", "torque_constant", "power", "payload"]
+Target = Literal["friction", "rotor", "torque_constant", "power"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
 Estimator = Literal["ols", "wls", "irls"]
 DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")

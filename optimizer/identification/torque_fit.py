@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from models.robot import Array, Mask, Robot
-from optimizer.identification.block import Block, block_of
+from optimizer.identification.block import COUPLED, SCALE, Block, block_of
 from optimizer.identification.clusters import Clusters
 from optimizer.identification.estimate import Estimate, Name, joined
 from optimizer.identification.fit_rows import Rows
@@ -24,6 +24,7 @@ from optimizer.identification.robust import weights_of
 
 # a value whose standard deviation is a larger share of it is not found; nor a load term below so many of them
 MOST_RELATIVE_SD, LOAD_SDS = 0.3, 3.0
+MOST_SCALE_SD = 0.03
 # share of the torque limit that the rigid torque's standard deviation must have for a load term
 LEAST_LOAD_SPREAD = 0.05
 # standard deviations of terms that are held at the robot's own figure, over their values; and of load friction
@@ -52,7 +53,30 @@ def fit_torques(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, opt
                 key=lambda each: _misfit(each, clusters, options),
             )
         found.append(_fit(robot, block, clusters, options))
-    return joined(found)
+    estimate = joined(found)
+    return _unscaled(robot, estimate) if "torque_constant" in options.fit else estimate
+
+
+def _unscaled(robot: Robot, found: Estimate) -> Estimate:
+    """The estimate with torque constants in the place of scales: torques were those of the robot's own constants."""
+    joints = [joint if joint is not None and not name.startswith(COUPLED) else 0 for name, joint in found.names]
+    at = [found.names.index((SCALE, joint)) for joint in joints]
+    own = [float(robot.drives.torque_constant[joint]) if name == SCALE else np.nan
+           for (name, _), joint in zip(found.names, joints, strict=True)]  # fmt: skip
+    constants = np.array(own)
+
+    def turned(values: Array) -> Array:
+        scale = values[..., at]
+        return np.asarray(np.where(np.isfinite(constants), constants / scale, values / scale))
+
+    # what the log does not tell stays the robot's own
+    value = np.where([bool(why) for why in found.why], found.value, turned(found.value))
+    replicates = np.where([bool(why) for why in found.why], found.replicates, turned(found.replicates))
+    kept = np.array([bool(why) for why in found.why]) & np.isfinite(constants)
+    value, replicates = np.where(kept, constants, value), np.where(kept, constants, replicates)
+    names = tuple(("torque_constant", joint) if name == SCALE else (name, joint) for name, joint in found.names)
+    slope = np.abs(value / np.where(found.value != 0, found.value, 1.0))
+    return Estimate(names, value, replicates, found.why, found.drift * np.outer(slope, slope))
 
 
 def _joint_sets(nq: int, couplings: Sequence[Coupling]) -> list[list[int]]:
@@ -173,6 +197,9 @@ def _least_told(block: Block, value: Array, sd: Array, loose: Mask) -> dict[Name
         if name[0] == "offset":
             continue
         relative = float(sd[k] / abs(value[k])) if loose[k] and value[k] != 0 else np.inf
+        if name[0] == SCALE:
+            # the robot's own constant is better than a poor estimate
+            relative *= MOST_RELATIVE_SD / MOST_SCALE_SD
         if relative > most:
             worst, most = name, relative
     if worst is None:

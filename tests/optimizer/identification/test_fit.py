@@ -9,7 +9,7 @@ import pytest
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer.exceptions import EffortNotUsable
+from optimizer.exceptions import EffortNotUsable, InvalidProblem
 from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
 from optimizer.identification.identify import Identification, fit
 from optimizer.identification.log import Log, Move
@@ -194,3 +194,25 @@ def test_more_noise_gives_larger_standard_deviations() -> None:
     assert len(shared) > 12
     # ten times the noise: some ten times the standard deviation
     assert 3 < np.median([loud_sd[key] / quiet_sd[key] for key in shared]) < 20
+
+
+def test_torque_constants_follow_from_gravity() -> None:
+    """Paes: with known links, the current that holds them says how much torque an ampere gives."""
+    truth = truth_of(ROBOT, 2)
+    real = truth.torque_constant * np.array([1.0, 1.06, 0.95, 1.04, 1.0, 1.0])
+    log = without_power(recorded(ROBOT, replace(truth, torque_constant=real), moves=14).log())
+    found = fit(ROBOT, [log], Options(fit=("friction", "rotor", "torque_constant"), held_out=0.0))
+    constants = {each.joint: each for each in found.parameters if each.figure == "torque_constant"}
+    for joint in LOADED:
+        assert constants[joint].identified
+        assert abs(constants[joint].value - real[joint]) <= FAR * constants[joint].sd < 0.02 * real[joint]
+    # nothing hangs on wrist 3
+    assert not constants[5].identified and constants[5].value == ROBOT.drives.torque_constant[5]
+    coulomb = next(each for each in found.parameters if (each.figure, each.joint) == ("coulomb", 1))
+    assert abs(coulomb.value - truth.coulomb[1]) <= FAR * coulomb.sd
+
+
+def test_torque_constants_are_asked_of_currents_only() -> None:
+    log = without_power(recorded(ROBOT, truth_of(ROBOT), moves=2).log("torque"))
+    with pytest.raises(InvalidProblem, match="currents"):
+        fit(ROBOT, [log], Options(fit=("torque_constant",), held_out=0.0))
