@@ -4,36 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Coroutine
 from functools import partial
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Body, Path, Request, Response
+from fastapi import APIRouter, Path, Request, Response
 
 from app.access.rules import check_owner
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.disconnect import unless_disconnected
-from app.http.json_route import JsonRoute
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
 from app.routes.problem_lists import MOTION_PROBLEMS
 from app.routes.uploads import upload
 from app.schemas import errors as problems
-from app.schemas.evaluate import EvaluateRequest
-from app.schemas.request import OptimizeRequest
-from app.schemas.studies import IterationDetail, IterationRequest, OptimizeStep
+from app.schemas.studies import IterationBody, IterationDetail
 from app.store import studies
 from app.store.tables import Study
 from app.studies.answers import detail
 from app.tasks.arm_engine import ArmEngine
 from app.tasks.evaluate import EvaluateTask
 from app.tasks.optimize import OptimizeTask
+from app.tasks.read_body import HeldBody
+from app.tasks.study_step import StudyStep, StudyStepTask, large_step, study_step
 from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
 
-R = TypeVar("R", OptimizeRequest, EvaluateRequest)
-
-router = APIRouter(route_class=JsonRoute, prefix="/studies", tags=["studies"])
+router = APIRouter(route_class=LargeBodyRoute, prefix="/studies", tags=["studies"])
 
 MOST_ITERATIONS = 2**31 - 1
 """Largest iteration number of the database."""
@@ -61,7 +59,7 @@ async def add(
     request: Request,
     response: Response,
     id: StudyId,
-    body: Annotated[IterationRequest, Body()],
+    body: IterationBody,
     settings: ServiceSettings,
     engine: ServiceArmEngine,
     store: ServiceStore,
@@ -72,17 +70,26 @@ async def add(
     from the previous and the best iteration. A failed request returns its problem, and the study does not record it."""
     study = (await store.read(partial(studies.state, study_id=id))).study
     check_owner(client, study.owner)
-    kind, asked = _completed(body, study)
-    sent = asked.model_dump(mode="json", exclude_unset=True)
-    known = await store.read(partial(studies.known_step, study_id=id, kind=kind, request=sent, key=key))
+    step = await unless_disconnected(request, _step(body, study, request.state.id, engine, settings))
+    known = await store.read(partial(studies.known_step, study_id=id, kind=step.kind, request=step.sent, key=key))
     if known is None:
-        work = _located(kind, _result(asked, request.state.id, engine, settings.max_deadline))
-        step = _step(kind, sent, await unless_disconnected(request, work))
-        number, again = await store.write(partial(studies.add, study_id=id, step=step, key=key, client=client))
+        work = _located(step.kind, _result(step, request.state.id, engine, settings.max_deadline))
+        made = _made(step, await unless_disconnected(request, work))
+        number, again = await store.write(partial(studies.add, study_id=id, step=made, key=key, client=client))
     else:
         number, again = known, True
     set_location(request, response, f"/studies/{id}/iterations/{number}", again)
     return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
+
+
+async def _step(
+    body: IterationBody | HeldBody, study: Study, request_id: str, engine: ArmEngine, settings: ServiceSettings
+) -> StudyStep:
+    """The request with the study's robot, figures and objective. Raises InvalidProblem if it names others."""
+    if not isinstance(body, HeldBody):
+        return study_step(body, study.robot, study.figures, study.objective)
+    task = StudyStepTask(body, study.robot, study.figures, study.objective, request_id)
+    return large_step(await engine.run(task, settings.max_deadline))
 
 
 async def _located(kind: str, work: Coroutine[Any, Any, TaskResult]) -> TaskResult:
@@ -98,16 +105,12 @@ async def _located(kind: str, work: Coroutine[Any, Any, TaskResult]) -> TaskResu
         raise InvalidProblem(f"{kind}.{error.field}", str(error)) from None
 
 
-async def _result(
-    asked: OptimizeRequest | EvaluateRequest, request_id: str, engine: ArmEngine, max_deadline: float
-) -> TaskResult:
+async def _result(step: StudyStep, request_id: str, engine: ArmEngine, max_deadline: float) -> TaskResult:
     """The answer of the endpoint that the request is for."""
-    if isinstance(asked, OptimizeRequest):
-        # all candidates: suggestions start from those that were ruled out, too
-        asked = asked.model_copy(update={"candidates": "all"})
-        return await engine.run(OptimizeTask(asked, request_id), deadline_of(asked, max_deadline))
+    if step.optimize is not None:
+        return await engine.run(OptimizeTask(step.optimize, request_id), deadline_of(step.optimize, max_deadline))
     with upload() as (file, path):
-        file.write(asked.model_dump_json(exclude_unset=True).encode())
+        file.write(step.evaluate)
         return await engine.run(EvaluateTask(path, "json", {}, "json", request_id, max_deadline), max_deadline)
 
 
@@ -126,34 +129,15 @@ async def show(
     return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
 
 
-def _step(kind: str, sent: dict[str, Any], result: TaskResult) -> studies.Step:
+def _made(step: StudyStep, result: TaskResult) -> studies.Step:
     answer = orjson.loads(result.document)
-    energy = answer["energy"] if kind == "optimize" else answer["total"]["energy"]
+    energy = answer["energy"] if step.kind == "optimize" else answer["total"]["energy"]
     return studies.Step(
-        kind,
-        sent,
+        step.kind,
+        step.sent,
         result.document,
         answer["duration"],
         energy["electrical"]["total"],
         energy["mechanical"]["total"],
         result.kept_as,
     )
-
-
-def _completed(body: IterationRequest, study: Study) -> tuple[str, OptimizeRequest | EvaluateRequest]:
-    """The endpoint and its request with the study's robot and objective. Raises InvalidProblem if the request names
-    others."""
-    if isinstance(body, OptimizeStep):
-        return "optimize", _about(study, "optimize", body.optimize, "robot", "figures", "objective")
-    return "evaluate", _about(study, "evaluate", body.evaluate, "robot", "figures")
-
-
-def _about(study: Study, kind: str, asked: R, *names: str) -> R:
-    for name in names:
-        if name in asked.model_fields_set and getattr(asked, name) != getattr(study, name):
-            raise InvalidProblem(
-                f"{kind}.{name}", f"The study has another {name}: leave {name} out, or create another study."
-            )
-    # null is left out: that is what a request without figures says
-    same = {name: getattr(study, name) for name in names if getattr(study, name) is not None}
-    return asked.model_copy(update=same)

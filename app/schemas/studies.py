@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, Tag
+from pydantic import ConfigDict, Field, RootModel, Tag
 
 from app.schemas.common import NO_CONTROLS, PLAIN, FiguresId, Request, Response, RobotName, by_field, described, part
 from app.schemas.evaluate import EvaluateRequest
@@ -82,6 +82,12 @@ IterationRequest = Annotated[
     Annotated[OptimizeStep, Tag("by optimize")] | Annotated[EvaluateStep, Tag("by evaluate")],
     by_field("optimize", "evaluate"),
 ]
+
+
+class IterationBody(RootModel[IterationRequest]):
+    """An iteration: exactly one of the requests."""
+
+    model_config = ConfigDict(frozen=True)
 
 
 class Iteration(Response):

@@ -18,6 +18,7 @@ from app.tasks import (
     own_robot,
     pareto,
     read_body,
+    study_step,
     whatif,
 )
 
@@ -34,6 +35,7 @@ __all__ = [
     "own_robot",
     "pareto",
     "read_body",
+    "study_step",
     "whatif",
 ]
 

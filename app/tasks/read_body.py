@@ -50,10 +50,14 @@ class ReadBodyTask:
             read = self.model.model_validate(parsed_json(self.body), from_attributes=True)  # as FastAPI does
         except ValidationError as error:
             raise invalid_request(error, "body") from None
-        fields = {name: getattr(read, name) for name in type(read).model_fields}
-        seen = {name: value if len(pickle.dumps(value)) <= _SMALL else ... for name, value in fields.items()}
-        content = (pickle.dumps(read), seen, read.model_fields_set)
-        return TaskResult(pickle.dumps(content), "application/x-python-pickle")
+        return TaskResult(pickle.dumps(pickled_body(read)), "application/x-python-pickle")
+
+
+def pickled_body(read: BaseModel) -> tuple[bytes, dict[str, Any], set[str]]:
+    """The content of a HeldBody."""
+    fields = {name: getattr(read, name) for name in type(read).model_fields}
+    seen = {name: value if len(pickle.dumps(value)) <= _SMALL else ... for name, value in fields.items()}
+    return pickle.dumps(read), seen, read.model_fields_set
 
 
 def held(result: TaskResult) -> HeldBody:

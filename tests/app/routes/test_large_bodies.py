@@ -79,6 +79,47 @@ def test_is_refused_as_a_small_one(client: TestClient, path: str, body: Any) -> 
     assert sent(client, path, padded(small)) == sent(client, path, small)
 
 
+GIVEN = {"configurations": [HOME, [0.3, *HOME[1:]]], "time_per_segment": 1.0}
+
+
+def test_iterations_are_answered_and_refused_as_small_ones(client: TestClient) -> None:
+    def answers(pad: Any) -> list[tuple[int, Any]]:
+        study = client.post("/studies", json={"name": "large", "threshold": 1.0}).headers["location"]
+        found = []
+        bodies = [
+            {"optimize": move(method="time_scaling", candidates="none")},
+            {"evaluate": GIVEN},
+            {"optimize": move(robot="ur10e")},
+            {"optimize": move(deadline=599)},
+            {"optimize": move(start={"q": [9.0, *HOME[1:]]})},
+            {"evaluate": GIVEN | {"time_per_segment": -1.0}},
+            {"evaluate": GIVEN | {"robot": "ur3e"}},
+            {},
+            [],
+        ]
+        for body in bodies:
+            status, content = sent(client, f"{study}/iterations", pad(json.dumps(body).encode()))
+            for name in ("answer", "created"):
+                content.pop(name, None)
+            found.append((status, content))
+        return found
+
+    small, large = answers(bytes), answers(padded)
+    assert [status for status, _ in small] == [201, 201, *[422] * 7]
+    assert large == small
+
+
+def test_a_large_iteration_has_all_candidates_and_is_stored_as_sent(client: TestClient) -> None:
+    study = client.post("/studies", json={"name": "large", "threshold": 1.0}).headers["location"]
+    body = {"optimize": move(method="time_scaling", candidates="none", scene=SCENE)}
+    step = client.post(f"{study}/iterations", json=body, headers={"Idempotency-Key": f"{study}-a"})
+    assert step.status_code == 201, step.text
+    assert step.json()["request"]["optimize"]["scene"] == body["optimize"]["scene"]
+    assert client.get(f"/answers/{step.json()['answer']}").json()["answer"]["candidates"]
+    again = client.post(f"{study}/iterations", json=body, headers={"Idempotency-Key": f"{study}-a"})
+    assert (again.status_code, again.headers["idempotency-replayed"]) == (201, "true")
+
+
 @pytest.mark.parametrize("body", [b"{", b"\xff", b"[" * LARGE, b"9" * LARGE])
 def test_survives_what_is_no_json(client: TestClient, body: bytes) -> None:
     status, content = sent(client, "/optimize", padded(body))
