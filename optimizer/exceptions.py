@@ -4,9 +4,6 @@ JoulepathError
 ├── InvalidProblem          malformed or contradictory request
 │   ├── OutsideLimits       given joints beyond a limit
 │   └── InvalidTable        a row of a given motion, or its table as a whole
-├── LogTooLarge             a log with more rows or bytes than are read
-├── ExcitationInfeasible    no excitation keeps its limits
-├── EffortNotUsable         logged efforts that say nothing of the arm
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
 ├── SingularPose            reached on a self-motion of unknown form only
@@ -26,6 +23,8 @@ JoulepathError
 ├── FormatUnsuitable        a motion cannot be written in a format
 ├── SimulatorMissing        MuJoCo is not installed
 └── DeadlineExceeded        no motion certified in time
+
+Those of logs are in `identification.log_errors`, that of excitations in `excitation.errors`.
 """
 
 from __future__ import annotations
@@ -91,39 +90,6 @@ class InvalidTable(InvalidProblem):
     def __init__(self, message: str, row: int | None = None, column: str | None = None) -> None:
         super().__init__("motion", message)
         self.row, self.column = row, column
-
-
-class LogTooLarge(JoulepathError):
-    """A log has more than `limit` rows, or bytes after unpacking: `unit` says which."""
-
-    def __init__(self, limit: int, unit: str) -> None:
-        super().__init__(
-            f"The log has more than {limit} {unit}: send it in parts, at a lower rate, or only the columns that count."
-        )
-        self.limit, self.unit = limit, unit
-
-
-class EffortNotUsable(JoulepathError):
-    """The efforts of a log are without gravity (`meaning` is external), or it is not clear what they are (None).
-
-    `slope` is that of the effort against the torque of the rigid model, by the names of two joints; None for one that
-    the log does not determine.
-    """
-
-    def __init__(self, message: str, meaning: str | None, slope: dict[str, float | None]) -> None:
-        super().__init__(message)
-        self.meaning, self.slope = meaning, slope
-
-
-class ExcitationInfeasible(JoulepathError):
-    """No start of an excitation gave a motion within all limits; `limit` names the one that the last one broke."""
-
-    def __init__(self, limit: str) -> None:
-        remedy = "relax it, or give a longer period"
-        if limit == "clearance":
-            remedy = "move the obstacles, ask for less clearance, or give a centre with more room"
-        super().__init__(f"No excitation was found that keeps its limits, the last one broke {limit}: {remedy}.")
-        self.limit = limit
 
 
 class UnknownRobot(JoulepathError):

@@ -54,16 +54,18 @@ from app.exceptions import (
 from app.http.validation_messages import told
 from app.schemas import errors as problems
 from optimizer import exceptions as optimizer_errors
+from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
+from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
     optimizer_errors.InvalidProblem: problems.Validation,
     optimizer_errors.OutsideLimits: problems.OutsideLimits,
     optimizer_errors.InvalidTable: problems.InvalidTable,
-    optimizer_errors.LogTooLarge: problems.LogTooLarge,
-    optimizer_errors.EffortNotUsable: problems.EffortNotUsable,
-    optimizer_errors.ExcitationInfeasible: problems.ExcitationInfeasible,
+    LogTooLarge: problems.LogTooLarge,
+    EffortNotUsable: problems.EffortNotUsable,
+    ExcitationInfeasible: problems.ExcitationInfeasible,
     identification_errors.NotExcited: problems.NotExcited,
     identification_errors.NothingHeldOut: problems.NothingHeldOut,
     identification_errors.NoPowerChannel: problems.NoPowerChannel,

@@ -17,7 +17,8 @@ from optimizer.certificate import certify
 from optimizer.collision.model import CollisionModel, collision_model
 from optimizer.deadline import Deadline
 from optimizer.energy.plant import Plant
-from optimizer.exceptions import DeadlineExceeded, ExcitationInfeasible
+from optimizer.exceptions import DeadlineExceeded
+from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.excitation.excitation_problem import ExcitationProblem
 from optimizer.excitation.fourier import FourierBasis
 from optimizer.excitation.information import Information

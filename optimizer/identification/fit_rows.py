@@ -21,7 +21,8 @@ Numbers = npt.NDArray[np.int64]
 
 # rate [Hz] of the rows: motions of arms and their torques are slower by far
 RATE = 100.0
-# of all logs together, and with regressors, which take 3 kB each; residuals of neighbours are so alike that more rows tell nothing more
+# of all logs together, and with regressors, which take 3 kB each; residuals of neighbours are so alike that more rows
+# tell nothing more
 MOST_ROWS, MOST_REGRESSORS = 20_000, 8_000
 # a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s] between them is left out
 # rad; a joint that stays within it over a move does not move

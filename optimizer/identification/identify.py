@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Mask, Robot
-from optimizer.exceptions import EffortNotUsable, InvalidProblem
+from optimizer.exceptions import InvalidProblem
 from optimizer.identification.advice import advice_of
 from optimizer.identification.block import own_value
 from optimizer.identification.errors import NoPowerChannel, NotExcited
@@ -18,6 +18,7 @@ from optimizer.identification.fitting import Fitted, fit_rows, motor_torque
 from optimizer.identification.grouped import lag_one
 from optimizer.identification.interval import Spread, sessions, spread_of
 from optimizer.identification.log import Log
+from optimizer.identification.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
 from optimizer.identification.regressor import BODY, body_parameters
 from optimizer.identification.results import (

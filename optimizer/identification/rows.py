@@ -15,7 +15,8 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.csv_table import FIRST_ROW, line_of, numbers_of, with_points, wrong_length
-from optimizer.exceptions import InvalidTable, LogTooLarge
+from optimizer.exceptions import InvalidTable
+from optimizer.identification.log_errors import LogTooLarge
 from optimizer.replay.recording import BLOCK, MOST_ROWS
 
 LONGEST_LINE = 16384

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal
 
-from optimizer.exceptions import EffortNotUsable
 from optimizer.identification.columns import Group
 from optimizer.identification.effort import EffortReport
 from optimizer.identification.log import EffortMeaning
+from optimizer.identification.log_errors import EffortNotUsable
 
 _NAMED: dict[Group, EffortMeaning] = {"current": "current", "torque": "torque"}
 

@@ -16,7 +16,9 @@ from app.http.problem_details import TABLE, problem_content, problem_type
 from app.schemas.errors import Internal, NoTrajectory, OutsideLimits, UnreachablePose
 from optimizer import exceptions
 from optimizer.exceptions import JoulepathError
+from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
+from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
 from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
@@ -35,9 +37,9 @@ ERRORS: list[JoulepathError] = [
     exceptions.NoTrajectory([CANDIDATE]),
     exceptions.DeadlineExceeded([CANDIDATE]),
     exceptions.InvalidTable("Times must increase.", 17, "t"),
-    exceptions.LogTooLarge(1_000_000, "rows"),
-    exceptions.ExcitationInfeasible("clearance"),
-    exceptions.EffortNotUsable("Log motor currents.", "external", {"elbow_joint": 0.02, "shoulder_lift_joint": None}),
+    LogTooLarge(1_000_000, "rows"),
+    ExcitationInfeasible("clearance"),
+    EffortNotUsable("Log motor currents.", "external", {"elbow_joint": 0.02, "shoulder_lift_joint": None}),
     identification_errors.NotExcited(["coulomb", "viscous"]),
     identification_errors.NothingHeldOut(1),
     identification_errors.NoPowerChannel(),
@@ -54,7 +56,7 @@ ERRORS: list[JoulepathError] = [
 ]
 
 
-OURS = ("app.exceptions.", "optimizer.exceptions", "optimizer.identification.errors")
+OURS = ("app.exceptions", "optimizer.")
 """Modules of errors."""
 SERVICE_ERRORS: list[ServiceError] = [
     service.InvalidRequest([{"loc": ["body", "start"], "msg": "Field required"}]),
@@ -72,7 +74,12 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(kind() for kind in (service.UnsupportedCoding, service.NotAcceptable, service.MalformedHttp)),
     *(kind() for kind in (service.TooManyRequests, service.TooManyConnections, service.TooManyConnectionsOfClient)),
     *(kind() for kind in (service.TooManyBytes, service.TooManyBytesOfClient)),
-    *(service.UnknownLog(), service.UnknownIdentification(), service.TooManyLogs(1 << 30)),
+    *(
+        service.ClusterUnavailable(),
+        service.UnknownLog(),
+        service.UnknownIdentification(),
+        service.TooManyLogs(1 << 30),
+    ),
     *(service.HeadTooLarge(32_768), service.RequestTimeout(10.0)),
     *(kind() for kind in (service.TooManyWaiting, service.UnknownJob)),
     service.PartsNeeded(["/answers/7b5f3a52"]),

@@ -7,8 +7,9 @@ import pinocchio as pin
 import pytest
 
 from models.registry import load_robot
-from optimizer.exceptions import DeadlineExceeded, ExcitationInfeasible, InvalidProblem
+from optimizer.exceptions import DeadlineExceeded, InvalidProblem
 from optimizer.excitation import excite as module
+from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.excitation.excitation_problem import Criterion, ExcitationProblem
 from optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
 from optimizer.excitation.fourier import FourierBasis

@@ -9,10 +9,11 @@ import pytest
 
 from models.registry import load_robot
 from models.robot import Array
-from optimizer.exceptions import EffortNotUsable, InvalidProblem
+from optimizer.exceptions import InvalidProblem
 from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
 from optimizer.identification.identify import Identification, fit
 from optimizer.identification.log import Log, Move
+from optimizer.identification.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
 from tests.identification_logs import Noise, Recording, Truth, recorded, truth_of
 

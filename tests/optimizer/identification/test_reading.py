@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from models.registry import load_robot
-from optimizer.exceptions import EffortNotUsable, InvalidProblem, InvalidTable, LogTooLarge
+from optimizer.exceptions import InvalidProblem, InvalidTable
 from optimizer.identification.log import Log
+from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
 from optimizer.identification.reading import LogOptions, read, read_log
 from optimizer.problem.arm import Payload
 from tests.identification_logs import SILENT, Form, Recording, csv_of, recorded, rigid_torques, truth_of, with_current
