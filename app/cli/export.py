@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 import orjson
@@ -11,9 +11,6 @@ import orjson
 from app.cli import terminal
 from app.cli.answer import FILE, OUTPUT, answered, content_of, new_id, validated, write
 from app.cli.kept_answers import WithStore
-
-if TYPE_CHECKING:
-    pass
 
 # wall time [s] that an export may take; it takes milliseconds
 DEADLINE = 120.0
