@@ -53,7 +53,7 @@ def identify(
     """Finds friction, rotor inertia and power of one arm from its LOGS, with their standard deviations.
 
     LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
-    is the `result` of `GET /identifications/{id}`; its `figures` can be sent to `PUT /figures`.
+    is the `result` of `GET /identifications/{id}`; its `document` can be sent to `PUT /figures`.
     """
     from app.schemas.identifications import IdentifyRequest
     from app.schemas.logs import LogSettings

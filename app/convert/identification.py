@@ -33,7 +33,7 @@ def identification_fields(found: Identification, validation: Validation) -> dict
     """What an answer says of an identification."""
     return {
         "robot": found.robot.name,
-        "figures": document_of(found.figures(), datetime.now(UTC).date().isoformat()),
+        "document": document_of(found.figures(), datetime.now(UTC).date().isoformat()),
         "parameters": [asdict(each) for each in found.parameters],
         "structure": asdict(found.structure),
         "physical": None if found.physical is None else asdict(found.physical),

@@ -202,8 +202,9 @@ class IdentificationResult(Response):
     """What was found from logs."""
 
     robot: str = described("Name of the robot.", None, "ur5e")
-    figures: dict[str, Any] = described(
-        "The identified figures in the form of the robot's own: value, unit, source, trust, `sd`; `covariance`, "
+    document: dict[str, Any] = described(
+        "The identified figures, to be sent to `PUT /figures`: in the form of the robot's own, with value, unit, "
+        "source, trust and `sd`; `covariance`, "
         "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power of a move).",
         None,
         {"robot": "ur5e", "electronics": {"idle_power": {"value": 36.4, "unit": "W", "sd": 0.3}}},

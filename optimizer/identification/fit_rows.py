@@ -21,14 +21,13 @@ Numbers = npt.NDArray[np.int64]
 
 # rate [Hz] of the rows: motions of arms and their torques are slower by far
 RATE = 100.0
-# of all logs together, and with regressors, which take 3 kB each; residuals of neighbours are so alike that more rows
-# tell nothing more
+# of all logs together, and with regressors, of 3 kB each: residuals of neighbours are so alike that more tell no more
 MOST_ROWS, MOST_REGRESSORS = 20_000, 8_000
-# a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s] between them is left out
 # rad; a joint that stays within it over a move does not move
 STILL = 1e-3
 # rad/s; a slower joint that stands still has no speed but noise
 SLOW = 0.02
+# a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s] between them is left out
 LONGEST, BLOCK, PAUSE = 7.5, 5.0, 0.5
 
 

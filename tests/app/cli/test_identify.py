@@ -33,7 +33,7 @@ def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> Non
     assert code == 0
     result = IdentificationResult.model_validate_json(output.read_bytes())
     assert result.validation.moves == 3
-    assert "log0" in result.figures["friction_laws"]["identified"]["coulomb"]["source"]
+    assert "log0" in result.document["friction_laws"]["identified"]["coulomb"]["source"]
     assert b"log1" not in told
 
 

@@ -65,13 +65,19 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     torque, own = result.validation.fitted.torque, result.validation.own.torque
     assert torque is not None and own is not None and max(torque.rmse) < min(own.rmse[:3])
     assert result.validation.coverage is not None
-    law = result.figures["friction_laws"]["identified"]
+    law = result.document["friction_laws"]["identified"]
     assert law["coulomb"]["value"][1] == coulomb.value and law["coulomb"]["sd"][1] == pytest.approx(coulomb.sd)
     assert (law["coulomb"]["trust"], law["coulomb"]["unit"]) == ("B", "N·m")
-    names = result.figures["covariance"]["names"]
-    matrix = np.array(result.figures["covariance"]["matrix"])
+    names = result.document["covariance"]["names"]
+    matrix = np.array(result.document["covariance"]["matrix"])
     assert "friction_laws.identified.coulomb.1" in names and "electronics.idle_power" in names
     assert matrix.shape == (len(names), len(names)) and np.linalg.eigvalsh(matrix)[0] > -1e-9
+    stored = client.put("/figures", json=result.document)
+    assert stored.status_code == 201, stored.text
+    home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
+    motion = {"configurations": [home, [0.5, *home[1:]]], "time_per_segment": 1.5, "figures": stored.json()["id"]}
+    answer = client.post("/evaluate", json=motion)
+    assert answer.status_code == 200, answer.text
 
 
 def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log: str) -> None:
@@ -80,7 +86,7 @@ def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log:
     assert result.validation.moves == 4
     assert result.physical is not None and result.physical.consistent
     assert (result.structure.base, result.structure.excited) == (40, 40)
-    assert {"mass", "center_of_mass", "inertia"} <= result.figures["inertials"].keys()
+    assert {"mass", "center_of_mass", "inertia"} <= result.document["inertials"].keys()
 
 
 def test_each_motion_in_its_turn(client: TestClient, log: str) -> None:

@@ -9,10 +9,13 @@ import pinocchio as pin
 import pytest
 
 from benchmarks.identification_logs import MISSING, folder, tx40
+from models.from_figures import robot_of
 from models.registry import load_robot
 from models.robot import Array, Robot
+from models.uncertainty.document import covariance_of, with_document
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.consistent import solve_consistent
+from optimizer.identification.document import document_of
 from optimizer.identification.identify import fit
 from optimizer.identification.options import Options
 from optimizer.identification.pseudo_inertia import nearness, pseudo_inertias
@@ -126,3 +129,22 @@ def test_a_refit_of_a_right_model_moves_nothing_that_matters() -> None:
     regressor = rigid_regressor(robot.model, *states(6, 50))
     own = regressor @ body_parameters(robot.model)
     assert np.linalg.norm(regressor @ change) < 0.02 * np.linalg.norm(own)
+
+
+def test_identified_figures_become_a_robot() -> None:
+    """The document is one that requests take: the robot's own figures, with the identified ones in their place."""
+    robot = load_robot("ur10e")
+    truth = truth_of(robot, 1)
+    found = fit(robot, [recorded(robot, truth, moves=10).log()], Options(refit=True, held_out=0.0))
+    document = document_of(found.figures(), "2025-03-14")
+    figures = with_document(robot.name, robot.figures, document)
+    made = robot_of("ur10e", figures)
+    assert made.friction.name == "identified" and made.friction.load is not None
+    assert made.friction.coulomb == pytest.approx(truth.coulomb, rel=0.05)
+    assert made.electronics.idle_power == pytest.approx(truth.idle_power, rel=0.01)
+    change = found.fitted.arm.bodies
+    assert change is not None
+    assert body_parameters(made.model) == pytest.approx(body_parameters(robot.model) + change, abs=1e-6)
+    known = covariance_of(figures)
+    assert known is not None and known.move_sd == found.spread.move
+    assert {"electronics.idle_power", "friction_laws.identified.coulomb.1"} <= set(known.names)
