@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,8 +10,10 @@ from typing import Any
 
 from playwright.sync_api import Browser, Page, expect
 
-from tests.app.live import ANSWER
+from tests.app.live import ANSWER, ROOT
 
+FIRST = json.loads((ROOT / "examples" / "optimize" / "bin_to_shelf.json").read_text())
+"""The request of the first visit."""
 PATIENCE = 1000 * ANSWER  # [ms]
 expect.set_options(timeout=PATIENCE)
 SHOWN = "() => Boolean(window.studio?.state.answer && (window.studio.view?.frames ?? 1))"
@@ -22,6 +25,24 @@ def until(page: Page, condition: str, patience: float = ANSWER) -> None:
     while not page.evaluate(condition):
         assert time.monotonic() < end, condition
         page.wait_for_timeout(20)
+
+
+def state(page: Page, what: str) -> Any:
+    return page.evaluate(f"() => studio.state.{what}")
+
+
+def show(page: Page, tab: str) -> None:
+    page.locator(f"#tab-{tab}").click()
+
+
+def ask(page: Page, body: dict[str, Any]) -> None:
+    """Sends a body from the page, and waits for the answer."""
+    before = state(page, "answer.id")
+    show(page, "json")
+    page.locator("#json").fill(json.dumps(body))
+    page.locator("#json").blur()
+    page.locator("#optimise").click()
+    until(page, f"() => studio.state.answer.id !== '{before}'")
 
 
 @contextmanager
@@ -40,4 +61,5 @@ def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
     yield page
     context.close()
     # Chromium itself says of a refused request that it failed: that is what these tests provoke
-    assert [fault for fault in faults if "status of 4" not in fault] == []
+    left = [fault for fault in faults if "status of 4" not in fault]
+    assert not left, left

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,33 +17,30 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
 from tests.app.live import ROOT, Server
 from tests.app.requests import NEAR, move
-from tests.browser.pages import SHOWN, opened, until
+from tests.browser.pages import FIRST, SHOWN, ask, opened, state, until
 from tests.browsers import BROWSER, MISSING
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
-FIRST = json.loads((ROOT / "examples" / "optimize" / "bin_to_shelf.json").read_text())
 DRAWN = 1e-6  # m; the certificate's own tolerance of an end
 ROUNDING = 1e-9  # m; sums of some ten products in double precision
 # relative; the service integrates the power of the recording's samples by another rule
 RECORDED = 2e-3
-PIXELS = """async () => {
-    const image = await createImageBitmap(await studio.view.picture());
-    const canvas = new OffscreenCanvas(image.width, image.height);
-    const context = canvas.getContext("2d");
-    context.drawImage(image, 0, 0);
-    const { data } = context.getImageData(0, 0, image.width, image.height);
+PIXELS = """() => {
+    const { view } = studio;
+    view.setFineness(0.5);
+    view.renderer.render(view.scene, view.camera);
+    const gl = view.renderer.getContext();
+    const [width, height] = [gl.drawingBufferWidth, gl.drawingBufferHeight];
+    const data = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
     let drawn = 0, sum = 0;
     for (let k = 0; k < data.length; k += 4) {
         drawn += data[k + 3] > 0;
         sum += data[k] + 3 * data[k + 1] + 7 * data[k + 2];
     }
-    return [drawn / (data.length / 4), sum];
+    return [drawn / (width * height), sum];
 }"""
-
-
-def state(page: Page, what: str) -> Any:
-    return page.evaluate(f"() => studio.state.{what}")
 
 
 def tcp(page: Page, time: float) -> np.ndarray:
@@ -168,15 +164,6 @@ def test_a_link_holds_the_request(browser: Browser, page: Page) -> None:
         assert state(other, "answer.energy.electrical.total") == pytest.approx(energy, rel=1e-9)
 
 
-def ask(page: Page, body: dict[str, Any]) -> None:
-    """Sends a body from the page, and waits for the answer."""
-    before = state(page, "answer.id")
-    page.locator("#json").fill(json.dumps(body))
-    page.locator("#json").blur()
-    page.locator("#optimise").click()
-    until(page, f"() => studio.state.answer.id !== '{before}'")
-
-
 def test_branches_side_by_side(page: Page) -> None:
     """A branch that the search ruled out: as a ghost, then as a second arm on the same clock."""
     ask(page, {**FIRST, "branch": {"shoulder": "left", "elbow": "up"}, "candidates": "all"})
@@ -207,17 +194,6 @@ def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
     fastest = points.first.get_attribute("aria-label")
     points.first.click()
     expect(page.locator("#joules")).to_have_text(str(fastest).split(", ")[1])
-
-
-def test_a_wrong_request_is_explained(page: Page) -> None:
-    page.locator("#json").fill(json.dumps({**FIRST, "sample_period": -1}))
-    page.locator("#json").blur()
-    page.locator("#optimise").click()
-    expect(page.locator("#problem")).to_contain_text("sample_period")
-    assert page.locator("#problem a").get_attribute("href") == "problems/validation"
-    page.locator("#json").fill("{")
-    page.locator("#json").blur()
-    expect(page.locator("#problem")).to_contain_text("no JSON")
 
 
 def test_without_webgl_the_figures_are_there(browser: Browser, service: Server) -> None:
@@ -260,6 +236,8 @@ def test_the_keyboard_is_enough(browser: Browser, service: Server) -> None:
                     return
             raise AssertionError(name)
 
+        tab_to("tab-form")
+        page.keyboard.press("ArrowRight")
         tab_to("json")
         page.keyboard.press("Control+a")
         page.keyboard.insert_text(json.dumps(move()))

@@ -2,6 +2,7 @@
 import { $, el, figure } from "./dom.js";
 import { play } from "./player.js";
 import { compute, optimise, problem } from "./request.js";
+import { embedded } from "./standalone.js";
 import { follow, set, state } from "./store.js";
 
 const MOST = 4; // ghosts at a time
@@ -28,7 +29,7 @@ function draw() {
   const table = el("table", {}, el("thead", {}, head), el("tbody", {}, rows.slice(0, MOST_ROWS).map(row)));
   const more = [];
   if (rows.length > MOST_ROWS) more.push(el("p", { class: "hint" }, `${MOST_ROWS} of ${rows.length} are listed.`));
-  if (answer.candidates.length < total) more.push(el("button", { type: "button", onclick: listAll }, `List all ${total} (computes again)`));
+  if (answer.candidates.length < total && !embedded()) more.push(el("button", { type: "button", onclick: listAll }, `List all ${total} (computes again)`));
   $("candidates").replaceChildren(rows.length ? el("div", { class: "scroll" }, table) : el("p", { class: "hint" }, "None with this status."), ...more);
 }
 
@@ -52,7 +53,7 @@ function row(candidate) {
     el("td", {}, candidate.goal, candidate.start === candidate.goal ? null : el("small", {}, ` from ${candidate.start}`)),
     el("td", {}, best ? "this motion" : candidate.status),
     ...["lower_bound", "energy", "duration"].map((key) => el("td", { class: "number" }, figure(candidate[key]))),
-    el("td", {}, best ? null : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute")));
+    el("td", {}, best || embedded() ? null : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute")));
 }
 
 /** Computes one branch, and lets its arm move beside the answer's. Throws Problem. */

@@ -68,7 +68,7 @@ export function inverse(T) {
 export function cellOf(request, robot) {
   const T = ofOrigin(robot.kinematics.base_link_origin?.value ?? [0, 0, 0, 0, 0, 0]);
   const obstacles = (request.scene?.obstacles ?? []).map((obstacle) => {
-    if (obstacle.pose?.frame !== "base_link") return obstacle;
+    if (request.scene.frame !== "base_link") return obstacle;
     const pose = multiply(T, ofPose(obstacle.pose));
     return { ...obstacle, pose: { position: [pose[3], pose[7], pose[11]], quaternion: quaternionOf(pose) } };
   });

@@ -2,13 +2,18 @@
 import { get } from "./api.js";
 import { createCandidates } from "./candidates.js";
 import { $, figure, percent, tabs } from "./dom.js";
+import { createDrag } from "./drag.js";
 import { createEnergy } from "./energy.js";
+import { createForm, placeErrors, showForm } from "./form.js";
 import { createFront } from "./front.js";
+import { createKept, openAnswer, showKept } from "./kept.js";
 import { createLimits } from "./limits.js";
 import { createPlayer, play } from "./player.js";
 import { createPlots } from "./plots.js";
-import { createRequest, optimise, problem, setRequest, showAnswer } from "./request.js";
+import { createRequest, keepRobot, optimise, problem, setRequest, showAnswer } from "./request.js";
+import { createRound } from "./round.js";
 import { createShare, shared } from "./share.js";
+import { embedded } from "./standalone.js";
 import { follow, state } from "./store.js";
 import { createView, drawnTcp } from "./view.js";
 
@@ -19,11 +24,14 @@ createPlayer(view);
 createPlots();
 createEnergy();
 createLimits();
-createFront();
 createCandidates();
-createRequest();
 createShare(view);
-tabs(document.querySelector("#ask > .tabs"));
+createRound();
+const inside = embedded();
+if (!inside) for (const create of [createFront, createRequest, createKept, createForm]) create();
+if (!inside) createDrag(view);
+if (!inside) tabs(document.querySelector("#ask > .tabs"), () => Promise.all([showForm(), showKept()]).catch(problem));
+if (!inside) follow("problem", () => placeErrors(state.problem?.details?.errors ?? []));
 follow("answer", headline);
 
 /** For tests, and for those who look in the console. */
@@ -32,13 +40,12 @@ window.studio = { state, view, tcp: drawnTcp };
 start().catch(problem);
 
 async function start() {
-  const given = await shared();
-  if (given.answer) {
-    const kept = await get(`answers/${encodeURIComponent(given.answer)}`);
-    const { answer } = kept;
-    // the same arm between the same ends: what the answer does not say of its request stays at the defaults
-    setRequest(given.request ?? { robot: answer.robot, ...answer.arm, start: { q: answer.branch.start.q }, goal: { q: answer.branch.goal.q } });
-    await showAnswer(answer, state.request);
+  const given = inside ?? (await shared());
+  if (inside) {
+    keepRobot(inside.robot);
+    await showAnswer(inside.answer, inside.request);
+  } else if (given.answer) {
+    await openAnswer(given.answer);
   } else {
     setRequest(given.request ?? (await get(FIRST)));
     await optimise();

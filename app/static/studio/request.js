@@ -2,6 +2,7 @@
 import { Problem, get, stream } from "./api.js";
 import { cellOf } from "./chain.js";
 import { $, el, figure, svg } from "./dom.js";
+import { showRound } from "./round.js";
 import { follow, set, state } from "./store.js";
 
 const EXAMPLE = "From a bin to a shelf";
@@ -36,8 +37,8 @@ async function fillExamples() {
   const first = await get("studio/first.json");
   const { paths } = await openapi();
   const option = (name, body) => Object.assign(el("option", {}, name), { body });
-  const examples = paths["/optimize"].post.requestBody.content["application/json"].examples;
-  select.replaceChildren(option(EXAMPLE, first), ...Object.values(examples).map(({ summary, value }) => option(summary, value)));
+  const of = (path, mark) => Object.values(paths[path].post.requestBody.content["application/json"].examples).map(({ summary, value }) => option(mark + summary, value));
+  select.replaceChildren(option(EXAMPLE, first), ...of("/optimize", ""), ...of("/cycle", "Round: "));
 }
 
 function readJson() {
@@ -52,8 +53,9 @@ function readJson() {
 
 /** Sends the request, shows its progress, then its answer. Throws Problem. */
 export async function optimise(request = state.request) {
-  const answer = await compute("optimize", request);
-  if (answer) await showAnswer(answer, request);
+  const isRound = Boolean(request.stops);
+  const answer = await compute(isRound ? "cycle" : "optimize", request);
+  if (answer) await (isRound ? showRound : showAnswer)(answer, request);
 }
 
 /** The answer to a POST with progress; null if it was cancelled. Throws Problem. */
@@ -137,6 +139,9 @@ function falling(incumbents, began) {
   return svg("svg", { viewBox: "0 0 100 30", preserveAspectRatio: "none", role: "img", "aria-label": "Best energy and bound over time" }, line("energy"), line("bound"));
 }
 
+/** Keeps the figures of a robot that are known already. */
+export const keepRobot = (robot) => robots.set(robot.name, robot);
+
 /** Figures of a robot, asked for once. */
 export async function robotOf(name) {
   if (!robots.has(name)) robots.set(name, await get(`robots/${encodeURIComponent(name)}`));
@@ -160,6 +165,7 @@ export function problem(error) {
   const box = $("problem");
   box.hidden = !error;
   box.replaceChildren();
+  set({ problem: error });
   if (!error) return;
   if (!(error instanceof Problem)) console.error(error);
   const { title, type, errors = [] } = error.details ?? {};

@@ -2,22 +2,25 @@
 import { send } from "./api.js";
 import { $, el, save } from "./dom.js";
 import { openapi, problem } from "./request.js";
+import { embedded, standalone } from "./standalone.js";
 import { state } from "./store.js";
 
 const WARNING = "Set payload, speed and safety limits on the controller before you run it. No format was run on hardware.";
 
 export function createShare(view) {
-  $("downloads").ontoggle = () => $("downloads").open && !$("exports") && offerExports().catch(problem);
-  $("share").onclick = () => share().catch(problem);
+  $("downloads").ontoggle = () => $("downloads").open && !$("exports") && !embedded() && offerExports().catch(problem);
+  if ($("share")) $("share").onclick = () => share().catch(problem);
   const files = [
-    ["Answer (JSON)", () => save("answer.json", JSON.stringify(state.answer), "application/json")],
-    ["Samples (CSV)", () => save("motion.csv", csv(state.answer.trajectory), "text/csv")],
-    ["Request (JSON)", () => save("request.json", JSON.stringify(state.asked ?? state.request, null, 1), "application/json")],
+    ["Answer (JSON)", () => save("answer.json", JSON.stringify(state.answer), "application/json"), true],
+    ["Samples (CSV)", () => save("motion.csv", csv(state.answer.trajectory), "text/csv"), true],
+    ["Page that stands alone (HTML)", async () => save("motion.html", await standalone(), "text/html")],
+    ["Request (JSON)", () => save("request.json", JSON.stringify(state.asked ?? state.request, null, 1), "application/json"), true],
     ["Robot (URDF)", async () => save(`${state.answer.robot}.urdf`, await (await send(`robots/${state.answer.robot}/urdf`, {})).blob())],
-    ...(view ? [["Picture (PNG)", async () => save("motion.png", await view.picture())]] : []),
+    ...(view ? [["Picture (PNG)", async () => save("motion.png", await view.picture()), true]] : []),
   ];
-  $("download-list").replaceChildren(...files.map(([name, give]) =>
-    el("button", { type: "button", onclick: async () => { $("downloads").open = false; if (state.answer) await give(); } }, name)));
+  const given = embedded() ? files.filter(([, , alone]) => alone) : files;
+  $("download-list").replaceChildren(...given.map(([name, give]) =>
+    el("button", { type: "button", onclick: async () => { $("downloads").open = false; if (state.answer) await Promise.resolve(give()).catch(problem); } }, name)));
 }
 
 /** Buttons for the formats that the service exports to. */

@@ -7,6 +7,7 @@ export const state = {
   answer: null,
   robot: null, // GET /robots/{name} of the answer
   arms: [], // [{name, colour, answer}]: the answer and further branches, which move on one clock
+  problem: null, // the error that is shown
   round: null, // answer of POST /cycle
   time: 0,
   duration: 1,

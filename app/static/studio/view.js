@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Arm } from "./arm.js";
-import { Chain, multiply, ofPose, sampleAt } from "./chain.js";
+import { Chain, cellOf, multiply, ofPose, sampleAt } from "./chain.js";
 import { $, el, figure, style, svg } from "./dom.js";
 import { Eye } from "./eye.js";
 import { Labels } from "./labels.js";
@@ -20,6 +20,7 @@ const SLOW = 0.055;
 const FAST = 0.022;
 // pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that alone
 const STILL = 2;
+const PAUSE = 400; // until then a picture does not count as still [ms]
 
 let view = null;
 
@@ -31,6 +32,7 @@ export function createView() {
   }
   view = new View($("view"));
   follow("answer arms", () => view.build());
+  follow("request", () => view.preview());
   follow("chosen", () => view.buildGhosts());
   follow("time show", () => view.pose());
   follow("playing", () => view.draw());
@@ -49,11 +51,6 @@ class View {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
-    for (const [name, dragging] of [["start", true], ["end", false]])
-      this.controls.addEventListener(name, () => {
-        this.dragging = dragging;
-        this.draw();
-      });
     this.parts = Object.fromEntries(["arms", "ghosts", "obstacles", "margins", "path", "nearest", "axes"].map((name) => {
       const group = new THREE.Group();
       this.scene.add(group);
@@ -100,6 +97,7 @@ class View {
       return arm;
     });
     for (const obstacle of cell.scene.obstacles) this.obstacle(obstacle);
+    this.drawnScene = cell.scene;
     this.nearest = this.nearestOf(answer, cell, robot);
     this.eye.fit(state.answer.trajectory, this.chain, this.sun);
     this.explain();
@@ -117,6 +115,18 @@ class View {
     $("legend").replaceChildren("power along the path", ramp, el("div", {}, el("span", {}, `${figure(Math.min(...power))} W`), el("span", {}, `${figure(Math.max(...power))} W`)));
     const pendant = state.robot.title.startsWith("Universal Robots");
     $("frame-note").textContent = pendant ? "base frame as on the teach pendant; ROS base_link is turned by 180° about z" : "base frame of the robot";
+  }
+
+  /** Obstacles of a request that is being edited, before it is sent. */
+  preview() {
+    const { request, robot, cell, answer } = state;
+    if (!answer || !request || (request.robot ?? "ur5e") !== answer.robot) return;
+    const edited = cellOf(request, robot);
+    if (JSON.stringify(edited.scene) === JSON.stringify(this.drawnScene ?? cell.scene)) return;
+    this.drawnScene = edited.scene;
+    for (const name of ["obstacles", "margins"]) this.empty(this.parts[name]);
+    for (const obstacle of edited.scene.obstacles) this.obstacle(obstacle);
+    this.draw();
   }
 
   obstacle(obstacle) {
@@ -207,16 +217,19 @@ class View {
     });
   }
 
-  render() {
-    const began = performance.now();
-    if (state.playing || this.dragging) this.adapt(began);
-    else this.setFineness(STILL);
+  /** Draws now. When nothing has changed for a while, once more, `fine`. */
+  render(fine = false) {
+    const now = performance.now();
+    if (fine) this.setFineness(STILL);
+    else this.adapt(now);
     this.controls.update();
     if (this.arms) this.eye.fade(this.arms[0].frames);
     this.renderer.render(this.scene, this.camera);
     this.labels.place(this.size);
     this.frames = (this.frames ?? 0) + 1;
-    this.last = began;
+    this.last = now;
+    clearTimeout(this.refining);
+    if (!fine) this.refining = setTimeout(() => this.render(true), PAUSE);
   }
 
   /** Coarser while frames come slowly, finer when they come fast. A still picture is always fine. */

@@ -1,0 +1,162 @@
+"""The studio page in a real browser: how one asks, by form, by JSON and by hand, and what is said of errors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.app.live import ROOT, Server
+from tests.app.requests import EXAMPLES, NEAR, long_search, move
+from tests.browser.pages import FIRST, SHOWN, opened, show, state, until
+from tests.browsers import BROWSER, MISSING
+
+ROUNDING = 1e-9  # s; sums of times in double precision
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
+
+
+def test_a_wrong_request_is_explained(page: Page) -> None:
+    show(page, "json")
+    page.locator("#json").fill(json.dumps({**FIRST, "sample_period": -1}))
+    page.locator("#json").blur()
+    page.locator("#optimise").click()
+    expect(page.locator("#problem")).to_contain_text("sample_period")
+    assert page.locator("#problem a").get_attribute("href") == "problems/validation"
+    page.locator("#json").fill("{")
+    page.locator("#json").blur()
+    expect(page.locator("#problem")).to_contain_text("no JSON")
+
+
+def test_the_form_keeps_every_example(page: Page) -> None:
+    """What the form shows, it does not change; what is changed in it comes back."""
+    show(page, "form")
+    for name, body in EXAMPLES.items():
+        page.locator("#json").evaluate(
+            "(it, text) => { it.value = text; it.dispatchEvent(new Event('change')); }", json.dumps(body)
+        )
+        until(page, "() => document.querySelectorAll('#form > .fields > *').length > 2")
+        assert state(page, "request") == body, name
+        field = page.get_by_label("deadline in s", exact=True)
+        field.fill("77")
+        field.blur()
+        assert state(page, "request") == body | {"deadline": 77}, name
+    field.fill(str(body["deadline"]))
+    field.blur()
+    assert state(page, "request") == body
+    angle = page.locator("#form [data-path^='start.q'] input").nth(1)
+    angle.fill("-90")
+    angle.blur()
+    assert state(page, "request")["start"]["q"][1] == pytest.approx(-np.pi / 2)
+    page.get_by_label("Remove deadline").click()
+    assert "deadline" not in state(page, "request")
+    page.get_by_label("Add a field", exact=True).select_option("payload")
+    assert state(page, "request")["payload"]["mass"] > 0
+
+
+def test_an_error_stands_beside_its_field(page: Page) -> None:
+    show(page, "form")
+    page.get_by_label("Add a field to payload").select_option("shape")
+    page.get_by_label("mass in kg").fill("-1")
+    page.get_by_label("mass in kg").blur()
+    page.locator("#optimise").click()
+    expect(page.locator("[data-path='payload.mass'] .error")).to_be_visible()
+    expect(page.locator("#form .error")).to_have_count(1)
+
+
+def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server) -> None:
+    with opened(browser, f"{service.url}/studio") as page:
+        until(page, SHOWN)
+        page.locator("#drag").select_option("goal")
+        until(page, "() => studio.view.handle.position.length() > 0")
+        x, y = page.evaluate("""() => {
+            const at = studio.view.handle.position.clone().project(studio.view.camera);
+            const box = studio.view.renderer.domElement.getBoundingClientRect();
+            return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+        }""")
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x - 8, y - 8, steps=3)
+        page.mouse.up()
+        expect(page.locator("#drag-note")).to_contain_text("Reached by")
+        moved = state(page, "request.goal.pose.position")
+        assert 1e-3 < np.linalg.norm(np.subtract(moved, FIRST["goal"]["pose"]["position"])) < 0.2
+        page.locator("#draw-box").click()
+        box = page.locator("#view").bounding_box()
+        assert box is not None
+        x, y = box["x"] + box["width"] * 0.4, box["y"] + box["height"] * 0.8
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 30, y + 20, steps=3)
+        page.mouse.up()
+        drawn = state(page, "request.scene.obstacles")[-1]
+        assert drawn["name"] == "box 1" and min(drawn["size"]) > 0
+        count = len(FIRST["scene"]["obstacles"]) + 1
+        assert page.evaluate("() => studio.view.parts.obstacles.children.length") == count
+
+
+def test_an_export_of_the_service_is_offered(page: Page) -> None:
+    page.locator("#downloads > summary").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="urscript").click()
+    assert "servoj" in Path(download.value.path()).read_text()
+    expect(page.locator("#status")).to_contain_text("safety limits")
+
+
+def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
+    """The search of minutes tells its best energy; after a cancel its worker is free."""
+    show(page, "json")
+    page.locator("#json").fill(json.dumps(long_search(100.0)))
+    page.locator("#json").blur()
+    page.locator("#optimise").click()
+    expect(page.locator("#progress-text")).to_contain_text("best")
+    page.locator("#cancel").click()
+    expect(page.locator("#status")).to_have_text("Cancelled.")
+    assert service.post("/optimize", move()).status_code == 200
+
+
+def test_a_round_is_played_as_one(page: Page) -> None:
+    show(page, "json")
+    page.locator("#json").fill((ROOT / "examples" / "cycle" / "press_tending.json").read_text())
+    page.locator("#json").blur()
+    page.locator("#optimise").click()
+    expect(page.locator("#timeline .leg").first).to_be_visible()
+    legs = state(page, "round.legs")
+    assert page.locator("#timeline .leg").count() == len(legs)
+    t, q = np.array(state(page, "answer.trajectory.t")), np.array(state(page, "answer.trajectory.q"))
+    assert t[0] == 0 and t[-1] == pytest.approx(state(page, "round.duration")) and (np.diff(t) > -ROUNDING).all()
+    assert np.abs(np.diff(q, axis=0)).max() < 0.1
+    page.locator("#timeline .leg").nth(2).click()
+    assert state(page, "time") == pytest.approx(legs[2]["t0"])
+
+
+def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
+    """An answer of a study, and one that this browser has seen."""
+    created = service.post("/studies", {"name": "press", "robot": "ur5e", "threshold": 60.0}).json()
+    service.post(f"/studies/{created['id']}/iterations", {"optimize": move()})
+    show(page, "kept")
+    page.locator("#pane-kept li button", has_text="press").click()
+    page.locator("#pane-kept li button").first.click()
+    until(page, "() => studio.state.round === null")
+    assert state(page, "answer.branch.goal.q") == pytest.approx(NEAR)
+    page.get_by_role("button", name="← all").click()
+    page.locator("#pane-kept li button", has_text=" J, ").nth(1).click()
+    until(page, f"() => Math.abs(studio.state.answer.branch.goal.q[0] - {NEAR[0]}) > 0.01")
+
+
+def test_a_page_stands_alone(browser: Browser, page: Page, tmp_path: Path) -> None:
+    """Opened from a file, with no service and no network."""
+    page.locator("#downloads > summary").click()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Page that stands alone").click()
+    file = tmp_path / "motion.html"
+    download.value.save_as(file)
+    energy = page.locator("#joules").inner_text()
+    with opened(browser, f"file://{file}", offline=True) as alone:
+        until(alone, SHOWN)
+        assert alone.locator("#joules").inner_text() == energy
+        alone.locator("#limits button").first.click()
+        assert np.isfinite(alone.evaluate("() => studio.tcp()")).all()
