@@ -7,7 +7,17 @@ from pathlib import Path
 
 from app import routes
 
-SHARED = {"dependencies", "large_bodies", "later", "parameters", "problem_lists", "query_settings", "reply", "uploads"}
+SHARED = {
+    "dependencies",
+    "kept_answers",
+    "large_bodies",
+    "later",
+    "parameters",
+    "problem_lists",
+    "query_settings",
+    "reply",
+    "uploads",
+}
 FILES = sorted(Path(routes.__path__[0]).glob("*.py"))
 
 
