@@ -1,6 +1,6 @@
 """Sends a request to a service on this machine and prints what one wants to know first. Needs Python alone.
 
-python3 examples/first_saving/ask.py [FILE] [ADDRESS]
+python3 examples/first_saving.py [FILE] [ADDRESS]
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def ask(path: Path, address: str) -> dict[str, Any]:
 
 def main() -> None:
     """Print the energy, what the controller's own motion needs, and what could still be saved."""
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "pick_to_place.json"
+    path = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / "optimize" / "pick_to_place.json"
     address = sys.argv[2] if len(sys.argv) > 2 else "http://127.0.0.1:8000"
     answer = ask(path, address.rstrip("/"))
     total, bound = answer["energy"]["electrical"]["total"], answer["energy"]["lower_bound"]
