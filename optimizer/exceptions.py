@@ -21,7 +21,7 @@ JoulepathError
 │   └── NoCollisionFreeTrajectory
 ├── NotCertified            a motion to export failed its certificate
 ├── FormatUnsuitable        a motion cannot be written in a format
-├── SimulatorMissing        MuJoCo is not installed
+├── SimulatorMissing        MuJoCo is not installed: see `simulation`
 └── DeadlineExceeded        no motion certified in time
 
 Those of logs are in `identification.log_errors`, that of excitations in `excitation.errors`.
@@ -285,16 +285,6 @@ class NoCollisionFreeTrajectory(NoTrajectory):
         self.cut_short = cut_short
         self.pair, self.time, self.start, self.goal = best.pair, best.time, start, goal
         self.depth = max(-best.min_clearance, 0.0)
-
-
-class SimulatorMissing(JoulepathError):
-    """MuJoCo, an optional extra, is not installed."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "MuJoCo is not installed, and only it can replay motions: the operator of the service installs it with "
-            "pip install 'joulepath[mujoco]'."
-        )
 
 
 class DeadlineExceeded(JoulepathError):

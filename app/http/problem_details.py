@@ -57,6 +57,7 @@ from optimizer import exceptions as optimizer_errors
 from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
 from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
+from optimizer.simulation.simulator import SimulatorMissing
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
@@ -85,7 +86,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     optimizer_errors.NoTrajectory: problems.NoTrajectory,
     optimizer_errors.NotCertified: problems.NotCertified,
     optimizer_errors.FormatUnsuitable: problems.FormatUnsuitable,
-    optimizer_errors.SimulatorMissing: problems.SimulatorMissing,
+    SimulatorMissing: problems.SimulatorMissing,
     optimizer_errors.DeadlineExceeded: problems.DeadlineExceeded,
     Busy: problems.Busy,
     TooManyRequests: problems.TooManyRequests,

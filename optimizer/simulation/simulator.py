@@ -5,7 +5,17 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from optimizer.exceptions import SimulatorMissing
+from optimizer.exceptions import JoulepathError
+
+
+class SimulatorMissing(JoulepathError):
+    """MuJoCo is not installed."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "MuJoCo is not installed, and only it can replay motions: the operator of the service installs it with "
+            "pip install 'joulepath[mujoco]'."
+        )
 
 
 def mujoco() -> Any:

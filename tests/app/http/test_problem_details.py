@@ -19,6 +19,7 @@ from optimizer.exceptions import JoulepathError
 from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
 from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
+from optimizer.simulation.simulator import SimulatorMissing
 from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 
 CANDIDATE = CandidateReport("left/up/flip", "left/up/flip", np.zeros(6), np.ones(6), "failed", "no step left", 12.5)
@@ -51,7 +52,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.RoundTooShort(5.5, 0.9),
     exceptions.NotCertified(2, "its velocity is at 1.2 of the limit", {"velocity": 1.2, "torque": np.nan}),
     exceptions.FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
-    exceptions.SimulatorMissing(),
+    SimulatorMissing(),
     exceptions.PathInfeasible(0.5, [exceptions.PathAttempt("left/up/flip", 0.6, "singular")]),
 ]
 
@@ -83,7 +84,7 @@ SERVICE_ERRORS: list[ServiceError] = [
     *(service.HeadTooLarge(32_768), service.RequestTimeout(10.0)),
     *(kind() for kind in (service.TooManyWaiting, service.UnknownJob)),
     service.PartsNeeded(["/answers/7b5f3a52"]),
-    *(kind() for kind in (service.JobNotCancellable, service.TooManyDeaths)),
+    *(kind() for kind in (service.JobNotCancellable, service.TooManyDeaths, service.ClusterUnavailable)),
 ]
 
 

@@ -13,7 +13,7 @@ from app.schemas import errors as problems
 from app.schemas.examples.own_arm import ARM
 from app.schemas.replay import ReplayRequest, ReplayResponse
 from app.tasks.replay import ReplayTask
-from optimizer.exceptions import SimulatorMissing
+from optimizer.simulation.simulator import SimulatorMissing
 from tests.app.requests import HOME, NEAR, PATIENT, move
 from tests.app.routes.test_problems import refused
 

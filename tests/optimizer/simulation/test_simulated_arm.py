@@ -13,7 +13,6 @@ import pytest
 from models.registry import load_robot, robot_names
 from models.robot import Array, Robot
 from optimizer.collision.model import collision_model
-from optimizer.exceptions import SimulatorMissing
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.problem.arm import Arm, Payload
@@ -21,6 +20,7 @@ from optimizer.problem.clouds import Points
 from optimizer.problem.scene import Attachment, Box, Capsule, Cylinder, HalfSpace, Mesh, Obstacle, Scene, Shape, Sphere
 from optimizer.simulation.shapes import unsimulated
 from optimizer.simulation.simulated_arm import SimulatedArm, with_changes
+from optimizer.simulation.simulator import SimulatorMissing
 from tests.models.own_arm.arms import RICH_ARM
 from tests.models.own_arm.arms import robot as own_arm
 from tests.optimizer.moves import PAYLOAD, START, TILTED
