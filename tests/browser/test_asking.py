@@ -139,6 +139,7 @@ def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
     service.post(f"/studies/{created['id']}/iterations", {"optimize": move()})
     show(page, "kept")
     page.locator("#pane-kept li button", has_text="press").click()
+    expect(page.get_by_role("button", name="← all")).to_be_visible()
     page.locator("#pane-kept li button").first.click()
     until(page, "() => studio.state.round === null")
     assert state(page, "answer.branch.goal.q") == pytest.approx(NEAR)
