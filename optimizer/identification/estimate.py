@@ -32,14 +32,6 @@ class Estimate:
         """Covariance (p, p) of the values."""
         return jackknife(self.replicates) + self.drift
 
-    def of(self, figure: str, nq: int) -> tuple[Array, Array]:
-        """Values (nq,) of a figure over joints, NaN for joints without, and (G, nq) with each cluster left out."""
-        value, replicates = np.full(nq, np.nan), np.full((len(self.replicates), nq), np.nan)
-        for k, (name, joint) in enumerate(self.names):
-            if name == figure and joint is not None:
-                value[joint], replicates[:, joint] = self.value[k], self.replicates[:, k]
-        return value, replicates
-
 
 def joined(estimates: list[Estimate]) -> Estimate:
     """Several estimates from the same clusters as one."""

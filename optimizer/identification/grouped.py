@@ -47,19 +47,6 @@ class Grouped:
             gram[k], moment[k] = part.T @ part, part.T @ values[rows]
         return Grouped(gram, moment)
 
-    def __add__(self, other: Grouped) -> Grouped:
-        return Grouped(self.gram + other.gram, self.moment + other.moment)
-
-    def scaled(self, factor: float) -> Grouped:
-        """With all rows weighted alike."""
-        return Grouped(factor * self.gram, factor * self.moment)
-
-    def without_column(self, column: int, value: float) -> Grouped:
-        """With a parameter held at a value."""
-        kept = np.delete(np.arange(self.moment.shape[1]), column)
-        moment = self.moment[:, kept] - value * self.gram[:, kept, column]
-        return Grouped(self.gram[:, kept][:, :, kept], moment)
-
 
 def solve(gram: Array, moment: Array, lower: Array) -> Array:
     """The x (p,) ≥ lower that minimises xᵀ gram x / 2 - momentᵀ x.

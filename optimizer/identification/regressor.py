@@ -44,11 +44,3 @@ def without_rotors(model: pin.Model) -> pin.Model:
 def body_parameters(model: pin.Model) -> Array:
     """Parameters (10 nq,) of the model's moving bodies."""
     return np.concatenate([body.toDynamicParameters() for body in list(model.inertias)[1:]])
-
-
-def placed(placement: pin.SE3) -> Array:
-    """The matrix (10, 10) that turns a body's parameters in one frame into those in the frame it is placed in."""
-    bodies = [pin.Inertia.Random() for _ in range(4 * BODY)]
-    inside = np.array([body.toDynamicParameters() for body in bodies])
-    outside = np.array([placement.act(body).toDynamicParameters() for body in bodies])
-    return np.asarray(np.linalg.lstsq(inside, outside, rcond=None)[0].T)
