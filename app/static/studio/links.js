@@ -34,6 +34,8 @@ export function linkBodies(robot) {
     return [of(joint, placement), of(joint + 1, IDENTITY)];
   });
   housings.forEach((pair) => meet(...pair));
+  // nothing of the base is below the ground that it stands on
+  if (placements[0][10] > 0.99) housings[0][0].low = Math.max(housings[0][0].low, -placements[0][11]);
   housings.forEach((pair, joint) => {
     pair.forEach((each, side) => {
       const T = side === 0 ? placements[joint] : IDENTITY;
