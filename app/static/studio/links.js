@@ -35,7 +35,9 @@ export function linkBodies(robot) {
   });
   housings.forEach((pair) => meet(...pair));
   // nothing of the base is below the ground that it stands on
-  if (placements[0][10] > 0.99) housings[0][0].low = Math.max(housings[0][0].low, -placements[0][11]);
+  const [up, height, foot] = [placements[0][10], placements[0][11], housings[0][0]];
+  if (up > 0.99) foot.low = Math.max(foot.low, -height);
+  if (up < -0.99) foot.high = Math.min(foot.high, height);
   housings.forEach((pair, joint) => {
     pair.forEach((each, side) => {
       const T = side === 0 ? placements[joint] : IDENTITY;
