@@ -261,5 +261,6 @@ class Dispatcher:
             self.changes.ring(changed)
 
     async def _settle(self, outcomes: list[Outcome]) -> set[str]:
-        settle = partial(leases.settle, holder=self.holder, outcomes=outcomes, now=self._now())
+        most = self._settings.max_figures
+        settle = partial(leases.settle, holder=self.holder, outcomes=outcomes, now=self._now(), most=most)
         return await self._store.write(settle)

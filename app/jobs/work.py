@@ -55,7 +55,9 @@ async def outcome_of(lease: Lease, executor: Executor, tell: Tell) -> Outcome:
         return defect(lease)
     assert isinstance(result, JobResult)
     parts = tuple((part.id, result.parts, part.body) for part in result.stored)
-    return Outcome(lease, "done", result.figures, result.document, parts, answer_id=result.kept_as)
+    return Outcome(
+        lease, "done", result.figures, result.document, parts, answer_id=result.kept_as, identified=result.identified
+    )
 
 
 def defect(lease: Lease) -> Outcome:

@@ -20,7 +20,7 @@ from app.schemas.examples.values import IDENTIFICATION_ID
 from app.schemas.identifications import Identification, IdentifyRequest
 from app.store import jobs as stored_jobs
 from app.store import logs as stored_logs
-from app.store.tables import JobRequest
+from app.store.tables import Figures, JobRequest
 from app.tasks.job_body import job_of_one
 from app.tasks.job_request import IDENTIFY
 
@@ -92,12 +92,14 @@ def _content(session: Session, job_id: str) -> dict[str, Any]:
         raise UnknownIdentification from None
     if request.kind != IDENTIFY:
         raise UnknownIdentification
+    has_figures = request.figures is not None and session.get(Figures, request.figures) is not None
     return {
         "id": job.id,
         "state": _state(request),
         "created": job.created,
         "owner": job.owner,
         "problem": request.problem,
+        "figures": request.figures if has_figures else None,
         "result": None if body is None else orjson.Fragment(zlib.decompress(body)),
     }
 

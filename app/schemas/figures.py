@@ -23,7 +23,7 @@ class Covariance(Request):
 
     names: Annotated[list[str], Field(min_length=1, max_length=200)] = described(NAMES, None, COVARIANCE["names"])
     matrix: Annotated[list[list[float]], Field(min_length=1, max_length=200)] = described(
-        "Symmetric, positive semidefinite; units are products of the parameters'.", None, COVARIANCE["matrix"]
+        "Symmetric and positive semidefinite, in the units of the parameters.", "unit · unit", COVARIANCE["matrix"]
     )
 
 

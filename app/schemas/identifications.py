@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from app.schemas.common import Request, Response, described, part
+from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
 
 MOST_LOGS = 32
@@ -68,7 +69,7 @@ class IdentifyRequest(Request):
         "keep",
         default="keep",
     )
-    friction: FrictionTerms = Field(description="The friction law that is fitted.", default=FrictionTerms())
+    friction: FrictionTerms = Field(description="Terms of the friction law.", default=FrictionTerms())
     estimator: Literal["wls", "irls", "ols"] = described(
         "Weighted, reweighted (outliers count less) or ordinary least squares.", None, "wls", default="wls"
     )
@@ -170,7 +171,7 @@ class Residuals(Response):
 class Temperatures(Response):
     """Friction over temperature: friction(T) = friction(T0)·exp(-k (T - T0)). Arrays are over joints."""
 
-    reference: list[float | None] = described("T0, the mean of the logs [°C]; null if not logged.", None, [34.4, 35.7])
+    reference: list[float | None] = described("T0, the mean of the logs; null if not logged.", "°C", [34.4, 35.7])
     span: list[float | None] = described("Greatest less least temperature of the logs.", "K", [0.1, 0.1])
     k: list[float | None] = described("k; null where the logs span less than 8 K.", "1/K", [None, 0.011])
     sd: list[float | None] = described("Its standard deviation.", "1/K", [None, 0.001])
@@ -195,6 +196,12 @@ class Identification(Response):
     problem: dict[str, Any] | None = described(
         "Why it failed (RFC 9457); null otherwise.", None, {"type": "/problems/not-excited", "status": 422}
     )
+    figures: str | None = described(
+        "Id of the figures that were found: every request about a motion takes it as `figures`. Null before the end, "
+        "where the service has no room for more figures, and after they were deleted.",
+        None,
+        FIGURES_ID,
+    )
     result: IdentificationResult | None = part("What was found; null before it is done.")
 
 
@@ -203,16 +210,16 @@ class IdentificationResult(Response):
 
     robot: str = described("Name of the robot.", None, "ur5e")
     document: dict[str, Any] = described(
-        "The identified figures, to be sent to `PUT /figures`: in the form of the robot's own, with value, unit, "
-        "source, trust and `sd`; `covariance`, "
+        "The identified figures, which `PUT /figures` of another server takes, too: in the form of the robot's own, "
+        "with value, unit, source, trust and `sd`; `covariance`, "
         "`session_sd` (relative, of friction from day to day) and `move_sd` (W, of the mean power of a move).",
         None,
         {"robot": "ur5e", "electronics": {"idle_power": {"value": 36.4, "unit": "W", "sd": 0.3}}},
     )
     parameters: list[IdentifiedParameter] = part("Every figure that was sought.")
-    structure: Structure = part("What the torques of the links depend on.")
+    structure: Structure = part("Base parameters of the links and rotors.")
     physical: Physical | None = part("Whether refitted links are real bodies; null if they are kept.")
     validation: Validation = part("Errors on moves that the fit has not seen.")
-    residuals: Residuals = part("What the fit leaves over.")
+    residuals: Residuals = part("What the fit leaves over of the moves.")
     temperatures: Temperatures = part("Friction over temperature.")
     advice: Advice | None = part("What would help most; null if nothing is known of it.")

@@ -6,6 +6,7 @@ of `jobs` never waits for rows of `job_requests`. So no two transactions wait fo
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -14,7 +15,8 @@ from typing import Any, Literal
 from sqlalchemy import select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
-from app.store import answers, jobs
+from app.exceptions import TooManyFigures
+from app.store import answers, figures, jobs
 from app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
 from app.store.tables import Job, JobRequest, new_id
 
@@ -52,11 +54,19 @@ class Figures:
 
 
 @dataclass(frozen=True)
+class Identified:
+    """What takes the place of a robot's own figures, see `figures.new_figures`."""
+
+    robot: str
+    content: dict[str, Any]
+
+
+@dataclass(frozen=True)
 class Outcome:
     """How the work on a lease ended. `waiting`: it is to be done again.
 
     `answer` is the compressed document, and `answer_id` its id, if it says so itself. `parts` are the answers that it
-    refers to: id, endpoint and compressed document.
+    refers to: id, endpoint and compressed document. `identified` are the figures that were found, if any.
     """
 
     lease: Lease
@@ -68,6 +78,7 @@ class Outcome:
     died: bool = False
     preempted: bool = False
     answer_id: str | None = None
+    identified: Identified | None = None
 
 
 def lease(session: Session, holder: str, count: int, now: datetime, until: datetime) -> tuple[list[Lease], set[str]]:
@@ -100,8 +111,11 @@ def lease(session: Session, holder: str, count: int, now: datetime, until: datet
     return leased, changed
 
 
-def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: datetime) -> set[str]:
-    """Stores outcomes of the leases that `holder` still has, and drops the others; returns the jobs that changed."""
+def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: datetime, most: int) -> set[str]:
+    """Stores outcomes of the leases that `holder` still has, and drops the others; returns the jobs that changed.
+
+    Of identified figures, the database takes `most`; further ones stay in their answers alone.
+    """
     found = _held(session, holder, outcomes)
     held = [(outcome, found.pop((outcome.lease.key, outcome.lease.attempt), None)) for outcome in outcomes]
     locked = _locked(session, (outcome.lease.job_id for outcome, request in held if request is not None))
@@ -109,7 +123,7 @@ def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: date
     for outcome, request in held:
         if request is not None:
             job = locked[request.job_id]
-            _store(session, job, request, outcome)
+            _store(session, job, request, outcome, most)
             if request.state == "failed" and not job.keep_going:
                 stopped.append(job)
     for job in stopped:
@@ -188,7 +202,7 @@ def _locked(session: Session, job_ids: Iterable[str]) -> dict[str, Job]:
     return {job.id: job for job in session.scalars(query.execution_options(populate_existing=True))}
 
 
-def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome) -> None:
+def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome, most: int) -> None:
     request.leased_by = request.leased_until = None
     request.state = outcome.state
     if outcome.state == "waiting":
@@ -205,5 +219,9 @@ def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome) ->
     if outcome.answer is not None:
         request.answer_id = outcome.answer_id or new_id()
         answers.put_of_job(session, outcome.lease.kind, outcome.answer, job.id, request.answer_id, job.owner)
+    if (found := outcome.identified) is not None:
+        with contextlib.suppress(TooManyFigures):
+            new = figures.new_figures(found.robot, found.content, job.owner)
+            request.figures = figures.put(session, new, most)[0].id
     if request.state != "waiting":
         request_ended(session, job, request)

@@ -238,6 +238,8 @@ class JobRequest(Table):
     status: Mapped[str | None] = mapped_column(String(16))
     answer_id: Mapped[str | None] = mapped_column(ForeignKey("answers.id"), unique=True)
     problem: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    figures: Mapped[str | None] = mapped_column(String(ID_LENGTH))
+    """Id of the figures that an identification found, if they could be stored. They may have been deleted since."""
 
 
 class JobEvent(Table):

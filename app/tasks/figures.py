@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from app.convert.arm import robot_named
 from app.engine.result import TaskResult
@@ -24,10 +25,15 @@ class FiguresTask:
 
         Raises UnknownRobot, or InvalidProblem, which names the place.
         """
-        robot = robot_named(self.request.robot)
-        try:
-            content = replaced_in(robot.name, robot.figures, self.request.document())
-            own_robot(robot.name, merged(robot.figures, content))
-        except InvalidFigures as error:
-            raise InvalidProblem(error.field or "robot", str(error)) from None
-        return TaskResult.of_json(content)
+        return TaskResult.of_json(replacing(self.request.robot, self.request.document()))
+
+
+def replacing(name: str, document: dict[str, Any]) -> dict[str, Any]:
+    """What of a document takes the place of a robot's own figures. Raises UnknownRobot, or InvalidProblem."""
+    robot = robot_named(name)
+    try:
+        content = replaced_in(robot.name, robot.figures, document)
+        own_robot(robot.name, merged(robot.figures, content))
+    except InvalidFigures as error:
+        raise InvalidProblem(error.field or "robot", str(error)) from None
+    return content

@@ -19,10 +19,11 @@ from app.schemas.identifications import IdentifyRequest
 from app.schemas.pareto import ParetoRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import WhatifRequest
-from app.store.leases import Figures
+from app.store.leases import Figures, Identified
 from app.tasks.compare import CompareTask
 from app.tasks.cycle import CycleTask
 from app.tasks.evaluate import evaluated
+from app.tasks.figures import replacing
 from app.tasks.identify import IdentifyTask, Stored
 from app.tasks.optimize import OptimizeTask
 from app.tasks.pareto import ParetoTask
@@ -35,10 +36,14 @@ IDENTIFY = "identify"
 
 @dataclass(frozen=True)
 class JobResult(TaskResult):
-    """An answer with its figures. Its documents are compressed; `parts` is the endpoint of those in `stored`."""
+    """An answer with its figures. Its documents are compressed; `parts` is the endpoint of those in `stored`.
+
+    `identified` are the figures of an arm that were found, if any.
+    """
 
     figures: Figures = field(kw_only=True)
     parts: str = field(kw_only=True)
+    identified: Identified | None = field(kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,13 @@ class JobRequestTask:
                 time.perf_counter() - began, *_ENERGY_AND_DURATION[self.kind](answer), answer.get("status")
             ),
             parts="evaluate" if self.kind == "whatif" and answer["objective"] is None else "optimize",
+            identified=_identified(answer) if self.kind == IDENTIFY else None,
         )
+
+
+def _identified(answer: dict[str, Any]) -> Identified:
+    document = {name: value for name, value in answer["document"].items() if name != "robot"}
+    return Identified(answer["robot"], replacing(answer["robot"], document))
 
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:

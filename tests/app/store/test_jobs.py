@@ -41,7 +41,7 @@ class Bench:
         return (await self.store.write(work))[0]
 
     async def settle(self, holder: str, *outcomes: Outcome) -> None:
-        await self.store.write(partial(leases.settle, holder=holder, outcomes=outcomes, now=self.now))
+        await self.store.write(partial(leases.settle, holder=holder, outcomes=outcomes, now=self.now, most=MUCH))
 
     async def states(self, job_id: str) -> list[str]:
         found = await self.store.read(partial(jobs.requests, job_id=job_id, limit=MUCH, after=-1))

@@ -1,4 +1,4 @@
-"""Figures that were identified on one arm, and the studies that use them."""
+"""Figures that were identified on one arm, the studies that use them, and the work that found them."""
 
 from __future__ import annotations
 
@@ -24,9 +24,11 @@ def upgrade() -> None:
     )
     op.create_index("ix_figures_created_id", "figures", ["created", "id"])
     op.add_column("studies", sa.Column("figures", sa.String(36), nullable=True))
+    op.add_column("job_requests", sa.Column("figures", sa.String(36), nullable=True))
 
 
 def downgrade() -> None:
     """From this revision."""
+    op.drop_column("job_requests", "figures")
     op.drop_column("studies", "figures")
     op.drop_table("figures")
