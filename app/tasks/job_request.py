@@ -43,7 +43,7 @@ class JobResult(TaskResult):
 
     figures: Figures = field(kw_only=True)
     parts: str = field(kw_only=True)
-    identified: Identified | None = field(kw_only=True)
+    identified: Identified | None = field(kw_only=True, default=None)
 
 
 @dataclass(frozen=True)

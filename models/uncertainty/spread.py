@@ -112,7 +112,8 @@ class _Sources:
     def _nominal(self) -> Array:
         robot = self.robot
         power = robot.electronics.idle_power + robot.electronics.controller_power
-        return values(robot.friction_laws[self.law], robot.drives, power)
+        law = next(each for each in robot.friction_laws.values() if each.name == self.law)
+        return values(law, robot.drives, power)
 
     def _normal(self) -> Array:
         """A standard normal column (n,): one value of each of n strips of equal probability, in random order."""

@@ -1,4 +1,7 @@
-"""One service and one browser for all tests of the page in a process."""
+"""One service and one browser for all tests of the page that run one after the other.
+
+The browser's event loop must end with them: other tests start one of their own.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,14 @@ from tests.browser.pages import SHOWN, opened, until
 from tests.browsers import SOFTWARE, chromium
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def service() -> Iterator[Server]:
     """With a database of its own."""
     with serving(workers=1, deadline_grace=GRACE) as server:
         yield server
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     with chromium(*SOFTWARE) as browser:
         yield browser
