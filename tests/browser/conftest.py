@@ -1,6 +1,6 @@
-"""One service and one browser for all tests of the page that run one after the other.
+"""One service for all tests of the page in a process, and a browser for each of their files.
 
-The browser's event loop must end with them: other tests start one of their own.
+The browser's event loop must end with the file: tests of other files start one of their own.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from tests.browser.pages import SHOWN, opened, until
 from tests.browsers import SOFTWARE, chromium
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="session")
 def service() -> Iterator[Server]:
     """With a database of its own."""
     with serving(workers=1, deadline_grace=GRACE) as server:
         yield server
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     with chromium(*SOFTWARE) as browser:
         yield browser
