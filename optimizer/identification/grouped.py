@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import lsq_linear
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from models.robot import Array, Mask
 
@@ -97,7 +97,7 @@ def jackknife(estimates: Array) -> Array:
     if groups < 2:
         return np.full((estimates.shape[1],) * 2, np.inf)
     centred = estimates - estimates.mean(axis=0)
-    wider = float(student.ppf(0.95, groups - 1)) / P95
+    wider = float(stdtrit(groups - 1, 0.95)) / P95
     return np.asarray(wider**2 * (groups - 1) / groups * centred.T @ centred)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm
@@ -79,7 +79,7 @@ def _move_sd(fitted: Fitted, rows: Rows) -> float:
         return 0.0
     own = max(np.mean(squares) - np.mean(explained), LEAST_OWN * np.mean(squares))
     # of few moves, as wide as Student's distribution is
-    return float(np.sqrt(own) * student.ppf(0.95, len(squares)) / P95)
+    return float(np.sqrt(own) * stdtrit(len(squares), 0.95) / P95)
 
 
 def sessions(fitted: Fitted, rows: Rows) -> tuple[float, ...]:
