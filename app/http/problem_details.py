@@ -70,6 +70,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     identification_errors.NotExcited: problems.NotExcited,
     identification_errors.NothingHeldOut: problems.NothingHeldOut,
     identification_errors.NoPowerChannel: problems.NoPowerChannel,
+    identification_errors.PayloadUnknown: problems.PayloadUnknown,
     optimizer_errors.UnknownRobot: problems.UnknownRobot,
     optimizer_errors.UnreachablePose: problems.UnreachablePose,
     optimizer_errors.SingularPose: problems.SingularPose,

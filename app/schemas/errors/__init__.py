@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
-from app.schemas.errors.identifications import NoPowerChannel, NotExcited, NothingHeldOut, UnknownIdentification
+from app.schemas.errors.identifications import (
+    NoPowerChannel,
+    NotExcited,
+    NothingHeldOut,
+    PayloadUnknown,
+    UnknownIdentification,
+)
 from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
@@ -107,6 +113,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     NotExcited,
     NothingHeldOut,
     NoPowerChannel,
+    PayloadUnknown,
     EffortNotUsable,
     ExcitationInfeasible,
     UnknownFigures,
@@ -169,6 +176,7 @@ __all__ = [
     "NothingHeldOut",
     "OutsideLimits",
     "PathInfeasible",
+    "PayloadUnknown",
     "ProblemDetails",
     "RequestTimeout",
     "RobotExists",
