@@ -165,12 +165,14 @@ def _carried(robot: Robot, rows: Rows, options: Options, last: int) -> Carried |
 
 def _fold(robot: Robot, rows: Rows, out: Mask, options: Options, last: int) -> Fold:
     """The rows that are held `out` (n,), and a fit to the others, which are of the same days."""
-    seen, held = rows.take(~out), rows.take(out)
+    seen = rows.take(~out)
     carried = _carried(robot, seen, options, last)
-    if carried is not None:
-        seen, held = loaded(seen, carried), loaded(held, carried)
+    seen = seen if carried is None else loaded(seen, carried)
     blind = fit_rows(robot, seen, options)
-    return Fold(blind, replace(spread_of(blind, seen), session=0.0), held)
+    spread = replace(spread_of(blind, seen), session=0.0)
+    del seen  # rows are large
+    held = rows.take(out)
+    return Fold(blind, spread, held if carried is None else loaded(held, carried))
 
 
 def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Options) -> None:

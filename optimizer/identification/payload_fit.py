@@ -136,7 +136,7 @@ def _equations(
         left, right = np.hstack([links, carried, friction]), torque[use, joint] - rigid
         at = [*shared, *range(len(shared) + joint * len(TERMS), len(shared) + (joint + 1) * len(TERMS))]
         of_row = clusters.of_row[use]
-        part = Grouped.of(left / np.sqrt(variance[joint]), right / np.sqrt(variance[joint]), of_row, clusters.count)
+        part = Grouped.of(left, right, np.full(len(right), 1 / variance[joint]), of_row, clusters.count)
         gram[np.ix_(range(clusters.count), at, at)] += part.gram
         moment[:, at] += part.moment
         parts.append((at, left, right, of_row))

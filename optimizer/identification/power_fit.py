@@ -88,8 +88,7 @@ def fit_power(
         if iteration:
             weight = bisquare_weights(residuals) if robust else weight
             noise = shared_variance(residuals, weight, clusters)
-        root = np.sqrt(weight / noise)
-        grouped = Grouped.of(root[:, None] * slope, root * (residuals + slope @ value), clusters.of_row, clusters.count)
+        grouped = Grouped.of(slope, residuals + slope @ value, weight / noise, clusters.of_row, clusters.count)
         precision = grouped.gram.sum(axis=0) + prior.precision
         target = grouped.moment.sum(axis=0) + prior.precision @ prior.mean
         new = _nonnegative(precision, target, prior.mean, held)
