@@ -14,6 +14,7 @@ from app.schemas.errors.motion import (
     GoalInCollision,
     InvalidTable,
     NoCollisionFreeTrajectory,
+    NoMeshes,
     NoSequence,
     NotCertified,
     NoTrajectory,
@@ -67,6 +68,7 @@ from app.schemas.errors.service import (
 PROBLEMS: tuple[type[ProblemDetails], ...] = (
     Validation,
     UnknownRobot,
+    NoMeshes,
     UnreachablePose,
     SingularPose,
     UnreachableTargets,
@@ -157,6 +159,7 @@ __all__ = [
     "MalformedHttp",
     "MethodNotAllowed",
     "NoCollisionFreeTrajectory",
+    "NoMeshes",
     "NoPowerChannel",
     "NoSequence",
     "NoTrajectory",
