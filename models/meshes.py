@@ -6,6 +6,7 @@ The meshes are no part of this package: a folder has them as `visual/NAME.obj` a
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +30,30 @@ _FILES = ("base", "shoulder", "upperarm", "forearm", "wrist1", "wrist2", "wrist3
 _TURNS = ((0.0, 0.0, np.pi), (0.0, 0.0, np.pi), _ALONG, _ALONG, _UPRIGHT, (0.0, 0.0, 0.0), _UPRIGHT)
 
 
+def installed(robot: str) -> Path | None:
+    """The folder of a robot's meshes in the package `airo-models`, which need not be imported; None without it."""
+    package = find_spec("airo_models")
+    if robot not in SHIFTS or package is None or package.origin is None:
+        return None
+    folder = Path(package.origin).parent / "arms" / robot
+    return folder if folder.is_dir() else None
+
+
+def mesh_file(folder: Path, kind: str, link: int) -> Path:
+    """The file of a link's mesh, of one of KINDS."""
+    return folder / kind / f"{_FILES[link]}.obj"
+
+
+def mesh_placement(robot: str, link: int) -> pin.SE3:
+    """Where the mesh of a link stands in the link's frame. `robot` is one of SHIFTS."""
+    position = np.array([0.0, 0.0, (0.0, 0.0, *SHIFTS[robot])[link]])
+    return pin.SE3(pin.rpy.rpyToMatrix(*_TURNS[link]), position)
+
+
 def link_surfaces(folder: Path, robot: str, link: int) -> dict[str, Array]:
     """Triangles (t, 3, 3) [m] of each of KINDS, in the frame of the link. `robot` is one of SHIFTS."""
-    position = np.array([0.0, 0.0, (0.0, 0.0, *SHIFTS[robot])[link]])
-    R = pin.rpy.rpyToMatrix(*_TURNS[link])
-    return {kind: _triangles(folder / kind / f"{_FILES[link]}.obj") @ R.T + position for kind in KINDS}
+    T = mesh_placement(robot, link)
+    return {kind: _triangles(mesh_file(folder, kind, link)) @ T.rotation.T + T.translation for kind in KINDS}
 
 
 def sampled(triangles: Array, count: int, rng: np.random.Generator) -> Array:

@@ -8,22 +8,21 @@ that a UR16e shares with the UR10e are in both.
 from __future__ import annotations
 
 import os
-from importlib.util import find_spec
 from pathlib import Path
 
-from models.meshes import SHIFTS
+from models.meshes import SHIFTS, installed
 
 # robots whose meshes the package ships
 SHIPPED = ("ur3e", "ur5e")
 
 
 def meshes(robot: str) -> Path:
-    """The folder of a robot's meshes. The package that ships them need not be imported."""
+    """The folder of a robot's meshes."""
     if robot not in SHIPPED:
         return Path(os.environ["ROBOT_MESHES"]) / robot
-    package = find_spec("airo_models")
-    assert package is not None and package.origin is not None, "a development dependency: `make test` installs it"
-    return Path(package.origin).parent / "arms" / robot
+    folder = installed(robot)
+    assert folder is not None, "a development dependency: `make test` installs it"
+    return folder
 
 
 # robots whose meshes are here

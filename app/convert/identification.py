@@ -6,10 +6,13 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
+import numpy as np
+
 from app.schemas.identifications import Fraction, IdentifyRequest
 from optimizer.identification.document import document_of
 from optimizer.identification.identify import Identification
 from optimizer.identification.options import Options
+from optimizer.identification.payload_fit import Carried
 from optimizer.identification.results import Validation
 
 
@@ -41,4 +44,11 @@ def identification_fields(found: Identification, validation: Validation) -> dict
         "residuals": asdict(found.residuals),
         "temperatures": asdict(found.temperatures),
         "advice": None if found.advice is None else asdict(found.advice),
+        "payload": None if found.payload is None else _payload_fields(found.payload),
     }
+
+
+def _payload_fields(carried: Carried) -> dict[str, Any]:
+    mass_sd, *com_sd = np.sqrt(np.diag(carried.covariance)).tolist()
+    told = {"log": carried.log, "mass": carried.mass, "com": carried.com.tolist(), "why": carried.why}
+    return told | {"mass_sd": mass_sd, "com_sd": com_sd}

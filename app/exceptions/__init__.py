@@ -5,6 +5,7 @@ from __future__ import annotations
 from app.exceptions.access import CrossSite, NoKey, NotOwner, RoleTooLow, WrongHost, WrongKey
 from app.exceptions.base import InvalidRequest, ServiceError
 from app.exceptions.figures import FiguresInUse, TooManyFigures, UnknownFigures
+from app.exceptions.pictures import NoMeshes
 from app.exceptions.queue import (
     Busy,
     ClientDisconnected,
@@ -68,6 +69,7 @@ __all__ = [
     "MalformedHttp",
     "MethodNotAllowed",
     "NoKey",
+    "NoMeshes",
     "NotAcceptable",
     "NotFound",
     "NotOwner",

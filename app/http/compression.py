@@ -23,7 +23,7 @@ _INSTANT = 1 << 15
 """Bodies below this size [byte] are compressed in less time than it takes to pass them to a thread."""
 _GZIP_LEVEL = 5
 _ZSTD_LEVEL = 3
-_TEXT = ("text/", "application/json", "application/problem+json", "application/javascript")
+_COMPRESSIBLE = ("text/", "application/json", "application/problem+json", "application/javascript", "model/")
 _STREAM = "text/event-stream"
 
 
@@ -67,7 +67,7 @@ async def _encoded(start: Message, message: Message, coding: Coding) -> Message:
     """The first message of a body, and in `start` the headers that fit it."""
     headers = MutableHeaders(scope=start)
     kind = headers.get("content-type", "")
-    if not kind.startswith(_TEXT) or kind.startswith(_STREAM) or "content-encoding" in headers:
+    if not kind.startswith(_COMPRESSIBLE) or kind.startswith(_STREAM) or "content-encoding" in headers:
         return message
     headers.add_vary_header("Accept-Encoding")
     body: bytes = message.get("body", b"")

@@ -11,8 +11,9 @@ from fastapi.concurrency import run_in_threadpool
 from sqlalchemy.exc import IntegrityError
 
 from app.access.client import Client
-from app.exceptions import RobotExists
+from app.exceptions import NoMeshes, RobotExists
 from app.http.disconnect import unless_disconnected
+from app.http.entity_tag import is_known
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
@@ -24,6 +25,8 @@ from app.schemas.robots import Friction, FrictionLaw, RobotDetail, RobotList, Ro
 from app.store import robots
 from app.store.tables import OwnRobot, now
 from app.tasks.own_robot import OwnRobotTask
+from app.tasks.pictures import MEDIA_TYPE, PictureTask, digest, kept
+from models.pictures import picture_sources
 from models.registry import load_robot, robot_names
 from models.robot import FrictionLaw as Law
 from models.trust import TRUST, energy_trust
@@ -109,6 +112,42 @@ async def urdf(name: Name, store: ServiceStore) -> Response:
     return Response(urdf_of(name, figures), media_type="application/xml")
 
 
+@router.get(
+    "/{name}/meshes.glb",
+    summary="The meshes of a robot",
+    response_class=Response,
+    responses={
+        200: {"content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}}, "description": "The file"},
+        304: {"description": "The client has it, by `If-None-Match`"},
+        **problem_responses(
+            problems.UnknownRobot,
+            problems.NoMeshes,
+            problems.ShuttingDown,
+            problems.DeadlineExceeded,
+            problems.StoreUnavailable,
+        ),
+    },
+)
+async def meshes(
+    request: Request, name: Name, settings: ServiceSettings, engine: ServiceClientEngine, store: ServiceStore
+) -> Response:
+    """The maker's meshes, simplified, as a glTF file with one node for each link, named as it and in its frame. Where
+    `has_meshes` of `GET /robots/{name}` is true."""
+    tag = await run_in_threadpool(digest, name) if name in robot_names() else None
+    if tag is None:
+        if name not in robot_names():
+            await store.read(partial(robots.get, name=name))
+        raise NoMeshes
+    headers = {"ETag": f'"{tag}"', "Cache-Control": "no-cache"}
+    if is_known(headers["ETag"], request):
+        return Response(status_code=304, headers=headers)
+    content = await run_in_threadpool(kept, name)
+    if content is None:
+        task = PictureTask(name, request.state.id)
+        content = (await unless_disconnected(request, engine.run(task, settings.max_deadline))).document
+    return Response(content, headers=headers, media_type=MEDIA_TYPE)
+
+
 @router.put(
     "/{name}",
     summary="Add or replace a robot",
@@ -173,6 +212,7 @@ def _detail(name: str, figures: dict[str, Any], added: bool, owner: str | None, 
     content: dict[str, Any] = {section: figures.get(section) for section in _SECTIONS}
     content |= _summary(name, figures, added, owner)
     content |= {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}
+    content["has_meshes"] = picture_sources(name) is not None
     return RobotDetail(**content)
 
 

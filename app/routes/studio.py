@@ -14,6 +14,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
 from app.exceptions import NotFound
+from app.http.entity_tag import is_known
 
 router = APIRouter(include_in_schema=False)
 
@@ -64,8 +65,7 @@ def _answer(request: Request, path: str) -> Response:
     }
     if path == PAGE:
         headers["Content-Security-Policy"] = _policy()
-    known = {tag.strip().removeprefix("W/") for tag in request.headers.get("if-none-match", "").split(",")}
-    if found.tag in known:
+    if is_known(found.tag, request):
         return Response(status_code=304, headers=headers)
     return Response(found.content, media_type=found.media_type, headers=headers)
 

@@ -12,7 +12,7 @@ from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
 
 MOST_LOGS = 32
-Target = Literal["friction", "rotor", "torque_constant", "power"]
+Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
 DEADLINE = 60.0
@@ -57,8 +57,10 @@ class IdentifyRequest(Request):
         default=Fraction(),
         alias="validate",
     )
-    fit: Annotated[list[Target], Field(min_length=1, max_length=4)] = described(
-        "What is found. Power is added by itself where the logs have it; asking for it refuses logs without.",
+    fit: Annotated[list[Target], Field(min_length=1, max_length=5)] = described(
+        "What is found. Power is added by itself where the logs have it; asking for it refuses logs without. "
+        "`payload`: mass and centre of mass of what the last of `logs` carried and the others did not; friction and "
+        "rotors are found with it.",
         None,
         ["friction", "rotor"],
         default=["friction", "rotor"],
@@ -205,6 +207,17 @@ class Identification(Response):
     result: IdentificationResult | None = part("What was found; null before it is done.")
 
 
+class FoundPayload(Response):
+    """A payload. Its mass and centre of mass go into `payload` of other requests."""
+
+    log: int = described("Number of the log that carries it, from 0.", "1", 1)
+    mass: float = described("Its mass; 0 if the logs do not tell it.", "kg", 2.8)
+    mass_sd: float = described("Standard deviation of the mass.", "kg", 0.01)
+    com: list[float] = described("Its centre of mass in the flange frame.", "m", [0.0, 0.0, 0.06])
+    com_sd: list[float] = described("Standard deviation of the centre of mass.", "m", [0.001, 0.001, 0.002])
+    why: str = described("Why the logs do not tell it; empty if they do.", None, "")
+
+
 class IdentificationResult(Response):
     """What was found from logs."""
 
@@ -223,3 +236,4 @@ class IdentificationResult(Response):
     residuals: Residuals = part("What the fit leaves over of the moves.")
     temperatures: Temperatures = part("Friction over temperature.")
     advice: Advice | None = part("What would help most; null if nothing is known of it.")
+    payload: FoundPayload | None = part("What the last log carried; null if it was not asked for.")

@@ -85,6 +85,9 @@ class RobotDetail(RobotSummary):
     default_motion: Parameters | None = part(
         "Default speed and acceleration of the robot's own controller; null if they are unknown."
     )
+    has_meshes: bool = described(
+        "Whether `GET /robots/{name}/meshes.glb` has the maker's meshes of the links.", None, True
+    )
     warnings: list[str] = described(
         "Of a robot that a user added: what is hardly real, and which parameters are engineering defaults.",
         None,

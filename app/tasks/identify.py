@@ -30,7 +30,8 @@ class IdentifyTask:
     def run(self, deadline: float) -> TaskResult:
         """What was found. `deadline` is not watched: whoever runs the task ends it.
 
-        Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel or InvalidRequest.
+        Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel, PayloadUnknown or
+        InvalidRequest.
         """
         logs = [stored_log(settings, body) for settings, body in self.logs]
         count, robot = len(self.request.logs), robot_named(logs[0].robot)

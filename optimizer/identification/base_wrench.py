@@ -54,7 +54,9 @@ def fit_base_wrench(model: pin.Model, q: Array, v: Array, a: Array, wrench: Arra
     # forces and torques have different units: each of the six by the size of its noise, about that of its values
     scale = np.maximum(wrench.std(axis=0), 1e-9)
     flat = (columns / scale[:, None]).reshape(-1, len(kept))
-    grouped = Grouped.of(flat, (wrench / scale).ravel(), np.repeat(numbers, 6), int(numbers.max()) + 1)
+    grouped = Grouped.of(
+        flat, (wrench / scale).ravel(), np.ones(len(flat)), np.repeat(numbers, 6), int(numbers.max()) + 1
+    )
     value = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), np.full(len(kept), -np.inf))
     spread = left_out(grouped, value, np.ones(len(kept), dtype=bool))
     return WrenchFit(value, jackknife(spread), combination)

@@ -43,9 +43,9 @@ class Block:
 
 def terms_of(options: Options) -> list[str]:
     """The terms of each joint that are fitted."""
-    friction = options.terms if "friction" in options.fit else ()
-    scale = (SCALE,) if "torque_constant" in options.fit else ()
-    return [*friction, *(("rotor_inertia",) if "rotor" in options.fit else ()), *scale]
+    friction = options.terms if "friction" in options.targets else ()
+    scale = (SCALE,) if "torque_constant" in options.targets else ()
+    return [*friction, *(("rotor_inertia",) if "rotor" in options.targets else ()), *scale]
 
 
 def block_of(
@@ -115,9 +115,9 @@ def own_value(robot: Robot, name: Name) -> float:
 
 def _known(robot: Robot, rows: Rows, options: Options) -> Array:
     """Torque (n, nq) [N·m] of what is not fitted: rigid bodies, and the robot's own friction or rotors."""
-    known = np.zeros_like(rows.rigid) if "torque_constant" in options.fit else rows.rigid.copy()
-    if "friction" not in options.fit:
+    known = np.zeros_like(rows.rigid) if "torque_constant" in options.targets else rows.rigid.copy()
+    if "friction" not in options.targets:
         known += robot.friction.torque(rows.v, rows.rigid)
-    if "rotor" not in options.fit:
+    if "rotor" not in options.targets:
         known += robot.drives.rotor_inertia * rows.a
     return known

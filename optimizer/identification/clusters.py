@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from models.robot import Array
 from optimizer.identification.fit_rows import Rows
 
 Numbers = npt.NDArray[np.int64]
@@ -16,6 +17,8 @@ LEAST_GROUPS = 5
 SECOND = 1.0
 # more clusters than this tell nothing more and take time
 MOST_CLUSTERS = 60
+# of residuals that are rounding
+LEAST_VARIANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,3 +41,17 @@ def clusters_of(rows: Rows) -> Clusters:
     if count > MOST_CLUSTERS:
         number, count = number * MOST_CLUSTERS // count, MOST_CLUSTERS
     return Clusters(np.asarray(number, dtype=np.int64), count)
+
+
+def shared_variance(residuals: Array, weight: Array, clusters: Clusters) -> float:
+    """Variance of a row (n,) that tells as much as if all rows were independent, in the unit of the residuals squared.
+
+    The rows of a move share an error that the model cannot express. The mean residual of a cluster of n rows has then a
+    larger variance than 1/n of a row's.
+    """
+    weighted = np.sqrt(weight) * residuals
+    size = np.bincount(clusters.of_row, minlength=clusters.count)
+    total = np.bincount(clusters.of_row, weighted, minlength=clusters.count)
+    shared = float(np.mean(total[size > 0] ** 2 / size[size > 0]))
+    alone = float(weighted @ weighted / max(weight.sum(), 1e-300))
+    return max(shared, alone) + LEAST_VARIANCE

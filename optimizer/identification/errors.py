@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from optimizer.exceptions import JoulepathError
 
 
 class NotExcited(JoulepathError):
-    """The logs tell nothing of what was asked; `parameters` are its names."""
+    """The logs of a `robot` tell nothing of what was asked; `parameters` are its names.
 
-    def __init__(self, parameters: Sequence[str]) -> None:
+    `excite` are the parameters that an excitation is to tell apart, with a payload of `mass` [kg] at `com` (3,) [m].
+    `advice` is the request for it.
+    """
+
+    def __init__(
+        self, parameters: Sequence[str], robot: str, excite: Sequence[str], mass: float = 0.0, com: Sequence[float] = ()
+    ) -> None:
         super().__init__(
             "Nothing that was asked for can be identified from these logs: log motions in which every joint moves, at "
             "several speeds and in both directions."
         )
         self.parameters = list(parameters)
+        carried = {"payload": {"mass": mass, "com": list(com)}} if mass > 0 else {}
+        self.advice: dict[str, Any] = {"robot": robot, "parameters": list(excite), **carried}
 
 
 class NothingHeldOut(JoulepathError):
@@ -37,3 +46,14 @@ class NoPowerChannel(JoulepathError):
             "No log has the power of the arm's bus: log voltage and current of the arm, or its power. Joint currents "
             "are not taken for it, as they are no DC currents."
         )
+
+
+class PayloadUnknown(JoulepathError):
+    """Torque constants were asked for, and it is not known what the arm carried; `joints` carry too little to tell."""
+
+    def __init__(self, joints: Sequence[int]) -> None:
+        super().__init__(
+            "Gravity does not tell the torque constants of all joints, and nobody said what the arm carried: give "
+            "`payload` with each log, of mass 0 if it was nothing, and find a payload and torque constants one by one."
+        )
+        self.joints = list(joints)

@@ -89,7 +89,8 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
             model.gravity.linear = log.gravity
             piece["regressor"] = rigid_regressor(model, piece["q"], piece["v"], piece["a"])
         pieces.append(piece)
-    joined = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    # taken out one by one: regressors are large
+    joined = {name: np.concatenate([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
     return Rows(**joined, current=meanings == ["current"])
 

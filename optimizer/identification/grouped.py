@@ -8,6 +8,7 @@ says how well they are known.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,16 +36,21 @@ class Grouped:
     moment: Array
 
     @staticmethod
-    def of(columns: Array, values: Array, group: Numbers, count: int) -> Grouped:
-        """From columns (n, p), values (n,) and the group (n,) of each row, of `count`."""
-        p = columns.shape[1]
+    def of(columns: Array | Sequence[Array], values: Array, weight: Array, group: Numbers, count: int) -> Grouped:
+        """From columns (n, p), values, weight and group (n,) of each row, of `count`.
+
+        Columns in several parts (n, …) are put side by side, and weighted, one group at a time: all of them are large.
+        """
+        blocks = [columns] if isinstance(columns, np.ndarray) else [*columns]
+        p = sum(block.shape[1] for block in blocks)
         gram, moment = np.zeros((count, p, p)), np.zeros((count, p))
         order = np.argsort(group, kind="stable")
         edges = np.searchsorted(group[order], np.arange(count + 1))
         for k in range(count):
             rows = order[edges[k] : edges[k + 1]]
-            part = columns[rows]
-            gram[k], moment[k] = part.T @ part, part.T @ values[rows]
+            root = np.sqrt(weight[rows])
+            part = root[:, None] * np.hstack([block[rows] for block in blocks])
+            gram[k], moment[k] = part.T @ part, part.T @ (root * values[rows])
         return Grouped(gram, moment)
 
 

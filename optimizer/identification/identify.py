@@ -11,15 +11,17 @@ from models.robot import Mask, Robot
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.advice import advice_of
 from optimizer.identification.block import own_value
-from optimizer.identification.errors import NoPowerChannel, NotExcited
+from optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadUnknown
 from optimizer.identification.estimate import Estimate, Name
 from optimizer.identification.fit_rows import Rows, rows_of
+from optimizer.identification.fitted_arm import own_arm
 from optimizer.identification.fitting import Fitted, fit_rows, motor_torque
 from optimizer.identification.grouped import lag_one
 from optimizer.identification.interval import Spread, sessions, spread_of
 from optimizer.identification.log import Log
 from optimizer.identification.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
+from optimizer.identification.payload_fit import Carried, joints_without_gravity, loaded, payload_of
 from optimizer.identification.regressor import BODY, body_parameters
 from optimizer.identification.results import (
     Advice,
@@ -38,6 +40,7 @@ from optimizer.identification.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
 from optimizer.identification.validation import Fold, validate
 from optimizer.identification.whole_fit import LINK, PARTS
 from optimizer.linear_algebra import one_thread
+from optimizer.problem.arm import Payload
 
 WHITE = 0.3
 """Correlation of neighbouring residuals up to which they count as independent."""
@@ -45,7 +48,9 @@ WHITE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """An arm's figures from logs. `validation` is of a fit without the held-out moves; None if none was asked for."""
+    """An arm's figures from logs. `validation` is of a fit without the held-out moves; None if none was asked for.
+
+    `payload` is what the last log carried; None if it was not asked for."""
 
     robot: Robot
     options: Options
@@ -58,6 +63,7 @@ class Identification:
     temperatures: Temperatures
     advice: Advice | None
     validation: Validation | None
+    payload: Carried | None
     logs: tuple[str, ...]
 
     @one_thread()
@@ -104,19 +110,24 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
     """The figures of an arm from at least one log of it.
 
     They are fitted to all moves. Before that, a fit without the held-out moves is validated on these, unless `held_out`
-    is 0. Raises InvalidProblem, EffortNotUsable, NoPowerChannel, NotExcited, and NothingHeldOut.
+    is 0. Raises InvalidProblem, EffortNotUsable, NoPowerChannel, NotExcited, PayloadUnknown, and NothingHeldOut.
     """
-    options = options or Options()
-    rows = rows_of(robot, logs, options.refit)
-    _check(rows, logs, options)
+    options, last = options or Options(), len(logs) - 1
+    rows = _rows(robot, logs, options)
+    _check(robot, rows, logs, options)
     validation = None
     if options.held_out:
-        folds = [_fold(robot, rows, out, options) for out in held_out(rows, options.held_out)]
+        folds = [_fold(robot, rows, out, options, last) for out in held_out(rows, options.held_out)]
         validation = validate(robot, folds, options.velocity_threshold)
+    carried = _carried(robot, rows, options, last)
+    rows = rows if carried is None else loaded(rows, carried)
     fitted = fit_rows(robot, rows, options)
     parameters = _parameters(robot, fitted.estimate)
-    if not any(each.identified for each in parameters):
-        raise NotExcited([each.figure for each in parameters])
+    if carried is not None:
+        parameters += carried.parameters(logs[-1].payload)
+    sought = [each for each in parameters if set(options.fit) != {"payload"} or each.figure.startswith("payload")]
+    if not any(each.identified for each in sought):
+        raise _not_excited([each.figure for each in sought], logs, options)
     return Identification(
         robot=robot,
         options=options,
@@ -131,17 +142,40 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
         ),
         advice=advice_of(fitted, rows),
         validation=validation,
+        payload=carried,
         logs=tuple(log.name or "" for log in logs),
     )
 
 
-def _fold(robot: Robot, rows: Rows, out: Mask, options: Options) -> Fold:
+def _rows(robot: Robot, logs: Sequence[Log], options: Options) -> Rows:
+    """The rows of the logs. Where a payload is sought, the last log's counts as nothing, whatever it says."""
+    if "payload" not in options.fit:
+        return rows_of(robot, logs, options.refit)
+    if len(logs) < 2:
+        raise InvalidProblem("logs", "A payload needs two logs: one without it, and last the one with it.")
+    return rows_of(robot, [*logs[:-1], replace(logs[-1], payload=Payload())], regressor=True)
+
+
+def _carried(robot: Robot, rows: Rows, options: Options, last: int) -> Carried | None:
+    """The payload of the `last` log, if it was asked for."""
+    if "payload" not in options.fit:
+        return None
+    return payload_of(robot, rows, motor_torque(own_arm(robot), rows), last, options.velocity_threshold)
+
+
+def _fold(robot: Robot, rows: Rows, out: Mask, options: Options, last: int) -> Fold:
     """The rows that are held `out` (n,), and a fit to the others, which are of the same days."""
-    blind = fit_rows(robot, rows.take(~out), options)
-    return Fold(blind, replace(spread_of(blind, rows.take(~out)), session=0.0), rows.take(out))
+    seen = rows.take(~out)
+    carried = _carried(robot, seen, options, last)
+    seen = seen if carried is None else loaded(seen, carried)
+    blind = fit_rows(robot, seen, options)
+    spread = replace(spread_of(blind, seen), session=0.0)
+    del seen  # rows are large
+    held = rows.take(out)
+    return Fold(blind, spread, held if carried is None else loaded(held, carried))
 
 
-def _check(rows: Rows, logs: Sequence[Log], options: Options) -> None:
+def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Options) -> None:
     """Whether the logs have what was asked for."""
     if any(log.effort_meaning == "external" for log in logs):
         raise EffortNotUsable(
@@ -154,11 +188,26 @@ def _check(rows: Rows, logs: Sequence[Log], options: Options) -> None:
             "fit",
             "torque_constant needs motor currents, and links that are known: leave it out, or keep the inertials.",
         )
+    if "torque_constant" in options.fit and ("payload" in options.fit or not all(log.payload_known for log in logs)):
+        raise PayloadUnknown(joints_without_gravity(robot, rows, logs))
+    if "payload" in options.fit and (options.refit or options.couplings):
+        raise InvalidProblem("fit", "A payload needs links that are known, and no couplings: leave it out.")
     power = bool(np.isfinite(rows.power).any())
     if "power" in options.fit and not power:
         raise NoPowerChannel
-    if not power and not np.isfinite(rows.effort).any():
-        raise NotExcited(list(options.fit))
+    efforts = bool(np.isfinite(rows.effort).any())
+    if not power and not efforts:
+        raise _not_excited(options.fit, logs, options)
+    if "payload" in options.fit and not efforts:
+        raise _not_excited(["payload"], logs, options)
+
+
+def _not_excited(parameters: Sequence[str], logs: Sequence[Log], options: Options) -> NotExcited:
+    """With the excitation that would tell them: friction always, and what the torques of the links tell."""
+    links = options.refit or {"torque_constant", "payload"} & set(options.fit)
+    excite = [*(["inertials"] if links else []), *(["rotor"] if "rotor" in options.targets else []), "friction"]
+    carried = logs[0].payload
+    return NotExcited(parameters, logs[0].robot, excite, carried.mass, carried.com.tolist())
 
 
 def _parameters(robot: Robot, estimate: Estimate) -> tuple[Parameter, ...]:

@@ -32,7 +32,8 @@ class Log:
     `time` (n,) [s] is the uniform grid, from 0 in steps of 1 / `rate` [Hz]. `q` [rad], `v` [rad/s] and `a` [rad/s²] are
     (n, joints). `effort` (n, joints) is what `effort_meaning` says: both are None where no effort was logged. `power`
     (n,) [W] is drawn from the arm's bus, `temperature` (n, joints) [°C] that of the joints; None where not logged.
-    `payload` is what the arm carried, `gravity` (3,) [m/s²] is in the base frame.
+    `payload` is what the arm carried, and `payload_known` whether anybody said so. `gravity` (3,) [m/s²] is in the base
+    frame.
     `moves` cover all rows in their order, apart from pauses between blocks of a log that never rests.
 
     Raises InvalidProblem if an array has another shape than the grid asks for.
@@ -48,6 +49,7 @@ class Log:
     power: Array | None = None
     temperature: Array | None = None
     payload: Payload = field(default_factory=Payload)
+    payload_known: bool = True
     gravity: Array = field(default_factory=lambda: np.array([0.0, 0.0, -9.81]))
     rate: float
     moves: tuple[Move, ...]

@@ -19,12 +19,12 @@ _MISFIT = 0.2
 _LEAST_SPEED = 0.01  # rad/s, standard deviation from which on speeds are compared
 
 
-def log_warnings(log: Log, grid: Grid, columns: Columns, speeds_logged: bool, payload_known: bool) -> list[str]:
+def log_warnings(log: Log, grid: Grid, columns: Columns, speeds_logged: bool) -> list[str]:
     """Gaps, repeated times, constant or saturated channels, speeds that do not fit, what the log does not say."""
     found = [*_times(grid), *_constant(log), *_saturated(log)]
     if speeds_logged:
         found += _misfit(log)
-    if not payload_known:
+    if not log.payload_known:
         found.append("No payload is given or logged: the arm is taken to have carried nothing.")
     if columns.form == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
         found.append(

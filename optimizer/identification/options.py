@@ -11,7 +11,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 
-Target = Literal["friction", "rotor", "torque_constant", "power"]
+Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
 Estimator = Literal["ols", "wls", "irls"]
 DEFAULT_TERMS: tuple[Term, ...] = ("coulomb", "viscous", "load", "offset")
@@ -42,7 +42,8 @@ class Coupling:
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """`fit`: the figures to find; power is added by itself where the logs have it. `refit`: the links' inertials, too.
+    """`fit`: the figures to find; power is added by itself where the logs have it, friction and
+    rotors where the payload of the last log is to be found. `refit`: the links' inertials, too.
 
     `held_out` is the fraction of the moves that validate; 0: none, 1: each motion in its turn. `terms` are those of the
     friction law, `knee` [rad/s] that of its step (None: the robot's own). `velocity_threshold` [rad/s]: slower samples
@@ -78,3 +79,10 @@ class Options:
         if self.knee is not None and not 1e-6 <= self.knee <= 1.0:
             raise InvalidProblem("knee", "knee must be from 1e-6 to 1 rad/s.")
         object.__setattr__(self, "couplings", tuple(self.couplings))
+
+    @property
+    def targets(self) -> tuple[Target, ...]:
+        """What is fitted: a payload is told only together with friction and rotors."""
+        given = tuple(self.fit)
+        together: tuple[Target, ...] = ("friction", "rotor") if "payload" in given else ()
+        return (*given, *(each for each in together if each not in given))

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from models.robot import Array, Mask, Robot
-from optimizer.identification.clusters import Clusters
+from optimizer.identification.clusters import Clusters, shared_variance
 from optimizer.identification.grouped import P95, Grouped, left_out
 from optimizer.identification.power_model import Electrics, Motion, power
 from optimizer.identification.robust import bisquare_weights
@@ -87,9 +87,8 @@ def fit_power(
         residuals = measured - predicted
         if iteration:
             weight = bisquare_weights(residuals) if robust else weight
-            noise = _noise(residuals, weight, clusters)
-        root = np.sqrt(weight / noise)
-        grouped = Grouped.of(root[:, None] * slope, root * (residuals + slope @ value), clusters.of_row, clusters.count)
+            noise = shared_variance(residuals, weight, clusters)
+        grouped = Grouped.of(slope, residuals + slope @ value, weight / noise, clusters.of_row, clusters.count)
         precision = grouped.gram.sum(axis=0) + prior.precision
         target = grouped.moment.sum(axis=0) + prior.precision @ prior.mean
         new = _nonnegative(precision, target, prior.mean, held)
@@ -112,20 +111,6 @@ def _unmoved(motion: Motion) -> Mask:
     still = np.abs(motion.v).max(axis=0) < 1e-3
     none = np.zeros_like(still)
     return np.concatenate([[False], none, none, still])
-
-
-def _noise(residuals: Array, weight: Array, clusters: Clusters) -> float:
-    """Variance [W²] of a row that tells as much as if all rows were independent.
-
-    The rows of a move share an error that the model cannot express. The mean residual of a cluster of n rows has then a
-    larger variance than 1/n of a row's.
-    """
-    weighted = np.sqrt(weight) * residuals
-    size = np.bincount(clusters.of_row, minlength=clusters.count)
-    total = np.bincount(clusters.of_row, weighted, minlength=clusters.count)
-    shared = float(np.mean(total[size > 0] ** 2 / size[size > 0]))
-    alone = float(weighted @ weighted / max(weight.sum(), 1e-300))
-    return max(shared, alone) + 1e-9
 
 
 def _nonnegative(precision: Array, target: Array, own: Array, held: Mask) -> Array:

@@ -123,13 +123,14 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
         power=None if power is None else power.prod(axis=1),
         temperature=logged["temperature"],
         payload=payload,
+        payload_known=payload_known,
         gravity=gravity,
         rate=grid.rate,
         moves=cut(still, grid.rate, grid.gaps),
         name=options.name,
         tags=tuple(options.tags),
     )
-    remarks += log_warnings(log, grid, columns, logged["v"] is not None, payload_known)
+    remarks += log_warnings(log, grid, columns, logged["v"] is not None)
     return Reading(log, LogReport(rows, dropped, grid.jitter, channels_of(log, columns, named), found, tuple(remarks)))
 
 

@@ -26,12 +26,13 @@ def structure_of(robot: Robot, rows: Rows, options: Options) -> Structure:
     base = base_parameters(robot.model, rotors)
     condition, excited = None, None
     if rows.regressor is not None:
-        columns = rows.regressor[~rows.rest].reshape(-1, BODY * robot.nq)
-        if rotors:
-            accelerations = (rows.a[~rows.rest][:, :, None] * np.eye(robot.nq)).reshape(-1, robot.nq)
-            columns = np.hstack([columns, accelerations])
-        chosen = columns[:, base.independent]
-        gram = chosen.T @ chosen
+        gram = np.zeros((base.count, base.count))
+        for joint, axis in enumerate(np.eye(robot.nq)):
+            columns = rows.regressor[~rows.rest, joint]
+            if rotors:
+                columns = np.hstack([columns, np.outer(rows.a[~rows.rest, joint], axis)])
+            chosen = columns[:, base.independent]
+            gram += chosen.T @ chosen
         scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         values = np.sqrt(np.maximum(np.linalg.eigvalsh(gram / np.outer(scale, scale)), 0.0))
         excited = int((values > LEAST_EXCITED * values[-1]).sum())

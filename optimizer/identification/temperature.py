@@ -46,7 +46,7 @@ def _rate(friction: Array, rest: Array, above: Array, clusters: Clusters) -> tup
     for _ in range(STEPS):
         curve = friction * np.exp(-found[1] * above)
         columns = np.column_stack([curve, -found[0] * above * curve])
-        grouped = Grouped.of(columns, rest - found[0] * curve, clusters.of_row, clusters.count)
+        grouped = Grouped.of(columns, rest - found[0] * curve, np.ones_like(rest), clusters.of_row, clusters.count)
         step = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), np.full(2, -np.inf))
         found = found + step
         if np.abs(step).max() < CONVERGED:

@@ -108,8 +108,7 @@ def _fit(robot: Robot, block: Block, clusters: Clusters, options: Options) -> Es
             lower=block.lower[free],
         )
         value, weight = _weighted(part, clusters, options)
-        root = np.sqrt(weight)
-        grouped = Grouped.of(root[:, None] * part.columns, root * part.values, block.cluster, clusters.count)
+        grouped = Grouped.of(part.columns, part.values, weight, block.cluster, clusters.count)
         loose = value > part.lower
         replicates = left_out(grouped, value, loose)
         worst = _least_told(part, value, np.sqrt(np.diag(jackknife(replicates))), loose)
@@ -121,7 +120,7 @@ def _fit(robot: Robot, block: Block, clusters: Clusters, options: Options) -> Es
             others = [(term, coulomb[1]) for term in ("viscous", "curved", "load")]
             held |= dict.fromkeys((name for name in others if name in block.names), KEPT)
     # of all terms, with the same weights
-    grouped = Grouped.of(root[:, None] * block.columns, root * block.values, block.cluster, clusters.count)
+    grouped = Grouped.of(block.columns, block.values, weight, block.cluster, clusters.count)
     full = own.copy()
     full[free] = value
     spread = np.tile(full, (clusters.count, 1))
@@ -179,8 +178,7 @@ def _weighted(block: Block, clusters: Clusters, options: Options) -> tuple[Array
     weight = np.ones_like(block.values)
     passes = {"ols": 1, "wls": 2 if len(np.unique(block.joint)) > 1 else 1, "irls": PASSES}[options.estimator]
     for step in range(passes):
-        root = np.sqrt(weight)
-        grouped = Grouped.of(root[:, None] * block.columns, root * block.values, block.cluster, clusters.count)
+        grouped = Grouped.of(block.columns, block.values, weight, block.cluster, clusters.count)
         found = solve(grouped.gram.sum(axis=0), grouped.moment.sum(axis=0), block.lower)
         if step < passes - 1:
             weight = weights_of(block.joint, block.values - block.columns @ found, options.estimator == "irls")

@@ -28,6 +28,11 @@ class WholeArm:
         """All columns (n, 10 bodies + p)."""
         return np.hstack([self.bodies, self.block.columns])
 
+    def torque(self, value: Array) -> Array:
+        """Torques (n,) [N·m] of parameters (10 bodies + p,) of links and other terms."""
+        links = self.bodies.shape[1]
+        return np.asarray(self.bodies @ value[:links] + self.block.columns @ value[links:])
+
 
 def whole_arm(
     robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options, bodies: Array, change: Array
@@ -37,6 +42,10 @@ def whole_arm(
     joints = range(robot.nq)
     block = block_of(robot, rows, torque, clusters, options, joints)
     uses = [moving(rows, torque, joint, options.velocity_threshold, options.couplings) for joint in joints]
-    columns = np.concatenate([bodies[use, joint] for joint, use in zip(joints, uses, strict=True)])
+    ends = np.cumsum([int(use.sum()) for use in uses])
+    columns = np.empty((int(ends[-1]), bodies.shape[2]))
+    # filled in place: they are the largest array of a fit
+    for joint, (use, part) in enumerate(zip(uses, np.split(columns, ends[:-1]), strict=True)):
+        part[:] = bodies[use, joint]
     known = body_parameters(robot.model) + change
     return WholeArm(columns, block, block.values + columns[:, : len(known)] @ known)

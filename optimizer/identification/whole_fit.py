@@ -12,7 +12,7 @@ import numpy as np
 
 from models.robot import Array, Robot
 from optimizer.identification.block import COUPLED
-from optimizer.identification.clusters import Clusters
+from optimizer.identification.clusters import Clusters, shared_variance
 from optimizer.identification.consistent import solve_consistent
 from optimizer.identification.estimate import Estimate, Name
 from optimizer.identification.fit_rows import Rows
@@ -59,11 +59,13 @@ def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, optio
         replicates = left_out(grouped, value, free, precision)
         change = value[: len(own)] - own
         held |= _unloaded(robot, arm, value, np.sqrt(np.diag(jackknife(replicates))), len(own))
+        terms = arm.block.names
+        del arm, now  # its columns are large, and those of the next pass take their place
     hessian = grouped.gram.sum(axis=0) + precision
     spread = np.linalg.solve(hessian, precision)
     order = np.r_[len(own) : len(value), : len(own)]
     links = [(LINK + part, joint) for joint in range(robot.nq) for part in PARTS]
-    names = (*arm.block.names, *links)
+    names = (*terms, *links)
     return WholeFit(
         Estimate(
             names=names,
@@ -102,15 +104,14 @@ def _solve(
     arm: WholeArm, clusters: Clusters, options: Options, mean: Array, precision: Array, links: int
 ) -> tuple[Array, Grouped]:
     """The solution (p,), and the weighted normal equations."""
-    columns, block = arm.columns, arm.block
+    block = arm.block
     lower = np.concatenate([np.full(BODY * links, -np.inf), block.lower])
-    value, weight = mean, _weights(arm, arm.values - columns @ mean, clusters, False)
+    value, weight = mean, _weights(arm, arm.values - arm.torque(mean), clusters, False)
     for _ in range(WEIGHINGS):
-        root = np.sqrt(weight)
-        grouped = Grouped.of(root[:, None] * columns, root * arm.values, block.cluster, clusters.count)
+        grouped = Grouped.of((arm.bodies, block.columns), arm.values, weight, block.cluster, clusters.count)
         gram, moment = grouped.gram.sum(axis=0) + precision, grouped.moment.sum(axis=0) + precision @ mean
         value = solve_consistent(gram, moment, links, lower)
-        weight = _weights(arm, arm.values - columns @ value, clusters, options.estimator == "irls")
+        weight = _weights(arm, arm.values - arm.torque(value), clusters, options.estimator == "irls")
     return value, grouped
 
 
@@ -121,10 +122,7 @@ def _weights(arm: WholeArm, residuals: Array, clusters: Clusters, robust: bool) 
         rows = arm.block.joint == joint
         rest, cluster = residuals[rows], arm.block.cluster[rows]
         share = bisquare_weights(rest) if robust else np.ones_like(rest)
-        size = np.bincount(cluster, minlength=clusters.count)
-        total = np.bincount(cluster, np.sqrt(share) * rest, minlength=clusters.count)
-        shared = float(np.mean(total[size > 0] ** 2 / size[size > 0]))
-        weight[rows] = share / max(shared, float(share @ rest**2 / share.sum()), 1e-9)
+        weight[rows] = share / shared_variance(rest, share, Clusters(cluster, clusters.count))
     return weight
 
 

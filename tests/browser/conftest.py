@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from tests.app.live import GRACE, Server, serving
-from tests.browser.pages import SHOWN, opened, until
+from tests.browser.pages import MESHES, SHOWN, opened, until
 from tests.browsers import SOFTWARE, chromium
 
 
@@ -33,4 +33,5 @@ def page(browser: Browser, service: Server) -> Iterator[Page]:
     """The page with its first example, still. Tests of a module share it."""
     with opened(browser, f"{service.url}/studio") as page:
         until(page, SHOWN)
+        until(page, MESHES)
         yield page

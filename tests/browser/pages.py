@@ -17,6 +17,8 @@ FIRST = json.loads((ROOT / "examples" / "optimize" / "bin_to_shelf.json").read_t
 PATIENCE = 1000 * ANSWER  # [ms]
 expect.set_options(timeout=PATIENCE)
 SHOWN = "() => Boolean(window.studio?.state.answer && (window.studio.view?.frames ?? 1))"
+# what is drawn from figures has texture coordinates, the meshes have none
+MESHES = "() => Boolean(window.studio?.view?.arms) && !studio.view.arms[0].drawn[0].geometry.hasAttribute('uv')"
 
 
 def until(page: Page, condition: str, patience: float = ANSWER) -> None:

@@ -18,6 +18,14 @@ ROUNDING = 1e-9  # s; sums of times in double precision
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
+GHOSTS = "() => studio.view.parts.ghosts.children.length"
+# where the flange of the last ghost is drawn, and where it is at the best goal so far
+BEST = """() => {
+    const { parts, chain } = studio.view;
+    const flange = parts.ghosts.children.at(-1).children.at(-1).matrix.clone().transpose();
+    return [flange.elements, chain.frames(studio.state.best.q_goal).at(-1)];
+}"""
+
 
 def test_a_wrong_request_is_explained(page: Page) -> None:
     show(page, "json")
@@ -113,8 +121,12 @@ def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
     page.locator("#json").blur()
     page.locator("#optimise").click()
     expect(page.locator("#progress-text")).to_contain_text("best")
+    # start, goal, and the best goal so far, where the service says
+    drawn, chain = page.evaluate(BEST)
+    assert page.evaluate(GHOSTS) == 3 and drawn == pytest.approx(chain)
     page.locator("#cancel").click()
     expect(page.locator("#status")).to_have_text("Cancelled.")
+    assert page.evaluate(GHOSTS) == 2
     assert service.post("/optimize", move()).status_code == 200
 
 

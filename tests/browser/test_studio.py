@@ -17,7 +17,7 @@ from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
 from tests.app.live import ROOT, Server
 from tests.app.requests import NEAR, move
-from tests.browser.pages import FIRST, SHOWN, ask, opened, state, until
+from tests.browser.pages import FIRST, MESHES, SHOWN, ask, opened, state, until
 from tests.browsers import BROWSER, MISSING
 
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
@@ -92,6 +92,32 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
         page.locator(f"[data-show={name}]").click()
     page.locator("#show > summary").click()
     assert page.evaluate(PIXELS)[1] == before
+
+
+def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
+    """Where the service has them; else the arm is drawn from its figures, and the page says nothing."""
+    with_meshes = page.evaluate(PIXELS)
+    with opened(browser, f"{service.url}/studio") as other:
+        other.route("**/meshes.glb", lambda route: route.fulfill(status=404, json={"title": "No meshes"}))
+        other.reload()
+        until(other, SHOWN)
+        until(other, "() => performance.getEntriesByType('resource').some(({ name }) => name.endsWith('/meshes.glb'))")
+        without = other.evaluate(PIXELS)
+        assert not other.evaluate(MESHES) and other.locator("#problem").is_hidden()
+        assert without[0] == pytest.approx(with_meshes[0], rel=0.05) and without[1] != with_meshes[1]
+        other.unroute("**/meshes.glb")
+        ask(other, move(robot="ur3e"))
+        until(other, MESHES)
+
+
+def test_words_stay_in_the_picture(browser: Browser, service: Server) -> None:
+    """On a phone, the name of the nearest pair is wider than the room beside it."""
+    with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
+        until(page, SHOWN)
+        expect(page.locator(".label.near")).to_be_visible()
+        label, box = (page.locator(name).bounding_box() for name in (".label.near", "#labels"))
+        assert label and box
+        assert box["x"] <= label["x"] and label["x"] + label["width"] <= box["x"] + box["width"]
 
 
 def test_one_clock(page: Page) -> None:

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 from app.schemas.errors.figures import FiguresInUse, TooManyFigures, UnknownFigures
-from app.schemas.errors.identifications import NoPowerChannel, NotExcited, NothingHeldOut, UnknownIdentification
+from app.schemas.errors.identifications import (
+    NoPowerChannel,
+    NotExcited,
+    NothingHeldOut,
+    PayloadUnknown,
+    UnknownIdentification,
+)
 from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
@@ -14,6 +20,7 @@ from app.schemas.errors.motion import (
     GoalInCollision,
     InvalidTable,
     NoCollisionFreeTrajectory,
+    NoMeshes,
     NoSequence,
     NotCertified,
     NoTrajectory,
@@ -67,6 +74,7 @@ from app.schemas.errors.service import (
 PROBLEMS: tuple[type[ProblemDetails], ...] = (
     Validation,
     UnknownRobot,
+    NoMeshes,
     UnreachablePose,
     SingularPose,
     UnreachableTargets,
@@ -107,6 +115,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     NotExcited,
     NothingHeldOut,
     NoPowerChannel,
+    PayloadUnknown,
     EffortNotUsable,
     ExcitationInfeasible,
     UnknownFigures,
@@ -157,6 +166,7 @@ __all__ = [
     "MalformedHttp",
     "MethodNotAllowed",
     "NoCollisionFreeTrajectory",
+    "NoMeshes",
     "NoPowerChannel",
     "NoSequence",
     "NoTrajectory",
@@ -169,6 +179,7 @@ __all__ = [
     "NothingHeldOut",
     "OutsideLimits",
     "PathInfeasible",
+    "PayloadUnknown",
     "ProblemDetails",
     "RequestTimeout",
     "RobotExists",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from app.schemas.common import described
 from app.schemas.errors.problem_details import ProblemDetails, fixed
@@ -16,6 +16,11 @@ class NotExcited(ProblemDetails):
     title: Literal["Not excited"] = fixed("title", "Not excited")
     status: Literal[422] = fixed("status", 422)
     parameters: list[str] = described("What cannot be identified.", None, ["coulomb", "viscous"])
+    advice: dict[str, Any] = described(
+        "A body for `POST /excitation`, whose motion tells these parameters. Add the scene of your cell.",
+        None,
+        {"robot": "ur5e", "parameters": ["rotor", "friction"]},
+    )
 
 
 class NothingHeldOut(ProblemDetails):
@@ -35,6 +40,17 @@ class NoPowerChannel(ProblemDetails):
     type: Literal["/problems/no-power-channel"] = fixed("type", "/problems/no-power-channel")
     title: Literal["No power channel"] = fixed("title", "No power channel")
     status: Literal[422] = fixed("status", 422)
+
+
+class PayloadUnknown(ProblemDetails):
+    """`torque_constant` is asked for, it is not known what the arm carried, and joints carry too little weight to tell
+    their constants. Send the logs again with `payload`: `{"mass": 0}` if the arm carried nothing. A payload is found
+    from two logs, by `"fit": ["payload"]` without `torque_constant`."""
+
+    type: Literal["/problems/payload-unknown"] = fixed("type", "/problems/payload-unknown")
+    title: Literal["Payload unknown"] = fixed("title", "Payload unknown")
+    status: Literal[422] = fixed("status", 422)
+    joints: list[int] = described("Joints at which gravity tells no torque constant, from 0.", "1", [0, 5])
 
 
 class UnknownIdentification(ProblemDetails):

@@ -19,6 +19,16 @@ class UnknownRobot(ProblemDetails):
     known: list[str] = described("Names of all robots.", None, ["ur10e", "ur3e", "ur5e"])
 
 
+class NoMeshes(ProblemDetails):
+    """The meshes of this robot are not installed, as `has_meshes` of `GET /robots/{name}` says. `pip install
+    'joulepath[meshes]'` installs those of ur3e and ur5e. The capsules of
+    `GET /robots/{name}` show every robot."""
+
+    type: Literal["/problems/no-meshes"] = fixed("type", "/problems/no-meshes")
+    title: Literal["No meshes"] = fixed("title", "No meshes")
+    status: Literal[404] = fixed("status", 404)
+
+
 class _TargetError(ProblemDetails):
     target: str = described(
         "Target at fault: `start`, `goal` (of `POST /ik`, too), or `stops/` and the name of a stop of `POST /cycle`.",

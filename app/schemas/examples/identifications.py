@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from fastapi.openapi.models import Example
 
-from app.schemas.examples.values import LOG_ID
+from app.schemas.examples.values import LOG_ID, OTHER_LOG_ID
 
 IDENTIFY_EXAMPLES: dict[str, Example] = {
     "friction_and_power": {
         "summary": "Friction, rotors and power from one log",
         "description": "A third of the motions is held out, and says how well the figures predict.",
         "value": {"logs": [LOG_ID]},
+    },
+    "payload": {
+        "summary": "A payload, from a log without it and one with it",
+        "description": "The last of the logs carries it. What that log says of its payload does not count.",
+        "value": {"logs": [LOG_ID, OTHER_LOG_ID], "fit": ["payload"]},
     },
     "robust_refit": {
         "summary": "With the links' inertials, and outliers that count less",

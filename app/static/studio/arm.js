@@ -19,6 +19,9 @@ function robotGeometry(robot) {
   return geometries.get(robot.name);
 }
 
+/** Draws a robot by these geometries from now on, one for each link, with colours. */
+export const drawBy = (robot, drawn) => Object.assign(robotGeometry(robot), { drawn });
+
 const merged = (parts) => (parts.length ? mergeGeometries(parts) : new THREE.BufferGeometry());
 
 function coloured(geometry, colour) {

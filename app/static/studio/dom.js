@@ -5,14 +5,10 @@ const SVG = "http://www.w3.org/2000/svg";
 export const $ = (id) => document.getElementById(id);
 
 /** An element with attributes, listeners (`onclick`) and children. Text goes in as text. */
-export function el(tag, attributes = {}, ...children) {
-  return filled(document.createElement(tag), attributes, children);
-}
+export const el = (tag, attributes = {}, ...children) => filled(document.createElement(tag), attributes, children);
 
 /** The same for SVG. */
-export function svg(tag, attributes = {}, ...children) {
-  return filled(document.createElementNS(SVG, tag), attributes, children);
-}
+export const svg = (tag, attributes = {}, ...children) => filled(document.createElementNS(SVG, tag), attributes, children);
 
 function filled(node, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {

@@ -9,9 +9,7 @@ const SEEN = "joulepath answers";
 const MOST_SEEN = 40;
 const MOST_LISTED = 50;
 
-export function createKept() {
-  follow("answer", remember);
-}
+export const createKept = () => follow("answer", remember);
 
 const seen = () => JSON.parse(localStorage.getItem(SEEN) ?? "[]");
 

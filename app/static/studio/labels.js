@@ -39,9 +39,12 @@ export class Labels {
   place({ width, height }) {
     for (const { node, at, off } of this.all.values()) {
       const point = at.clone().project(this.camera);
-      const hidden = off || point.z > 1;
-      node.hidden = hidden;
-      if (!hidden) node.style.transform = `translate(-50%, -50%) translate(${((point.x + 1) * width) / 2}px, ${((1 - point.y) * height) / 2}px)`;
+      node.hidden = off || Math.max(Math.abs(point.x), Math.abs(point.y), point.z) > 1;
+      if (node.hidden) continue;
+      // the words stay inside, where their point is
+      const half = node.offsetWidth / 2;
+      const x = Math.max(half, Math.min(width - half, ((point.x + 1) * width) / 2));
+      node.style.transform = `translate(-50%, -50%) translate(${x}px, ${((1 - point.y) * height) / 2}px)`;
     }
   }
 }

@@ -10,9 +10,7 @@ const NAMES = {
 };
 const FULL = 0.995; // share of a limit that counts as reached
 
-export function createLimits() {
-  follow("answer robot", () => state.answer && $("limits").replaceChildren(...content()));
-}
+export const createLimits = () => follow("answer robot", () => state.answer && $("limits").replaceChildren(...content()));
 
 function content() {
   const { worst_ratio, clearance, goal_error } = state.answer.certificate;

@@ -28,9 +28,7 @@ export function createPlayer(view) {
 }
 
 /** Sets the time, and holds the motion there. */
-export function goTo(time) {
-  set({ playing: false, time: Math.max(0, Math.min(state.duration, time)) });
-}
+export const goTo = (time) => set({ playing: false, time: Math.max(0, Math.min(state.duration, time)) });
 
 export function toggle() {
   state.playing ? set({ playing: false }) : play();

@@ -121,9 +121,7 @@ function zeroAndRecovered(plot) {
 }
 
 /** The samples that a torque limit is for: those of the motor, or those of the link. */
-export function limitedTorque({ robot, answer }) {
-  return answer.trajectory[robot.limits.torque_side?.value === "link" ? "tau" : "tau_motor"];
-}
+export const limitedTorque = ({ robot, answer }) => answer.trajectory[robot.limits.torque_side?.value === "link" ? "tau" : "tau_motor"];
 
 function drawJoints() {
   if (!state.answer) return;

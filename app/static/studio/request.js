@@ -77,7 +77,7 @@ export async function compute(path, request) {
     throw error;
   } finally {
     clearInterval(timer);
-    if (running === own) busy(false);
+    if (running === own) busy(false), set({ best: null });
   }
 }
 
@@ -87,7 +87,10 @@ async function streamed(path, request, progress, signal) {
     if (name === "answer") answer = data;
     else if (name === "candidates") progress.total = data.total;
     else if (name === "candidate") progress.done += 1;
-    else if (name === "incumbent") progress.incumbents.push({ ...data, at: performance.now() });
+    else if (name === "incumbent") {
+      progress.incumbents.push({ ...data, at: performance.now() });
+      set({ best: { ...data, robot: request.robot ?? "ur5e" } });
+    }
   }, signal);
   if (!answer) throw new Problem({ title: "The answer broke off", detail: "The connection ended before the answer came: send the request again." });
   return answer;

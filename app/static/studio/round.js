@@ -8,9 +8,7 @@ import { follow, set, state } from "./store.js";
 
 const REST = 0.1; // time between the samples of a rest [s]
 
-export function createRound() {
-  follow("round", draw);
-}
+export const createRound = () => follow("round", draw);
 
 /** Shows an answer of POST /cycle: its moves, which are kept answers, and its rests become one motion. Throws Problem. */
 export async function showRound(round, request) {

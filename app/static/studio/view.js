@@ -33,7 +33,7 @@ export function createView() {
   view = new View($("view"));
   follow("answer arms", () => view.build());
   follow("request", () => view.preview());
-  follow("chosen", () => view.buildGhosts());
+  follow("chosen best", () => view.buildGhosts());
   follow("time show", () => view.pose());
   follow("playing", () => view.draw());
   return view;
@@ -150,7 +150,7 @@ class View {
 
   buildGhosts() {
     this.empty(this.parts.ghosts);
-    const { answer, cell, robot, chosen } = state;
+    const { answer, cell, robot, chosen, best } = state;
     if (!answer) return;
     const ghost = (q, tint, opacity) => {
       const arm = new Arm(this.chain, robot, cell, { tint, opacity });
@@ -160,6 +160,7 @@ class View {
     ghost(answer.trajectory.q[0], START, 0.2);
     ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
     chosen.forEach(({ q_goal }, k) => ghost(q_goal, new THREE.Color(style(`--joint-${k + 2}`)).getHex(), 0.42));
+    if (best?.q_goal && best.robot === answer.robot) ghost(best.q_goal, new THREE.Color(style("--good")).getHex(), 0.42);
     this.draw();
   }
 

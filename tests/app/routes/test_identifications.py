@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
+from app.schemas.excitation import ExcitationRequest
 from app.schemas.identifications import Identification, IdentificationResult
 from models.registry import load_robot
+from optimizer.problem.arm import Payload
 from tests.app.routes.test_problems import refused
-from tests.identification_logs import csv_of, recorded, truth_of
+from tests.identification_logs import Truth, csv_of, recorded, truth_of
 
 ROBOT = load_robot("ur5e")
 TRUTH = truth_of(ROBOT)
@@ -22,9 +25,19 @@ FAR = 4.0
 NOBODY = "3d0b7c55-8e0a-4a6b-b1f0-7a5d9c2e4f18"
 
 
-def add_log(client: TestClient, moves: int = 8, seed: int = 0, **options: Any) -> str:
-    body = csv_of(recorded(ROBOT, TRUTH, moves=moves, seed=seed), **options)
-    answer = client.post("/logs", content=body, params={"payload": '{"mass": 0.0, "com": [0, 0, 0]}'}, headers=CSV)
+NOTHING = {"payload": '{"mass": 0.0, "com": [0, 0, 0]}'}
+
+
+def add_log(
+    client: TestClient,
+    moves: int = 8,
+    seed: int = 0,
+    truth: Truth = TRUTH,
+    params: dict[str, str] = NOTHING,
+    **options: Any,
+) -> str:
+    body = csv_of(recorded(ROBOT, truth, moves=moves, seed=seed), **options)
+    answer = client.post("/logs", content=body, params=params, headers=CSV)
     assert answer.status_code == 201, answer.text
     return str(answer.json()["id"])
 
@@ -114,6 +127,29 @@ def test_what_logs_do_not_tell_is_a_problem(
     found = ended(client, logs=[add_log(client, moves, **options)], **body)
     assert found.state == "failed" and found.result is None and found.problem is not None
     problem.model_validate(found.problem)
+    if "advice" in found.problem:
+        assert ExcitationRequest.model_validate(found.problem["advice"]).robot == ROBOT.name
+
+
+def test_a_payload_is_the_difference_of_two_logs(client: TestClient, log: str) -> None:
+    carried = Payload(2.0, np.array([0.01, -0.02, 0.05]))
+    # what the log says of its payload is wrong
+    loaded = add_log(client, truth=replace(TRUTH, payload=carried), without="P")
+    result = done(client, logs=[log, loaded], fit=["payload"])
+    assert result.payload is not None
+    assert abs(result.payload.mass - carried.mass) <= FAR * result.payload.mass_sd < 0.05
+    assert result.payload.com == pytest.approx(carried.com, abs=0.002)
+    mass = next(each for each in result.parameters if each.figure == "payload_mass")
+    assert (mass.value, mass.sd) == (result.payload.mass, result.payload.mass_sd)
+    wrong = ended(client, logs=[loaded, log], fit=["payload"])
+    assert wrong.problem is not None and "payload last" in str(problems.Validation.model_validate(wrong.problem).errors)
+
+
+def test_torque_constants_need_a_payload_that_is_known(client: TestClient) -> None:
+    silent = add_log(client, moves=2, params={})
+    found = ended(client, logs=[silent], fit=["torque_constant"])
+    joints = problems.PayloadUnknown.model_validate(found.problem).joints
+    assert {0, 5} <= set(joints) and not {1, 2} & set(joints)
 
 
 def test_unknown_logs_are_refused_at_once(client: TestClient, log: str) -> None:

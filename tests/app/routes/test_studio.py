@@ -50,8 +50,9 @@ def test_nothing_else_is_served(client: TestClient, path: str) -> None:
 
 
 def test_the_first_load_is_small(client: TestClient) -> None:
-    """The page, and all that it loads before the first answer."""
-    waiting, seen = ["studio", "studio/first.json"], dict[str, int]()
+    """The page, and all that it loads for the first picture, the maker's meshes and their reader included."""
+    reader = "studio/vendor/three/examples/jsm/loaders/GLTFLoader.js"
+    waiting, seen = ["studio", "studio/first.json", reader, "robots/ur5e/meshes.glb"], dict[str, int]()
     names = {"three": "studio/vendor/three/build/three.module.js", "uplot": "studio/vendor/uplot/dist/uPlot.esm.js"}
     while waiting:
         path = waiting.pop()

@@ -120,6 +120,7 @@ def test_a_log_at_rest_identifies_nothing() -> None:
     with pytest.raises(NotExcited) as caught:
         fit(ROBOT, [at_rest(log)], WITHOUT_SPLIT)
     assert "coulomb" in caught.value.parameters
+    assert caught.value.advice == {"robot": "ur10e", "parameters": ["rotor", "friction"]}
 
 
 @pytest.mark.parametrize("moves", [1, 2])

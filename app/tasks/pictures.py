@@ -1,0 +1,76 @@
+"""GET /robots/{name}/meshes.glb in a worker: simplifies the meshes once, and keeps the file in the cache."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import logging
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import models.meshes
+import models.pictures
+from app.engine.result import TaskResult
+from models.pictures import picture, picture_sources
+from optimizer.energy.kernel_cache import cache_directory
+
+logger = logging.getLogger(__name__)
+
+MEDIA_TYPE = "model/gltf-binary"
+
+
+@cache
+def digest(robot: str) -> str | None:
+    """Hash of everything that the picture of a robot depends on; None if its meshes are not installed."""
+    sources = picture_sources(robot)
+    if sources is None:
+        return None
+    h = hashlib.sha256(repr([version(name) for name in ("trimesh", "fast-simplification")]).encode())
+    for path in (*(Path(str(module.__file__)) for module in (models.meshes, models.pictures)), *sources):
+        h.update(path.read_bytes())
+    return h.hexdigest()[:24]
+
+
+def kept(robot: str) -> bytes | None:
+    """The picture of a robot from the cache; None if it is not there."""
+    try:
+        return _path(robot).read_bytes()
+    except OSError:
+        return None
+
+
+@dataclass(frozen=True)
+class PictureTask:
+    """The name of a robot whose meshes are installed, and the request's id."""
+
+    robot: str
+    request_id: str
+
+    def run(self, deadline: float) -> TaskResult:
+        """The GLB file, made once however many processes ask. `deadline` is not watched: it takes about a second."""
+        path = _path(self.robot)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.with_suffix(".lock").open("w") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                content = kept(self.robot) or _written(path, picture(self.robot))
+        except OSError as error:
+            logger.warning("the meshes of %s are not kept: %s", self.robot, error)
+            content = picture(self.robot)
+        return TaskResult(content, MEDIA_TYPE)
+
+
+def _written(path: Path, content: bytes) -> bytes:
+    """Puts the whole file in its place at once: who reads it never sees a part."""
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        part = Path(folder) / path.name
+        part.write_bytes(content)
+        part.replace(path)
+    return content
+
+
+def _path(robot: str) -> Path:
+    return cache_directory() / f"{robot}-{digest(robot)}.glb"
