@@ -97,7 +97,7 @@ class InvalidTable(ProblemDetails):
     the file is no CSV. Correct the place that `row` and `column` name."""
 
     type: Literal["/problems/invalid-table"] = fixed("type", "/problems/invalid-table")
-    title: Literal["Invalid motion table"] = fixed("title", "Invalid motion table")
+    title: Literal["Invalid table"] = fixed("title", "Invalid table")
     status: Literal[422] = fixed("status", 422)
     row: int | None = described(
         "CSV: number of the line; the header is line 1. JSON: index into the list, from 0. Null if no single row is at "
