@@ -1,0 +1,84 @@
+"""Whether the page can be read: contrast in light and dark, and letters of twice the size."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.app.live import Server
+from tests.browser.pages import SHOWN, opened, show, until
+from tests.browsers import BROWSER, MISSING
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
+
+LEAST = 4.5  # contrast of text, WCAG 2.2, 1.4.3
+# texts that are shown, and their contrast with what is behind them: the nearest grounds, laid over each other
+CONTRASTS = """() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
+    const pen = canvas.getContext("2d", { willReadFrequently: true });
+    const luminance = (colours) => {
+        pen.clearRect(0, 0, 1, 1);
+        for (const colour of colours) { pen.fillStyle = colour; pen.fillRect(0, 0, 1, 1); }
+        const [r, g, b] = [...pen.getImageData(0, 0, 1, 1).data].map((value) => {
+            const share = value / 255;
+            return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+        });
+        return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    };
+    const found = [];
+    const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    while (walker.nextNode()) {
+        const text = walker.currentNode.textContent.trim();
+        const owner = walker.currentNode.parentElement;
+        if (!text || !owner.checkVisibility({ visibilityProperty: true }) || owner.closest("script, style, :disabled, .skip")) continue;
+        const grounds = [];
+        for (let node = owner; node; node = node.parentElement) grounds.unshift(getComputedStyle(node).backgroundColor);
+        const style = getComputedStyle(owner);
+        const ink = owner instanceof SVGElement ? style.fill : style.color;
+        const [a, b] = [luminance(grounds), luminance([...grounds, ink])];
+        found.push([text, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05)]);
+    }
+    return found;
+}"""
+# pairs of controls and headings of which one covers the other, and those that are cut at the edge of the page
+CROWDED = """() => {
+    const all = [...document.querySelectorAll("h1, h2, button, .button, select, summary, label, #joules, #facts")]
+        .filter((each) => each.checkVisibility({ visibilityProperty: true }) && each.getBoundingClientRect().width);
+    const wide = document.documentElement.clientWidth;
+    const name = (each) => `${each.tagName} ${each.id} ${each.textContent.trim().slice(0, 30)}`;
+    const out = all.filter((each) => each.getBoundingClientRect().right > wide + 1 && !each.closest(".scroll, [role=tabpanel]"));
+    const over = [];
+    const header = all.filter((each) => each.closest("header, #player"));
+    for (const a of header) for (const b of header) {
+        if (a === b || a.contains(b) || b.contains(a) || a.compareDocumentPosition(b) & 2) continue;
+        const [p, q] = [a.getBoundingClientRect(), b.getBoundingClientRect()];
+        const width = Math.min(p.right, q.right) - Math.max(p.left, q.left);
+        const height = Math.min(p.bottom, q.bottom) - Math.max(p.top, q.top);
+        if (width > 1 && height > 1) over.push(`${name(a)} / ${name(b)}`);
+    }
+    return [...out.map(name), ...over];
+}"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_text_stands_out(browser: Browser, service: Server, scheme: str) -> None:
+    with opened(browser, f"{service.url}/studio", color_scheme=scheme) as page:
+        until(page, SHOWN)
+        for tab in ("form", "json", "kept"):
+            show(page, tab)
+            found = page.evaluate(CONTRASTS)
+            assert len(found) > 60
+            assert not [(text, round(ratio, 2)) for text, ratio in found if ratio < LEAST]
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_letters_of_twice_the_size(browser: Browser, service: Server, width: int) -> None:
+    with opened(browser, f"{service.url}/studio", viewport={"width": width, "height": 900}) as page:
+        until(page, SHOWN)
+        page.evaluate(
+            "() => { document.documentElement.style.fontSize = '32px'; document.body.style.fontSize = '28px'; }"
+        )
+        assert not page.evaluate(CROWDED)
+        for control in ("#optimise", "#play", "#scrub", "#joules"):
+            page.locator(control).scroll_into_view_if_needed()
+            expect(page.locator(control)).to_be_in_viewport(ratio=0.9)
