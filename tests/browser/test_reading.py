@@ -30,7 +30,8 @@ CONTRASTS = """() => {
     while (walker.nextNode()) {
         const text = walker.currentNode.textContent.trim();
         const owner = walker.currentNode.parentElement;
-        if (!text || !owner.checkVisibility({ visibilityProperty: true }) || owner.closest("script, style, :disabled, .skip")) continue;
+        if (!text || !owner.checkVisibility({ visibilityProperty: true })) continue;
+        if (owner.closest("script, style, :disabled, .skip")) continue;
         const grounds = [];
         for (let node = owner; node; node = node.parentElement) grounds.unshift(getComputedStyle(node).backgroundColor);
         const style = getComputedStyle(owner);
@@ -40,13 +41,18 @@ CONTRASTS = """() => {
     }
     return found;
 }"""
+TWICE = """() => {
+    document.documentElement.style.fontSize = "32px";
+    document.body.style.fontSize = "28px";
+}"""
 # pairs of controls and headings of which one covers the other, and those that are cut at the edge of the page
 CROWDED = """() => {
     const all = [...document.querySelectorAll("h1, h2, button, .button, select, summary, label, #joules, #facts")]
         .filter((each) => each.checkVisibility({ visibilityProperty: true }) && each.getBoundingClientRect().width);
     const wide = document.documentElement.clientWidth;
     const name = (each) => `${each.tagName} ${each.id} ${each.textContent.trim().slice(0, 30)}`;
-    const out = all.filter((each) => each.getBoundingClientRect().right > wide + 1 && !each.closest(".scroll, [role=tabpanel]"));
+    const beyond = all.filter((each) => each.getBoundingClientRect().right > wide + 1);
+    const out = beyond.filter((each) => !each.closest(".scroll, [role=tabpanel]"));
     const over = [];
     const header = all.filter((each) => each.closest("header, #player"));
     for (const a of header) for (const b of header) {
