@@ -20,9 +20,8 @@ class UnknownRobot(ProblemDetails):
 
 
 class NoMeshes(ProblemDetails):
-    """The meshes of this robot are not installed, as `has_meshes` of `GET /robots/{name}` says. `pip install
-    'joulepath[meshes]'` installs those of ur3e and ur5e. The capsules of
-    `GET /robots/{name}` show every robot."""
+    """The meshes of this robot are not installed, as `has_meshes` of `GET /robots/{name}` says. Those of ur3e and ur5e
+    come with `pip install 'joulepath[meshes]'`. The capsules of `GET /robots/{name}` show every robot."""
 
     type: Literal["/problems/no-meshes"] = fixed("type", "/problems/no-meshes")
     title: Literal["No meshes"] = fixed("title", "No meshes")
