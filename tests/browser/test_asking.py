@@ -122,6 +122,7 @@ def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
     page.locator("#optimise").click()
     expect(page.locator("#progress-text")).to_contain_text("best")
     # start, goal, and the best goal so far, where the service says
+    until(page, "() => Boolean(studio.state.best)")
     drawn, chain = page.evaluate(BEST)
     assert page.evaluate(GHOSTS) == 3 and drawn == pytest.approx(chain)
     page.locator("#cancel").click()
