@@ -63,6 +63,7 @@ def test_recording_and_lighter_links(printed: str) -> None:
     assert "limits that it violates: none" in printed
 
 
+@pytest.mark.long
 def test_pareto_front(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "front.png"
     monkeypatch.setattr(sys, "argv", ["pareto_front", str(picture)])

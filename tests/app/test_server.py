@@ -226,6 +226,7 @@ def test_sigterm_answers_or_refuses_all_in_flight() -> None:
             server.get("/healthz")
 
 
+@pytest.mark.long
 def test_sigterm_while_the_workers_warm_up() -> None:
     with serving(warm=False, workers=1) as server:
         until(lambda: any("running" in entry["message"] for entry in server.logged()), WARM_UP)

@@ -66,6 +66,7 @@ def assert_all_there(url: str, ids: list[str]) -> None:
     with_store(url, read)
 
 
+@pytest.mark.long
 def test_sqlite_under_load(tmp_path: Path) -> None:
     (tmp_path / "backup").mkdir()
     file = tmp_path / "backup" / "joulepath.db"

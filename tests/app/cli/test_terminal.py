@@ -63,6 +63,7 @@ def test_an_interrupt_that_is_dropped_is_raised_again(monkeypatch: pytest.Monkey
     assert len(dropped) == 1
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_a_search_with_130() -> None:
     process = subprocess.Popen(
         [*COMMAND, "optimize", "-"],

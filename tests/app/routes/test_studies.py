@@ -318,6 +318,7 @@ class Over:
         return self._server.post(path, json, **options)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", databases())
 def test_what_was_acknowledged_outlives_a_kill(kind: str, tmp_path: Path) -> None:
     if kind == "sqlite":

@@ -203,6 +203,7 @@ def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, na
     assert kernel_for(workshop.robot).compiled
 
 
+@pytest.mark.long
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
     """It has its answer from the virtual machine and does not wait for the compiler, nor stumble over it."""
     code = (

@@ -46,6 +46,7 @@ def energies(asked: WorkRound) -> dict[tuple[str, ...], float]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("seed", "count", "closed"), long_but([(1, 3, True)], [(1, 3, True), (0, 4, True), (2, 4, False)])
 )

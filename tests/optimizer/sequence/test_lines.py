@@ -63,6 +63,7 @@ def test_the_tool_comes_and_leaves_straight() -> None:
     assert carried == 2.0, "what is taken up is lifted along the line"
 
 
+@pytest.mark.long
 def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
     asked = one_stop(branch=BranchFilter(elbow="up"))
     found = optimize_round(asked)

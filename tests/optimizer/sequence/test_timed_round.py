@@ -156,6 +156,7 @@ def test_a_time_just_above_the_shortest_is_met() -> None:
     assert optimize_round(in_time(ASKED, 1.001 * shortest())).duration == pytest.approx(1.001 * shortest())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", long_but([0], range(10)))
 def test_the_bound_holds_for_every_chain_and_share(seed: int) -> None:
     """Random chains of configurations, in random shares of the time, need no less."""
