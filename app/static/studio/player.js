@@ -22,7 +22,7 @@ export function createPlayer(view) {
     scrub.setAttribute("aria-valuetext", `${figure(state.time)} of ${figure(state.duration)} seconds`);
   });
   follow("playing", () => {
-    $("play").textContent = state.playing ? "⏸" : "▶";
+    $("play").textContent = state.playing ? "▮▮" : "▶";
     $("play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
   });
 }
