@@ -338,8 +338,7 @@ def check_kill(url: str) -> None:
             killed.process.wait()
         with serving(workers=1, database_url=url) as restarted:
             for server in (other, restarted):
-                study = shown(Over(server), path)
-                assert [entry["answer"] for entry in study["history"]] == [step["answer"]]
+                assert [entry["answer"] for entry in shown(Over(server), path)["history"]] == [step["answer"]]
                 kept = server.get(f"/answers/{step['answer']}").json()["answer"]
                 assert kept["energy"]["electrical"]["total"] == step["energy"]
             # both servers, at once: numbers are counted without gaps and none is given twice
