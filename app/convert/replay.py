@@ -6,9 +6,10 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.convert.fields import fields
+from app.convert.given_answer import Number, Part
 from app.schemas.replay import DeepestContact, Perturb, SimulatedMotion
 from optimizer.exports.program import Move
 from optimizer.simulation.baseline_courses import ReportedBaseline, planned_baselines
@@ -18,55 +19,47 @@ from optimizer.simulation.reference import course_of
 from optimizer.simulation.replay import Quantity, Replay
 from optimizer.solution import BaselineName, Energy, Objective
 
-_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+
+class _Electrical(Part):
+    total: Number
+    dwell: Number = 0.0
 
 
-class _Part(BaseModel):
-    """A part of an answer. Other fields are not looked at."""
-
-    model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
+class _Mechanical(Part):
+    total: Number
 
 
-class _Electrical(_Part):
-    total: _Number
-    dwell: _Number = 0.0
-
-
-class _Mechanical(_Part):
-    total: _Number
-
-
-class _Energy(_Part):
+class _Energy(Part):
     electrical: _Electrical
     mechanical: _Mechanical
 
 
-class _Baseline(_Part):
+class _Baseline(Part):
     name: BaselineName
     duration: Annotated[float, Field(ge=0, le=1e6)]
-    electrical: _Number
-    mechanical: _Number
-    saving: _Number
+    electrical: Number
+    mechanical: Number
+    saving: Number
 
 
-class _Candidate(_Part):
-    q_goal: Annotated[list[_Number], Field(max_length=16)]
+class _Candidate(Part):
+    q_goal: Annotated[list[Number], Field(max_length=16)]
 
 
-class _Optimized(_Part):
+class _Optimized(Part):
     """An answer of `POST /optimize`, but for its motion."""
 
     objective: Objective = "electrical"
     energy: _Energy
-    baselines: Annotated[list[_Baseline], Field(max_length=16)] = []
-    candidates: Annotated[list[_Candidate], Field(max_length=100_000)] = []
+    baselines: Annotated[list[_Baseline], Field(max_length=16)] = Field(default_factory=list)
+    candidates: Annotated[list[_Candidate], Field(max_length=100_000)] = Field(default_factory=list)
 
 
-class _Total(_Part):
+class _Total(Part):
     energy: _Energy
 
 
-class _Evaluated(_Part):
+class _Evaluated(Part):
     """An answer of `POST /evaluate`, but for its motion."""
 
     total: _Total

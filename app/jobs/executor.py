@@ -15,7 +15,6 @@ from app.schemas.identifications import IdentifyRequest
 from app.store import logs
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
-from app.tasks.identify import Stored
 from app.tasks.job_request import IDENTIFY, JobRequestTask
 from optimizer.progress import Tell, nobody
 
@@ -47,15 +46,8 @@ class LocalExecutor:
 
     async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
         """See `Executor`."""
-        if isinstance(task, JobRequestTask) and task.kind == IDENTIFY:
-            task = replace(task, logs=await self._logs_of(task))
-        return await ArmEngine(_Spare(self.engine, stoppable), self.store).run(task, deadline, tell)
-
-    async def _logs_of(self, task: JobRequestTask) -> tuple[Stored, ...]:
-        """The logs that an identification names. Raises UnknownLog or StoreUnavailable."""
-        asked = IdentifyRequest.model_validate_json(zlib.decompress(task.body))
-        found = [await self.store.read(partial(logs.get, log_id=each)) for each in asked.all_logs]
-        return tuple((log.settings, log.body) for log in found)
+        spare = _Spare(self.engine, stoppable)
+        return await ArmEngine(spare, self.store).run(await _with_logs(task, self.store), deadline, tell)
 
 
 @dataclass(frozen=True)
@@ -72,7 +64,16 @@ class ClusterExecutor:
 
     async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
         """See `Executor`."""
-        return await ArmEngine(self.cluster, self.store).run(task, deadline, tell)
+        return await ArmEngine(self.cluster, self.store).run(await _with_logs(task, self.store), deadline, tell)
+
+
+async def _with_logs(task: Task, store: Store) -> Task:
+    """The task with the logs that an identification names. Raises UnknownLog or StoreUnavailable."""
+    if not isinstance(task, JobRequestTask) or task.kind != IDENTIFY:
+        return task
+    asked = IdentifyRequest.model_validate_json(zlib.decompress(task.body))
+    found = [await store.read(partial(logs.get, log_id=each)) for each in asked.all_logs]
+    return replace(task, logs=tuple((log.settings, log.body) for log in found))
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
-from app.schemas.arm import ArmRequest
 from app.schemas.common import Request, described
-from app.schemas.examples.values import ANSWER_ID
+from app.schemas.given_answer import AnswerRequest
 
 
 class ExportFormat(StrEnum):
@@ -176,15 +174,9 @@ OPTIONS_OF: dict[ExportFormat, str] = {
 """Field with the options of each format that has any."""
 
 
-class ExportRequest(Request):
+class ExportRequest(AnswerRequest):
     """An answer, and how to export it. Options of other formats than the one in the path are refused."""
 
-    answer: str | dict[str, Any] = described(
-        "A motion: the id (or the path) of a kept answer, or a whole answer, of `POST /optimize`, `POST /cycle` or "
-        "`POST /evaluate` with `sample_period`; a point of a front and a study's iteration by their `answer`.",
-        None,
-        ANSWER_ID,
-    )
     speed_scale: float = described(
         "Fraction of the speed: every move is slowed down uniformly and certified again. Rests stay as they are.",
         "1",
@@ -193,25 +185,10 @@ class ExportRequest(Request):
         ge=0.01,
         le=1.0,
     )
-    arm: ArmRequest | None = described(
-        "The arm of the answer: payload, limits, scene, ... as in its request. Null: what the answer says in `arm`. "
-        "Needed if that is null. Its `robot` is that of the answer. Not for a round.",
-        None,
-        {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
-        default=None,
-    )
     table: TableOptions | None = described("Options of `csv` and `npz`.", None, {"period": 0.004}, default=None)
     urscript: UrscriptOptions | None = described("Options of `urscript`.", None, {"digital_output": 0}, default=None)
     ros2: Ros2Options | None = described("Options of `ros2`.", None, {"message": "trajectory"}, default=None)
     moveit: MoveitOptions | None = described("Options of `moveit`.", None, {"encoding": "json"}, default=None)
-
     franka: FrankaOptions | None = described("Options of `franka`.", None, {"form": "cpp"}, default=None)
     rapid: RapidOptions | None = described("Options of `rapid`.", None, {"tolerance": 0.002}, default=None)
     krl: KrlOptions | None = described("Options of `krl`.", None, {"tolerance": 0.002}, default=None)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _answer_is_one(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "answer" in data and not isinstance(data["answer"], str | dict):
-            raise PydanticCustomError("answer", "answer must be the id of a kept answer, or a whole answer")
-        return data

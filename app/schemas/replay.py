@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
-from app.schemas.arm import ArmRequest
 from app.schemas.common import Answer, Request, Response, described, part
-from app.schemas.examples.values import ANSWER_ID
+from app.schemas.given_answer import AnswerRequest
 from app.schemas.response import BODIES
 from app.settings import LONGEST_DEADLINE
 from optimizer.simulation.controller import ControlName
@@ -34,22 +32,9 @@ class Perturb(Request):
     )
 
 
-class ReplayRequest(Request):
+class ReplayRequest(AnswerRequest):
     """An answer whose motion is played in MuJoCo."""
 
-    answer: str | dict[str, Any] = described(
-        "A motion: the id (or the path) of a kept answer, or a whole answer, of `POST /optimize`, `POST /cycle` or "
-        "`POST /evaluate` with `sample_period`; a point of a front and a study's iteration by their `answer`.",
-        None,
-        ANSWER_ID,
-    )
-    arm: ArmRequest | None = described(
-        "The arm of the answer: payload, limits, scene, ... as in its request. Null: what the answer says in `arm`. "
-        "Needed if that is null. Its `robot` is that of the answer. Not for a round.",
-        None,
-        {"payload": {"mass": 2.0, "com": [0.0, 0.0, 0.05]}},
-        default=None,
-    )
     control: Literal["feed_forward", "pd", "both"] = described(
         "Controller of the joints. `feed_forward`: torques known in advance, friction included, and a PD loop. `pd`: "
         "the loop alone, as simple controllers have it.",
@@ -74,13 +59,6 @@ class ReplayRequest(Request):
         ge=1e-3,
         le=LONGEST_DEADLINE,
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _answer_is_one(cls, data: Any) -> Any:
-        if isinstance(data, dict) and "answer" in data and not isinstance(data["answer"], str | dict):
-            raise PydanticCustomError("answer", "answer must be the id of a kept answer, or a whole answer")
-        return data
 
 
 class DeepestContact(Response):

@@ -54,7 +54,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Identified:
+class FoundFigures:
     """What takes the place of a robot's own figures, see `figures.new_figures`."""
 
     robot: str
@@ -78,7 +78,7 @@ class Outcome:
     died: bool = False
     preempted: bool = False
     answer_id: str | None = None
-    identified: Identified | None = None
+    identified: FoundFigures | None = None
 
 
 def lease(session: Session, holder: str, count: int, now: datetime, until: datetime) -> tuple[list[Lease], set[str]]:

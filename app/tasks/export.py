@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from pydantic import ValidationError
 
-from app.convert.exported_answer import paths_of_moves, to_program
 from app.convert.exported_file import to_file
+from app.convert.given_answer import paths_of_moves, to_program
 from app.engine.result import TaskResult
 from app.http.problem_details import invalid_request
 from app.schemas.export import ExportFormat, ExportRequest

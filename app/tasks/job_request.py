@@ -19,7 +19,7 @@ from app.schemas.identifications import IdentifyRequest
 from app.schemas.pareto import ParetoRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import WhatifRequest
-from app.store.leases import Figures, Identified
+from app.store.leases import Figures, FoundFigures
 from app.tasks.compare import CompareTask
 from app.tasks.cycle import CycleTask
 from app.tasks.evaluate import evaluated
@@ -43,7 +43,7 @@ class JobResult(TaskResult):
 
     figures: Figures = field(kw_only=True)
     parts: str = field(kw_only=True)
-    identified: Identified | None = field(kw_only=True, default=None)
+    identified: FoundFigures | None = field(kw_only=True, default=None)
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,9 @@ class JobRequestTask:
         )
 
 
-def _identified(answer: dict[str, Any]) -> Identified:
+def _identified(answer: dict[str, Any]) -> FoundFigures:
     document = {name: value for name, value in answer["document"].items() if name != "robot"}
-    return Identified(answer["robot"], replacing(answer["robot"], document))
+    return FoundFigures(answer["robot"], replacing(answer["robot"], document))
 
 
 def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
-from app.convert.exported_answer import paths_of_moves, to_program
+from app.convert.given_answer import paths_of_moves, to_program
 from app.convert.replay import to_perturbation, to_planned_motion, to_replayed_motion
 from app.convert.warnings import replay_warnings
 from app.engine.result import TaskResult

@@ -17,6 +17,7 @@ from scipy.optimize import lsq_linear
 from scipy.special import stdtrit
 
 from models.robot import Array, Mask
+from models.uncertainty.spread import P95
 
 Numbers = npt.NDArray[np.int64]
 
@@ -24,8 +25,6 @@ Numbers = npt.NDArray[np.int64]
 LEAST_COLUMN = 1e-9
 # of the eigenvalues of the column-scaled normal matrix: below it, a combination of columns does not move
 LEAST_EIGENVALUE = 1e-9
-# P95 of the normal distribution over its standard deviation
-P95 = 1.6448536269514722
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
+from models.uncertainty.spread import P95
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm
 from optimizer.identification.fitting import Fitted
-from optimizer.identification.grouped import P95, jackknife
+from optimizer.identification.grouped import jackknife
 
 # relative standard deviation of friction from day to day, where there are too few logs to measure it: 2 to 4 % in
 # twelve logs of a UR10e over two months

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from models.robot import Array, Mask, Robot
+from models.uncertainty.spread import P95
 from optimizer.identification.clusters import Clusters, shared_variance
-from optimizer.identification.grouped import P95, Grouped, left_out
+from optimizer.identification.grouped import Grouped, left_out
 from optimizer.identification.power_model import Electrics, Motion, power
 from optimizer.identification.robust import bisquare_weights
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array, Robot
+from models.uncertainty.spread import P95
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm, own_arm
 from optimizer.identification.fitting import Fitted, motor_torque
-from optimizer.identification.grouped import P95
 from optimizer.identification.interval import Spread, energy_sd
 from optimizer.identification.results import PowerErrors, Prediction, TorqueErrors, Validation
 

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import math
+import zlib
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from app.engine.result import TaskResult
+from app.engine.task import Task
 from app.exceptions import ClusterUnavailable
-from app.store import job_events
+from app.jobs.executor import ClusterExecutor, LocalExecutor
+from app.store import job_events, logs
 from app.store.store import Store
+from app.store.tables import StoredLog, new_id, now
+from app.tasks.job_request import IDENTIFY, JobRequestTask
 from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, nobody
 from tests.app.jobs.test_dispatcher import Service, is_done, requests, sent, until, with_store
 
@@ -90,5 +99,40 @@ def test_nobody_listens_to_short_requests(tmp_path: Path) -> None:
         await until(lambda: service.work.begun == [0])
         assert service.work.tell is nobody
         await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+class Caught(Exception):
+    """Carries the task that a runner was given."""
+
+
+class Runner:
+    """Stands for the cluster, and for the workers of this service."""
+
+    slots = 1
+
+    async def run(self, task: Task, *_: Any) -> TaskResult:
+        raise Caught(task)
+
+    @property
+    def spare(self) -> Runner:
+        return self
+
+
+@pytest.mark.parametrize("where", ["here", "cluster"])
+def test_an_identification_gets_its_logs_wherever_it_is_computed(tmp_path: Path, where: str) -> None:
+    async def test(store: Store) -> None:
+        log = StoredLog(
+            id=new_id(), robot="ur5e", created=now(), size=3, settings={"robot": "ur5e"}, report={}, body=b"log"
+        )
+        await store.write(partial(logs.add, log=log, most=100))
+        body = zlib.compress(json.dumps({"logs": [log.id]}).encode())
+        runner: Any = Runner()
+        executor = LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
+        with pytest.raises(Caught) as caught:
+            await executor.run(JobRequestTask(IDENTIFY, body, "job.0"), 1.0, True, nobody)
+        (task,) = caught.value.args
+        assert task.logs == (({"robot": "ur5e"}, b"log"),)
 
     with_store(tmp_path, test)

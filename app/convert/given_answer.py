@@ -1,4 +1,4 @@
-"""From an answer to the program that is exported."""
+"""From an answer that comes back in a request to the program of its motions: for exports and replays."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from optimizer.trajectories.through_samples import spline_through
 MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
 # of a stop: a move, two lines, a dwell and a wait
 MOST_LEGS = 5 * MOST_STOPS + 5
-_Number = Annotated[float, Field(ge=-1e9, le=1e9)]
-_Row = Annotated[list[_Number], Field(min_length=1, max_length=16)]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+_Row = Annotated[list[Number], Field(min_length=1, max_length=16)]
 
 
-class _Part(BaseModel):
+class Part(BaseModel):
     """A part of an answer. Other fields are not looked at."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False, frozen=True)
 
 
-class _Spline(_Part):
+class _Spline(Part):
     degree: Annotated[int, Field(ge=1, le=HIGHEST_DEGREE)]
-    knots: Annotated[list[_Number], Field(min_length=4, max_length=MOST_KNOTS)]
+    knots: Annotated[list[Number], Field(min_length=4, max_length=MOST_KNOTS)]
     control_points: Annotated[list[_Row], Field(min_length=2, max_length=MOST_KNOTS)]
 
 
-class _Samples(_Part):
-    t: Annotated[list[_Number], Field(min_length=2, max_length=MOST_SAMPLES)]
+class _Samples(Part):
+    t: Annotated[list[Number], Field(min_length=2, max_length=MOST_SAMPLES)]
     q: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
     v: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
     a: Annotated[list[_Row], Field(max_length=MOST_SAMPLES)]
@@ -57,7 +57,7 @@ class _Trajectory(_Samples):
     spline: _Spline
 
 
-class _Planned(_Part):
+class _Planned(Part):
     """An answer of `POST /optimize`."""
 
     robot: RobotName
@@ -65,7 +65,7 @@ class _Planned(_Part):
     arm: dict[str, Any] | None = None
 
 
-class _Given(_Part):
+class _Given(Part):
     """An answer of `POST /evaluate`."""
 
     robot: RobotName
@@ -73,11 +73,11 @@ class _Given(_Part):
     arm: dict[str, Any] | None = None
 
 
-class _Stop(_Part):
+class _Stop(Part):
     stop: Annotated[str, Field(max_length=256)]
 
 
-class _Leg(_Part):
+class _Leg(Part):
     kind: Literal["move", "line", "dwell", "wait"]
     start: _Stop
     goal: _Stop
@@ -85,7 +85,7 @@ class _Leg(_Part):
     answer: str | None
 
 
-class _Round(_Part):
+class _Round(Part):
     """An answer of `POST /cycle`."""
 
     robot: RobotName
