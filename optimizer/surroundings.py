@@ -75,9 +75,12 @@ class Surroundings:
         """
         if not self.arm.collisions:
             return None
-        closest = self.model.closest_pairs(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0)
-        worst = min(closest, key=lambda each: each.distance, default=None)
-        return worst if worst is not None and worst.distance < 0 else None
+        frames = self.model.frames(q[:: max(len(q) // CONTACT_SAMPLES, 1)])
+        distance = self.model.pair_distances(frames, within=0.0).distance
+        if distance.min(initial=np.inf) >= 0:
+            return None
+        sample, pair = np.unravel_index(int(distance.argmin()), distance.shape)
+        return ClosestPair(self.model.names(int(pair)), float(distance[sample, pair]))
 
     def is_near_contact(self, q: Array) -> bool:
         """Whether any of q (k, nq) [rad] has a clearance below NEAR_CONTACT.

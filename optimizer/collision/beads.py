@@ -45,6 +45,8 @@ class Beads:
         """
         result = np.full(len(pair), -np.inf)
         chosen = np.flatnonzero(self._has_bound[pair])
+        if not chosen.size:
+            return result
         configuration, pair = configuration[chosen], pair[chosen]
         formed, beaded = self._formed[pair], self._beaded[pair]
         T = frames[:, self._links]

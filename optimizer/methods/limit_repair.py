@@ -32,9 +32,9 @@ TORQUE_REPAIR = 1.5
 MOST_TIME_SCALE = 1 + 5e-4
 # points per panel of a knot span at which torque is checked between the nodes
 TORQUE_POINTS = 4
-# a motion longer than this [s] is checked at the quadrature points alone if its torques there, of rigid bodies and of
-# friction with any sign, stay below this ratio of the limits
-LONG, FAR_BELOW = 10.0, 0.8
+# a motion is checked at the quadrature points alone if its torques there, of rigid bodies and of friction with any
+# sign, stay below this ratio of the limits
+FAR_BELOW = 0.8
 # samples at which path constraints are checked, and the multiple of an excess by which they are tightened
 PATH_SAMPLES, PATH_REPAIR = 401, 1.5
 
@@ -66,15 +66,14 @@ def initial_bounds(path: PathConstraints | None) -> Array:
 def torque_peaks(prepared: PreparedProblem, spline: Spline) -> Array:
     """Greatest absolute limited torques (nq,) [N·m] at quadrature points and at the instants of the certificate.
 
-    Those instants are left out of a long motion that stays far from the torque limits.
+    Those instants are left out of a motion that stays far from the torque limits.
     """
     q, v, a = fine_samples(spline, TORQUE_POINTS)[1:]
     smooth, friction = limited_parts(prepared.arm, prepared.torques(q, v, a), v, a)
     peaks = np.abs(smooth + friction).max(axis=0)
-    if spline.duration > LONG:
-        most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
-        if (most <= FAR_BELOW * prepared.problem.arm.active_limits.tau_max).all():
-            return np.asarray(peaks)
+    most = np.abs(smooth).max(axis=0) + np.abs(friction).max(axis=0)
+    if (most <= FAR_BELOW * prepared.problem.arm.active_limits.tau_max).all():
+        return np.asarray(peaks)
     # at a reversal of a joint friction changes sign within a millisecond
     q, v, a = sample(spline, grid(spline.duration))
     return np.asarray(np.maximum(peaks, np.abs(prepared.limited_torques(q, v, a)).max(axis=0)))

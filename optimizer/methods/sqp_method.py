@@ -190,7 +190,7 @@ class SqpMethod(Method):
 
     def _first_duration(self, program: NonlinearProgram, free: Array, least: float) -> float:
         """The duration [s] of least cost among a few at which the guess is within the limits on its rates."""
-        peaks = np.abs(program.kinematics(free)).max(axis=1)
+        peaks = np.abs(program.kinematics(free)).max(axis=2)
         shortest = max(time_scale(peaks / program.limits.rates), least, program.t_min)
         if shortest >= program.t_max:
             return program.t_max

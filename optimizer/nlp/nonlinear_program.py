@@ -171,8 +171,8 @@ class NonlinearProgram:
         return np.hstack([by_points.reshape(len(k), self.free_count * self.r), by_time[:, None]])
 
     def kinematics(self, free: Array) -> Array:
-        """First to third derivative of s by τ on the fine grid, (3, M, r)."""
-        return self.basis.at_grid @ self.points(free)
+        """First to third derivative of s by τ on the fine grid, (3, r, M)."""
+        return np.asarray(self.points(free).T @ self.basis.at_grid.swapaxes(1, 2))
 
     @cached_property
     def path_rows(self) -> PathConstraintRows:

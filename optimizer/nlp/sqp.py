@@ -16,7 +16,7 @@ from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
 from optimizer.nlp.active_path_constraints import PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
-from optimizer.nlp.working_set_qp import QPInputs, QPStep, WorkingSetQP
+from optimizer.nlp.working_set_qp import MOST_ROUNDS, QP_ROUNDS, QPInputs, QPStep, WorkingSetQP
 
 # relative decrease of the cost that a further step must promise
 PROGRESS = 5e-5
@@ -103,7 +103,7 @@ class _Multipliers:
         self.curvature = -float((step.kinematic * (d + 1) * d).sum()) / (T * T)
         if not step.relaxed:
             need = np.zeros_like(self.penalty)
-            np.add.at(need, d * p.r + step.places[2], step.kinematic)
+            np.add.at(need, d * p.r + step.places[1], step.kinematic)
             np.add.at(need, 3 * p.r + step.nodes[1], step.torque)
             np.add.at(need, 3 * p.r + p.kernel.nq + step.passed[1], step.path)
             self.penalty = np.maximum(self.penalty, PENALTY_FACTOR * need)
@@ -123,6 +123,8 @@ class _Solver:
     ) -> None:
         self.p, self.deadline, self.progress = program, deadline, progress
         self.qp = WorkingSetQP(program, time_scale=T)
+        # among obstacles the linear model is worst: a step that breaks limits besides leads nowhere
+        self.rounds = MOST_ROUNDS if program.has_clearance else QP_ROUNDS
         self.scale = np.ones(self.qp.n)
         if self.qp.free_time:
             self.scale[-1] = T
@@ -145,7 +147,7 @@ class _Solver:
                 status = SqpStatus.OUT_OF_TIME
                 break
             qp = self._qp_inputs()
-            step = self.qp.solve(qp)
+            step = self.qp.solve(qp, self.rounds)
             if step is None:
                 status = SqpStatus.INFEASIBLE
                 break
@@ -163,6 +165,8 @@ class _Solver:
                 status = SqpStatus.SOLVED
                 break
             found = self._line_search(step.x, slope)
+            if found is None and self.rounds < MOST_ROUNDS:
+                found = self._exact_step(qp)
             if found is None:
                 status = SqpStatus.SOLVED if feasible and promised < 100 * self.progress else SqpStatus.STALLED
                 break
@@ -172,10 +176,18 @@ class _Solver:
         cost, multiplier = self.line.cost, self.multipliers.torque
         return Result(status, at.free, at.T, cost, iterations, violation, stationarity, multiplier)
 
+    def _exact_step(self, qp: QPInputs) -> _Point | None:
+        """The point that a step leads to which breaks no constraint of the QP; None if that leads to none."""
+        step = self.qp.solve(qp, MOST_ROUNDS)
+        if step is None:
+            return None
+        self.multipliers.update(step, self.p, self.at.T, self.cost_scale)
+        return self._line_search(step.x, float(qp.gradient @ step.x))
+
     def _point(self, free: Array, T: float, kinematics: Array, tau: Array) -> _Point:
         """The iterate, from its limited torques (N, nq)."""
         path_values = self.p.path_rows.values(self.p.points(free), T)
-        largest = np.maximum(kinematics.max(axis=1), -kinematics.min(axis=1)) / self.qp.rates(T)
+        largest = np.maximum(kinematics.max(axis=2), -kinematics.min(axis=2)) / self.qp.rates(T)
         torque = np.abs(tau).max(axis=0) / self.p.limits.tau_max
         path = path_values.ratios.value.max(axis=0, initial=0.0) - self.p.path_bounds + 1
         violation = np.maximum(np.concatenate([largest.ravel(), torque, path]) - 1, 0.0)
@@ -189,7 +201,7 @@ class _Solver:
         H = (self.line.hessian + bent) * self.cost_scale
         H[-1, -1] += self.multipliers.curvature
         H, whitening = _convex(H[:n, :n] * np.outer(self.scale, self.scale))
-        ratio = at.kinematics / self.qp.rates(at.T)[:, None, :]
+        ratio = at.kinematics / self.qp.rates(at.T)[:, :, None]
         return QPInputs(H, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
 
     def _line_search(self, dx: Array, slope: float) -> _Point | None:

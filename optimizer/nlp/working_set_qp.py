@@ -22,19 +22,23 @@ from optimizer.nlp.active_path_constraints import ActivePathConstraints, Index, 
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
 
 # constraints enter the QP when they use more than this ratio of their limit
-NEAR = 0.8
+NEAR = 0.6
 NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
 # no coordinate of a control point moves further in one step [rad]
 STEP = 1.5
-# times that the QP is solved again with the constraints that its step would break
-QP_ROUNDS = 10
+# times that the QP is solved, each time with the constraints that the step before would break. What the last breaks
+# is near its limit at the next iterate: more rounds cost more than they save in iterations, if the step is of any use
+QP_ROUNDS, MOST_ROUNDS = 3, 10
 # the same for a relaxed QP with clearance constraints: it has many rows, and none of them was active before
 RELAXED_ROUNDS = 2
 # least time [s] that a QP gets: most take a millisecond
 LEAST_TIME = 0.05
+# iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed one that collides everywhere
+# has thousands of active rows, and each of its last iterations takes milliseconds
+MOST_QP_ITERATIONS = 1200
 
-Places = tuple[Index, Index, Index]  # derivative, grid point, coordinate
+Places = tuple[Index, Index, Index]  # derivative, coordinate, grid point
 
 # excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
 BOUND_TOLERANCE = 1e-9
@@ -49,7 +53,7 @@ class QPInputs:
     """What the QP is made of at one iterate.
 
     `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n, n) makes it
-    the identity, Wᵀ H W = 1. `ratio` (3, M, r) holds speed, acceleration and jerk over their limits on the grid.
+    the identity, Wᵀ H W = 1. `ratio` (3, r, M) holds speed, acceleration and jerk over their limits on the grid.
     """
 
     hessian: Array
@@ -104,7 +108,7 @@ class _GoalRows:
 class _Rows:
     """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
-    `hard` rows are never relaxed. `chosen` (3, M, r) marks the grid points with a kinematic row, `places` lists them,
+    `hard` rows are never relaxed. `chosen` (3, r, M) marks the grid points with a kinematic row, `places` lists them,
     and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the lower and upper bounds with a row.
     """
 
@@ -157,7 +161,7 @@ class _Rows:
         left = watched_time_left()
         y, _, flag, info = daqp.solve(
             np.eye(len(gradient)), gradient, self.A, self.most, self.least, sense,
-            primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6,
+            primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6, iter_limit=MOST_QP_ITERATIONS,
             time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,  # 0: no limit
         )  # fmt: skip
         found = bool(flag >= _DAQP_OPTIMAL)
@@ -179,24 +183,25 @@ class WorkingSetQP:
         self.n = self.count + int(self.free_time)
         basis = program.basis
         self._grid_free = program.free_columns(basis.at_grid)
-        self._anchors = basis.anchors[:, :, None]
+        self._anchors = basis.anchors[:, None, :]
         self._orders = np.arange(1, 4)
-        self._active = np.zeros((*basis.at_grid.shape[:2], program.r), dtype=bool)
+        self._active = np.zeros((3, program.r, basis.at_grid.shape[1]), dtype=bool)
         self._bounded = np.zeros((2, self.n), dtype=bool)
 
     def rates(self, T: float) -> Array:
         """Limits on the first to third derivative of s by τ, (3, r), for the duration T [s]."""
         return np.asarray(self.p.limits.rates * (T**self._orders)[:, None])
 
-    def solve(self, at: QPInputs) -> QPStep | None:
+    def solve(self, at: QPInputs, rounds: int) -> QPStep | None:
         """The step; None if even the relaxed QP has no solution."""
         goal, torque = self._goal_rows(at.free), self._torque_rows(at)
         path = self.p.path_rows.active(at.path_values, at.T, NEAR_PATH)
         rows, bounds = self._rows(at, goal, torque, path), np.array(self._bounds(at.free, at.T))
         rows.add_bounds(bounds, self._bounded)
         gradient, relaxed = at.gradient @ at.whitening, False
-        last = QP_ROUNDS
-        for attempt in range(1, QP_ROUNDS + 1):
+        attempt, last = 0, rounds
+        while True:
+            attempt += 1
             checkpoint()
             y, multipliers, found = rows.solve(gradient, relaxed)
             if not found:
@@ -206,12 +211,11 @@ class WorkingSetQP:
             if not found:
                 # a relaxed QP without bounds may have a step of any length
                 relaxed = True
-                if self.p.has_clearance:
-                    last = min(attempt + RELAXED_ROUNDS, QP_ROUNDS)
+                last = attempt + (RELAXED_ROUNDS if self.p.has_clearance else rounds)
                 rows.add_bounds(bounds, np.ones_like(rows.bounded))
                 continue
             x = at.whitening @ y
-            if attempt == last or not self._add_broken(rows, at, bounds, x):
+            if attempt >= last or not self._add_broken(rows, at, bounds, x):
                 break
         mu = np.maximum(multipliers, 0.0)
         kinds = np.cumsum([len(goal.least), len(path.slack), len(torque.slack)])
@@ -236,7 +240,7 @@ class WorkingSetQP:
         """The rows that the QP is first solved with, but for bounds: goal, path, torque, kinematic."""
         size = np.abs(at.ratio)
         chosen = (size > NEAR) & (self._anchors | _peaks(size)) | self._active
-        places: Places = np.nonzero(chosen)  # type: ignore[assignment]
+        places = _places(chosen)
         rows = _Rows(at.whitening, size.shape)
         rows.add(goal.gradients, goal.most, goal.least, hard=True)
         rows.add(self._scaled(path.gradients), path.slack)
@@ -252,8 +256,8 @@ class WorkingSetQP:
             rows.add_bounds(bounds, np.ones_like(rows.bounded))
             return True
         before = len(rows.most)
-        moved = (self._grid_free @ x[: self.count].reshape(at.free.shape)) / self.rates(at.T)[:, None, :]
-        predicted = at.ratio + moved
+        moved = x[: self.count].reshape(at.free.shape).T @ self._grid_free.swapaxes(1, 2)
+        predicted = at.ratio + moved / self.rates(at.T)[:, :, None]
         if self.free_time:
             growth = 1 + self._orders * x[-1] * self.time_scale / at.T
             predicted /= np.maximum(growth, 1e-3)[:, None, None]
@@ -261,7 +265,7 @@ class WorkingSetQP:
         broken = size > 1 + FEASIBILITY / 4
         if broken.any():
             broken &= (self._anchors | _peaks(size)) & ~rows.chosen
-            fresh: Places = np.nonzero(broken)  # type: ignore[assignment]
+            fresh = _places(broken)
             # the row's sign is that of the value after the step, not before it
             signs = np.sign(predicted[fresh])
             rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh)
@@ -269,7 +273,7 @@ class WorkingSetQP:
 
     def _kinematic_rows(self, places: Places, signs: Array, T: float) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""
-        d, g, j = places
+        d, j, g = places
         A = np.zeros((len(d), self.n))
         block = (signs / self.rates(T)[d, j])[:, None] * self._grid_free[d, g]
         A[np.arange(len(d))[:, None], np.arange(self.p.free_count) * self.p.r + j[:, None]] = block
@@ -332,9 +336,14 @@ def _shortened(x: Array, bounds: Array) -> Array:
 
 
 def _peaks(size: Array) -> Mask:
-    """Marks the local maxima of size (d, M, r) ≥ 0 along the grid."""
+    """Marks the local maxima of size (3, r, M) ≥ 0 along the grid."""
     high = np.ones(size.shape, dtype=bool)
-    rising = size[:, 1:] >= size[:, :-1]
-    high[:, 1:] = rising
-    high[:, :-1] &= ~rising
+    rising = size[:, :, 1:] >= size[:, :, :-1]
+    high[:, :, 1:] = rising
+    high[:, :, :-1] &= ~rising
     return high
+
+
+def _places(marks: Mask) -> Places:
+    """The places of marks (3, r, M); a search in one dimension is several times as fast as `np.nonzero` in three."""
+    return np.unravel_index(np.flatnonzero(marks), marks.shape)  # type: ignore[return-value]

@@ -102,7 +102,7 @@ TASKS = {
     "shelf": (SHELF, at(0.45, -0.3, 0.12, DOWN), at(0.68, 0.0, 0.42, FORWARD)),
     "bin": (BIN, at(0.55, -0.3, 0.1, DOWN), at(0.575, 0.3, 0.12, DOWN)),
     "trap": (TRAP, at(0.6, 0.0, 0.2, DOWN), at(0.55, 0.4, 0.2, DOWN)),
-    "cage": (cage(), at(-0.5, 0.2, 0.3, DOWN), at(0.6, 0.0, 0.45, FORWARD)),
+    "cage": (cage(), at(0.55, 0.5, 0.3, DOWN), at(0.6, 0.0, 0.45, FORWARD)),
 }
 
 

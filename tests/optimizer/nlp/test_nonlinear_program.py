@@ -178,7 +178,7 @@ def test_rates_are_those_of_the_motion(case: Case) -> None:
     program, T = case.program, case.duration
     derivatives = program.kinematics(case.free)
     limit = program.limits.rates * T ** np.arange(1, 4)[:, None]
-    worst = (np.abs(derivatives).max(axis=1) / limit).max(axis=1)
+    worst = (np.abs(derivatives).max(axis=2) / limit).max(axis=1)
     curve, robot = motion(case), ROBOT.limits
     eps = 1e-10
     knots = curve.t

@@ -123,11 +123,11 @@ def unexplained(of: NonlinearProgram, found: Result) -> float:
     line = of.derivatives(found.free, T, np.zeros_like(found.multiplier))
     near = 1 - 5e-4
     rows = []
-    ratio = of.kinematics(found.free) / (of.limits.rates * T ** np.arange(1, 4)[:, None])[:, None, :]
-    for d, g, j in zip(*np.nonzero(np.abs(ratio) > near), strict=True):
+    ratio = of.kinematics(found.free) / (of.limits.rates * T ** np.arange(1, 4)[:, None])[:, :, None]
+    for d, j, g in zip(*np.nonzero(np.abs(ratio) > near), strict=True):
         row = np.zeros((m, r))
         row[:, j] = of.basis.at_grid[d, g, of.basis.free] / (of.limits.rates[d, j] * T ** (d + 1))
-        rows.append(np.sign(ratio[d, g, j]) * np.append(row.ravel(), -(d + 1) / T * ratio[d, g, j]))
+        rows.append(np.sign(ratio[d, j, g]) * np.append(row.ravel(), -(d + 1) / T * ratio[d, j, g]))
     share = line.tau / of.limits.tau_max
     k, j = np.nonzero(np.abs(share) > near)
     rows += list(of.torque_rows(line, T, k, j) * (np.sign(share[k, j]) / of.limits.tau_max[j])[:, None])
