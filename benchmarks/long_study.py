@@ -19,9 +19,11 @@ from functools import partial
 from typing import Any
 
 from app.access.client import OPERATOR
+from app.engine.result import StoredAnswer
 from app.store import studies
 from app.store.store import Store
 from app.store.studies import Step
+from app.store.tables import new_id
 from app.studies import answers
 from benchmarks.service import resident
 
@@ -30,7 +32,7 @@ REPEATS = 20
 
 
 def _step(k: int) -> Step:
-    return Step("evaluate", {"k": k}, b'{"k": 1}', 1.0, 100.0 + 1.0 / (1 + k), 50.0)
+    return Step("evaluate", {"k": k}, StoredAnswer(new_id(), b'{"k": 1}'), 1.0, 100.0 + 1.0 / (1 + k), 50.0)
 
 
 async def _posted(store: Store, study_id: str, k: int) -> float:

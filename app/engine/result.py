@@ -13,8 +13,18 @@ _ID = b'{"id":"'
 
 
 @dataclass(frozen=True)
+class AnswerFigures:
+    """What lists show of an answer: robot, energy [J], duration [s] and status; None if it has none."""
+
+    robot: str | None = None
+    energy: float | None = None
+    duration: float | None = None
+    status: str | None = None
+
+
+@dataclass(frozen=True)
 class StoredAnswer:
-    """A complete answer (JSON) and the id under which it is to be stored.
+    """A complete answer (JSON), the id under which it is to be stored, and what lists show of it.
 
     The task chooses the id, so that the document holds the final path from the first. Nothing is ever searched and
     replaced in a document, which repeats texts of the caller.
@@ -22,6 +32,7 @@ class StoredAnswer:
 
     id: str
     body: bytes
+    figures: AnswerFigures = AnswerFigures()
 
     @property
     def path(self) -> str:
@@ -34,7 +45,8 @@ class TaskResult:
     """A document and its media type. A task that fails raises an exception instead.
 
     `stored` are complete answers that belong into the database before the document is sent: it refers to them.
-    `kept_as` is the id under which the document itself is to be kept; its last field, `answer`, has the path.
+    `kept_as` is the id under which the document itself is to be kept; its last field, `answer`, has the path. `figures`
+    are what lists show of it.
     `is_optimal`: no more time would make it better. `age` [s] is that of a document that was computed before.
     """
 
@@ -42,6 +54,7 @@ class TaskResult:
     media_type: str
     stored: tuple[StoredAnswer, ...] = ()
     kept_as: str | None = None
+    figures: AnswerFigures = AnswerFigures()
     is_optimal: bool = False
     age: int | None = None
 
@@ -51,11 +64,12 @@ class TaskResult:
         return cls(json_document(content), "application/json", stored)
 
     @classmethod
-    def of_kept_json(cls, content: Mapping[str, Any]) -> TaskResult:
+    def of_kept_json(cls, content: Mapping[str, Any], figures: AnswerFigures) -> TaskResult:
         """A JSON document that is to be kept, with its path as the last field, `answer`."""
         kept = StoredAnswer(str(uuid.uuid4()), b"")
         document = json_document({**content, "answer": kept.path})
-        return cls(document, "application/json", kept_as=kept.id, is_optimal=content.get("status") == "optimal")
+        is_optimal = figures.status == "optimal"
+        return cls(document, "application/json", kept_as=kept.id, figures=figures, is_optimal=is_optimal)
 
     def without_path(self) -> TaskResult:
         """The same document, which was not kept: its field `answer` is null."""

@@ -152,7 +152,7 @@ class Dispatcher:
                     held.work.cancel()
                 if not held.work.cancelled():
                     outcome = held.work.result()
-                    taken = outcome.figures.wall_time
+                    taken = outcome.wall_time
                     self._mean_work += 0.2 * ((AHEAD if taken is None else taken) - self._mean_work)
             self._outcomes.append(outcome)
             if self._held.get(held.lease.key) is held:

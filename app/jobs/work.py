@@ -21,7 +21,7 @@ from app.exceptions import (
 )
 from app.http.problem_details import problem_content
 from app.jobs.executor import Executor
-from app.store.leases import Figures, Lease, Outcome
+from app.store.leases import Lease, Outcome
 from app.tasks.job_request import JobRequestTask, JobResult
 from optimizer.exceptions import JoulepathError
 from optimizer.progress import Tell
@@ -54,9 +54,16 @@ async def outcome_of(lease: Lease, executor: Executor, tell: Tell) -> Outcome:
         logger.exception("unforeseen error", extra={"request_id": task.request_id})
         return defect(lease)
     assert isinstance(result, JobResult)
-    parts = tuple((part.id, result.parts, part.body) for part in result.stored)
     return Outcome(
-        lease, "done", result.figures, result.document, parts, answer_id=result.kept_as, identified=result.identified
+        lease,
+        "done",
+        result.wall_time,
+        result.figures,
+        result.document,
+        result.kept_as,
+        result.stored,
+        result.parts,
+        identified=result.identified,
     )
 
 
@@ -70,8 +77,7 @@ def _request_id(lease: Lease) -> str:
 
 
 def _failed(lease: Lease, error: Exception, request_id: str, began: float) -> Outcome:
-    figures = Figures(wall_time=time.perf_counter() - began)
-    return Outcome(lease, "failed", figures, problem=_content(error, request_id))
+    return Outcome(lease, "failed", time.perf_counter() - began, problem=_content(error, request_id))
 
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:

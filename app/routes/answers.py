@@ -1,4 +1,4 @@
-"""GET and DELETE /answers/{id}."""
+"""GET /answers, GET and DELETE /answers/{id}."""
 
 from __future__ import annotations
 
@@ -6,21 +6,35 @@ from functools import partial
 from typing import Annotated
 
 import orjson
-from fastapi import APIRouter, Path, Response
+from fastapi import APIRouter, Path, Query, Response
 
 from app.engine.result import TaskResult
 from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceStore
 from app.schemas import errors as problems
-from app.schemas.answers import StoredAnswer
+from app.schemas.answers import AnswerList, AnswerPage, AnswerSummary, StoredAnswer
 from app.schemas.examples.values import ANSWER_ID
 from app.store import answers
 
 router = APIRouter(prefix="/answers", tags=["answers"])
 
-
 AnswerId = Annotated[str, Path(description="The answer's id.", examples=[ANSWER_ID])]
+
+
+@router.get(
+    "",
+    summary="List stored answers",
+    response_model=AnswerList,
+    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+)
+async def list_answers(page: Annotated[AnswerPage, Query()], store: ServiceStore) -> AnswerList:
+    """All answers that are kept, newest first, page by page: also the motions of fronts and rounds, and the answers of
+    studies and jobs."""
+    found, following = await store.read(partial(answers.page, limit=page.limit, after=page.after))
+    names = AnswerSummary.model_fields
+    listed = [AnswerSummary(**{name: getattr(answer, name) for name in names}) for answer in found]
+    return AnswerList(answers=listed, next=following)
 
 
 @router.get(

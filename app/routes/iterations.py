@@ -10,7 +10,7 @@ import orjson
 from fastapi import APIRouter, Path, Request, Response
 
 from app.access.rules import check_owner
-from app.engine.result import TaskResult
+from app.engine.result import StoredAnswer, TaskResult
 from app.exceptions import InvalidRequest
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
@@ -22,8 +22,9 @@ from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.studies import IterationBody, IterationDetail
 from app.store import studies
-from app.store.tables import Study
+from app.store.tables import Study, new_id
 from app.studies.answers import detail
+from app.tasks.answer_figures import figures_of
 from app.tasks.arm_engine import ArmEngine
 from app.tasks.evaluate import EvaluateTask
 from app.tasks.optimize import OptimizeTask
@@ -135,9 +136,8 @@ def _made(step: StudyStep, result: TaskResult) -> studies.Step:
     return studies.Step(
         step.kind,
         step.sent,
-        result.document,
+        StoredAnswer(result.kept_as or new_id(), result.document, figures_of(answer)),
         answer["duration"],
         energy["electrical"]["total"],
         energy["mechanical"]["total"],
-        result.kept_as,
     )

@@ -1,23 +1,62 @@
-"""What `GET /answers/{id}` answers."""
+"""What the routes under `/answers` take and answer."""
 
 from __future__ import annotations
 
 from datetime import datetime
 from typing import Any
 
-from app.schemas.common import Response, described
+from app.schemas.common import Response, described, part
 from app.schemas.examples.values import ANSWER_ID, CREATED
+from app.schemas.studies import PAGE_PATTERN, Query
+
+_POSITION = f"1741944413589793_{ANSWER_ID}"
 
 
-class StoredAnswer(Response):
-    """A complete answer to which another answer refers."""
+class KeptAnswer(Response):
+    """An answer that is kept, without its document."""
 
     id: str = described("Id of the answer.", None, ANSWER_ID)
-    kind: str = described("Endpoint of the answer: `optimize` or `evaluate`.", None, "optimize")
+    kind: str = described("Endpoint of the answer, for example `optimize` or `cycle`.", None, "optimize")
     created: datetime = described("Time at which it was computed, in UTC.", None, CREATED)
     owner: str | None = described("Name of the API key that asked for it; null without one.", None, "press_shop")
+
+
+class AnswerSummary(KeptAnswer):
+    """What a list shows of a kept answer. Its figures are null in answers of an earlier version."""
+
+    robot: str | None = described("Name of the robot.", None, "ur5e")
+    energy: float | None = described(
+        "Energy of the motion or round, of its objective (electrical for `evaluate`). Null for other kinds.", "J", 57.5
+    )
+    duration: float | None = described("Duration of that motion or round; null as `energy`.", "s", 1.33)
+    status: str | None = described("`status` of the answer; null if it has none.", None, "optimal")
+
+
+class StoredAnswer(KeptAnswer):
+    """A complete answer to which another answer refers."""
+
     answer: dict[str, Any] = described(
         "The answer, with the fields that this endpoint documents.",
         None,
         {"robot": "ur5e", "duration": 1.8, "status": "optimal"},
+    )
+
+
+class AnswerList(Response):
+    """Kept answers, newest first."""
+
+    answers: list[AnswerSummary] = part("The answers.")
+    next: str | None = described("Value of `after` for the next page; null on the last page.", None, _POSITION)
+
+
+class AnswerPage(Query):
+    """The part of the list of answers that is returned."""
+
+    limit: int = described("Largest number of answers in the answer.", "1", 50, default=50, ge=1, le=200)
+    after: str | None = described(
+        "Value of `next` on the previous page. Null: the first page.",
+        None,
+        _POSITION,
+        default=None,
+        pattern=PAGE_PATTERN,
     )

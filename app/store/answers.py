@@ -3,44 +3,41 @@
 from __future__ import annotations
 
 import zlib
+from dataclasses import replace
 from datetime import timedelta
 
-from sqlalchemy import and_, func, select
+from sqlalchemy import and_, func, or_, select
 from sqlalchemy import delete as delete_from
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, defer
 
 from app.access.client import Client
 from app.access.rules import check_owner
+from app.engine.result import StoredAnswer
 from app.exceptions import AnswerInUse, UnknownAnswer
-from app.store.tables import Answer, is_id, new_id, now
+from app.store.paging import position_after, position_of
+from app.store.tables import Answer, Job, is_id, now
 
 
 def put(
-    session: Session,
-    kind: str,
-    body: bytes,
-    study_id: str | None = None,
-    answer_id: str | None = None,
-    owner: str | None = None,
-) -> str:
-    """Stores an answer, the JSON document of the endpoint `kind`, and returns its id: `answer_id`, or a new one.
+    session: Session, kind: str, answer: StoredAnswer, study_id: str | None = None, owner: str | None = None
+) -> None:
+    """Stores an answer, the JSON document of the endpoint `kind`.
 
     The answer of a study stays until the study is deleted; any other until `prune` deletes it.
     """
     # the fastest level: a front can have a hundred megabytes, and its client waits
-    compressed = zlib.compress(body, zlib.Z_BEST_SPEED)
-    answer_id = new_id() if answer_id is None else answer_id
-    session.add(_answer(answer_id, kind, compressed, study_id=study_id, owner=owner))
-    return answer_id
+    compressed = replace(answer, body=zlib.compress(answer.body, zlib.Z_BEST_SPEED))
+    session.add(_row(kind, compressed, study_id=study_id, owner=owner))
 
 
-def put_of_job(session: Session, kind: str, compressed: bytes, job_id: str, answer_id: str, owner: str | None) -> None:
+def put_of_job(session: Session, kind: str, compressed: StoredAnswer, job: Job) -> None:
     """Stores an answer that is compressed already. It stays until its job is deleted."""
-    session.add(_answer(answer_id, kind, compressed, job_id=job_id, owner=owner))
+    session.add(_row(kind, compressed, job_id=job.id, owner=job.owner))
 
 
-def _answer(answer_id: str, kind: str, compressed: bytes, **whose: str | None) -> Answer:
-    return Answer(id=answer_id, kind=kind, created=now(), size=len(compressed), body=compressed, **whose)
+def _row(kind: str, compressed: StoredAnswer, **whose: str | None) -> Answer:
+    id, body, figures = compressed.id, compressed.body, compressed.figures
+    return Answer(id=id, kind=kind, created=now(), size=len(body), body=body, **vars(figures), **whose)
 
 
 def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
@@ -49,6 +46,18 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
     if answer is None:
         raise UnknownAnswer
     return answer, zlib.decompress(answer.body)
+
+
+def page(session: Session, limit: int, after: str | None) -> tuple[list[Answer], str | None]:
+    """Up to `limit` answers without their documents, newest first, and the `after` of the next page; None on the last
+    page."""
+    query = select(Answer).order_by(Answer.created.desc(), Answer.id.desc()).limit(limit + 1)
+    if after is not None:
+        created, answer_id = position_after(after)
+        query = query.where(or_(Answer.created < created, and_(Answer.created == created, Answer.id < answer_id)))
+    found = list(session.scalars(query.options(defer(Answer.body, raiseload=True))))
+    more, found = len(found) > limit, found[:limit]
+    return found, position_of(found[-1]) if more else None
 
 
 def delete(session: Session, answer_id: str, client: Client) -> None:

@@ -15,6 +15,7 @@ from typing import Any, Literal
 from sqlalchemy import select, tuple_, update
 from sqlalchemy.orm import Session, defer
 
+from app.engine.result import AnswerFigures, StoredAnswer
 from app.exceptions import TooManyFigures
 from app.store import answers, figures, jobs
 from app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
@@ -44,16 +45,6 @@ class Lease:
 
 
 @dataclass(frozen=True)
-class Figures:
-    """What lists show of an answer: wall time [s], energy [J], duration [s] and status; None if it has none."""
-
-    wall_time: float | None = None
-    energy: float | None = None
-    duration: float | None = None
-    status: str | None = None
-
-
-@dataclass(frozen=True)
 class FoundFigures:
     """What takes the place of a robot's own figures, see `figures.new_figures`."""
 
@@ -65,19 +56,22 @@ class FoundFigures:
 class Outcome:
     """How the work on a lease ended. `waiting`: it is to be done again.
 
-    `answer` is the compressed document, and `answer_id` its id, if it says so itself. `parts` are the answers that it
-    refers to: id, endpoint and compressed document. `identified` are the figures that were found, if any.
+    `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its id, if it says so
+    itself. `parts` are the answers that it refers to, compressed, of the endpoint `parts_kind`. `identified` are the
+    figures of an arm that were found, if any.
     """
 
     lease: Lease
     state: Literal["waiting", "done", "failed", "cancelled"]
-    figures: Figures = field(default_factory=Figures)
+    wall_time: float | None = None
+    figures: AnswerFigures = field(default_factory=AnswerFigures)
     answer: bytes | None = None
-    parts: Sequence[tuple[str, str, bytes]] = ()
+    answer_id: str | None = None
+    parts: Sequence[StoredAnswer] = ()
+    parts_kind: str = ""
     problem: dict[str, Any] | None = None
     died: bool = False
     preempted: bool = False
-    answer_id: str | None = None
     identified: FoundFigures | None = None
 
 
@@ -211,14 +205,15 @@ def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome, mo
         request.attempt -= outcome.preempted
         if job.state == "cancelling":
             request.state = "cancelled"
-    for name, value in vars(outcome.figures).items():
-        setattr(request, name, value)
-    request.problem = outcome.problem
-    for answer_id, kind, document in outcome.parts:
-        answers.put_of_job(session, kind, document, job.id, answer_id, job.owner)
+    own = outcome.figures
+    request.wall_time, request.energy, request.duration = outcome.wall_time, own.energy, own.duration
+    request.status, request.problem = own.status, outcome.problem
+    for part in outcome.parts:
+        answers.put_of_job(session, outcome.parts_kind, part, job)
     if outcome.answer is not None:
         request.answer_id = outcome.answer_id or new_id()
-        answers.put_of_job(session, outcome.lease.kind, outcome.answer, job.id, request.answer_id, job.owner)
+        whole = StoredAnswer(request.answer_id, outcome.answer, own)
+        answers.put_of_job(session, outcome.lease.kind, whole, job)
     if (found := outcome.identified) is not None:
         with contextlib.suppress(TooManyFigures):
             new = figures.new_figures(found.robot, found.content, job.owner)

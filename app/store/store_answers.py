@@ -44,7 +44,7 @@ async def keep_answer(
     It then answers what was `asked`, too.
     """
     assert result.kept_as is not None
-    kept = StoredAnswer(result.kept_as, result.document)
+    kept = StoredAnswer(result.kept_as, result.document, result.figures)
 
     def remember(session: Session) -> None:
         if asked is not None:
@@ -77,7 +77,7 @@ async def _put(
 
     def put(session: Session) -> int:
         for answer in stored:
-            answers.put(session, kind, answer.body, answer_id=answer.id, owner=owner)
+            answers.put(session, kind, answer, owner=owner)
         session.flush()
         size = sum(session.get_one(Answer, answer.id).size for answer in stored)
         if most is not None and size > most:

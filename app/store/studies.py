@@ -11,6 +11,7 @@ from sqlalchemy.orm import Session, defer
 
 from app.access.client import Client
 from app.access.rules import check_owner
+from app.engine.result import StoredAnswer
 from app.exceptions import KeyReused, UnknownIteration, UnknownStudy
 from app.store import answers
 from app.store.paging import position_after, position_of
@@ -26,12 +27,10 @@ class Step:
 
     kind: str
     request: dict[str, Any]
-    answer: bytes
+    answer: StoredAnswer
     duration: float
     electrical: float
     mechanical: float
-    answer_id: str | None = None
-    """Id under which the answer is to be stored, if it holds one."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ def add(session: Session, study_id: str, step: Step, key: str | None, client: Cl
     known = known_step(session, study_id, step.kind, step.request, key)
     if known is not None:
         return known, True
-    answer_id = answers.put(session, step.kind, step.answer, study_id, step.answer_id, owner=client.owner)
+    answers.put(session, step.kind, step.answer, study_id, owner=client.owner)
     session.flush()
     so_far, energy = _state(session, study), energy_of(study, step)
     number = 1 if so_far.last is None else so_far.last.number + 1
@@ -159,7 +158,7 @@ def add(session: Session, study_id: str, step: Step, key: str | None, client: Cl
             kind=step.kind,
             created=now(),
             request=step.request,
-            answer_id=answer_id,
+            answer_id=step.answer.id,
             duration=step.duration,
             electrical=step.electrical,
             mechanical=step.mechanical,

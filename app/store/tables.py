@@ -125,8 +125,13 @@ class Answer(Table):
     age and total size."""
 
     __tablename__ = "answers"
-    # for the sum of sizes from the newest on, without reading the bodies
-    __table_args__ = (Index(None, "created", "size"), Index(None, "study_id"), Index(None, "job_id"))
+    # the first for the sum of sizes from the newest on, the second for the list: without reading the bodies
+    __table_args__ = (
+        Index(None, "created", "size"),
+        Index(None, "created", "id"),
+        Index(None, "study_id"),
+        Index(None, "job_id"),
+    )
 
     id: Mapped[str] = mapped_column(String(ID_LENGTH), primary_key=True)
     kind: Mapped[str] = mapped_column(String(32))
@@ -135,6 +140,11 @@ class Answer(Table):
     study_id: Mapped[str | None] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"))
     job_id: Mapped[str | None] = mapped_column(String(ID_LENGTH))
     """Whoever deletes a job deletes its answers: SQLite adds no foreign key to a table that exists."""
+    robot: Mapped[str | None] = mapped_column(String(ROBOT_LENGTH))
+    """This and the next three are what lists show; null if it has none, or is of an earlier version."""
+    energy: Mapped[float | None]
+    duration: Mapped[float | None]
+    status: Mapped[str | None] = mapped_column(String(16))
     size: Mapped[int]
     """Size of the compressed body [byte]."""
     body: Mapped[bytes] = mapped_column(LargeBinary)

@@ -7,6 +7,7 @@ from typing import Any
 
 from app.engine.result import StoredAnswer, json_document
 from app.exceptions import InvalidRequest
+from app.tasks.answer_figures import figures_of
 
 MOST_BYTES = 1 << 26
 """Largest total size [byte], before compression, of the answers that one result refers to."""
@@ -26,7 +27,7 @@ class AnswerCollector:
         answer_id = str(uuid.uuid4())
         path = StoredAnswer(answer_id, b"").path
         own = {"answer": path} if "answer" in content else {}
-        answer = StoredAnswer(answer_id, json_document({**content, **own}))
+        answer = StoredAnswer(answer_id, json_document({**content, **own}), figures_of(content))
         self._answers.append(answer)
         if sum(len(each.body) for each in self._answers) > MOST_BYTES:
             message = "The answers are too large together: use a longer `sample_period`, or ask for fewer"

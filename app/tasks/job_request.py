@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import orjson
 
 from app.convert.evaluation import to_evaluate_response
-from app.engine.result import StoredAnswer, TaskResult
+from app.engine.result import TaskResult
 from app.schemas.compare import CompareRequest
 from app.schemas.cycle import CycleRequest
 from app.schemas.evaluate import EvaluateRequest
@@ -19,7 +19,8 @@ from app.schemas.identifications import IdentifyRequest
 from app.schemas.pareto import ParetoRequest
 from app.schemas.request import OptimizeRequest
 from app.schemas.whatif import WhatifRequest
-from app.store.leases import Figures, FoundFigures
+from app.store.leases import FoundFigures
+from app.tasks.answer_figures import figures_of
 from app.tasks.compare import CompareTask
 from app.tasks.cycle import CycleTask
 from app.tasks.evaluate import evaluated
@@ -38,10 +39,10 @@ IDENTIFY = "identify"
 class JobResult(TaskResult):
     """An answer with its figures. Its documents are compressed; `parts` is the endpoint of those in `stored`.
 
-    `identified` are the figures of an arm that were found, if any.
+    `wall_time` [s] is that of the work. `identified` are the figures of an arm that were found, if any.
     """
 
-    figures: Figures = field(kw_only=True)
+    wall_time: float = field(kw_only=True)
     parts: str = field(kw_only=True)
     identified: FoundFigures | None = field(kw_only=True, default=None)
 
@@ -66,15 +67,15 @@ class JobRequestTask:
         else:
             result = _RUN[self.kind](body, self.request_id, deadline)
         answer = orjson.loads(result.document)
+        figures = figures_of(answer)
         # here and not in the service, which has more to do; nobody waits, so that size counts more than time
         return JobResult(
             zlib.compress(result.document),
             result.media_type,
-            tuple(StoredAnswer(part.id, zlib.compress(part.body)) for part in result.stored),
+            tuple(replace(part, body=zlib.compress(part.body)) for part in result.stored),
             result.kept_as,
-            figures=Figures(
-                time.perf_counter() - began, *_ENERGY_AND_DURATION[self.kind](answer), answer.get("status")
-            ),
+            figures,
+            wall_time=time.perf_counter() - began,
             parts="evaluate" if self.kind == "whatif" and answer["objective"] is None else "optimize",
             identified=_identified(answer) if self.kind == IDENTIFY else None,
         )
@@ -98,27 +99,4 @@ _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {
     "compare": lambda body, own, left: CompareTask(CompareRequest.model_validate_json(body), own).run(left),
     "whatif": lambda body, own, left: WhatifTask(WhatifRequest.model_validate_json(body), own).run(left),
     "evaluate": _evaluate,
-}
-
-
-def _of_motion(answer: dict[str, Any]) -> tuple[float | None, float | None]:
-    return answer["energy"][answer.get("objective", "electrical")]["total"], answer["duration"]
-
-
-def _of_given_motion(answer: dict[str, Any]) -> tuple[float | None, float | None]:
-    return answer["total"]["energy"]["electrical"]["total"], answer["duration"]
-
-
-def _of_several(_: dict[str, Any]) -> tuple[float | None, float | None]:
-    return None, None
-
-
-_ENERGY_AND_DURATION = {
-    "optimize": _of_motion,
-    "cycle": _of_motion,
-    "pareto": _of_several,
-    "compare": _of_several,
-    "whatif": _of_several,
-    "evaluate": _of_given_motion,
-    IDENTIFY: _of_several,
 }

@@ -10,6 +10,7 @@ from app.convert.solution import to_optimize_response
 from app.engine.listening import listener
 from app.engine.result import TaskResult
 from app.schemas.request import OptimizeRequest
+from app.tasks.answer_figures import figures_of
 from app.tasks.certified import certified
 from optimizer.optimize import optimize
 
@@ -24,5 +25,5 @@ class OptimizeTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /optimize`, within about `deadline` seconds."""
         solution = certified(optimize(to_problem(self.request, deadline), tell=listener()))
-        arm = arm_fields(self.request)
-        return TaskResult.of_kept_json(to_optimize_response(self.request, self.request_id, solution, arm))
+        content = to_optimize_response(self.request, self.request_id, solution, arm_fields(self.request))
+        return TaskResult.of_kept_json(content, figures_of(content))

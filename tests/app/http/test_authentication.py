@@ -19,11 +19,10 @@ from app.schemas import errors as problems
 from app.schemas.examples.own_arm import PUT_EXAMPLES
 from app.schemas.examples.values import STUDY_ID
 from app.settings import Settings
-from app.store import answers
 from tests.app.access.test_key_file import add
 from tests.app.live import ANSWER, CLIENT, LOCAL, Server, serving
 from tests.app.routes.test_problems import refused
-from tests.app.store.test_store import with_store
+from tests.app.store.test_store import put, with_store
 
 STUDY = {"name": "press", "threshold": 60.0}
 ARM = PUT_EXAMPLES["makers_figures"]["value"]
@@ -217,12 +216,12 @@ def test_a_job_is_its_owners(guarded: Guarded) -> None:
 def test_an_answer_is_its_owners(guarded: Guarded) -> None:
     ids: list[str] = []
 
-    async def put(store: Any) -> None:
+    async def fill(store: Any) -> None:
         for owner in ("press", None):
-            work = partial(answers.put, kind="optimize", body=b"{}", owner=owner)
+            work = partial(put, owner=owner)
             ids.append(await store.write(work))
 
-    with_store(guarded.database, put)
+    with_store(guarded.database, fill)
     owned, free = (f"/answers/{id}" for id in ids)
     assert guarded.send("viewer", "GET", owned).json()["owner"] == "press"
     for path in (owned, free):

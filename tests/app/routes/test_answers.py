@@ -9,7 +9,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.convert.candidates import MOST_IN_A_PROBLEM, most_telling
-from app.engine.result import TaskResult
+from app.engine.result import AnswerFigures, TaskResult
+from app.schemas import errors as problems
+from app.schemas.answers import AnswerList
 from app.schemas.cycle import CycleResponse
 from app.schemas.response import OptimizeResponse
 from app.settings import Settings
@@ -53,6 +55,46 @@ def test_every_answer_is_kept(client: TestClient) -> None:
     assert client.post("/optimize", json=move()).json()["answer"] != content["answer"]
 
 
+def test_the_answers_are_listed(client: TestClient) -> None:
+    """Newest first, page by page, each with the figures of its motion; those of studies and jobs, too."""
+    own = client.post("/optimize", json=move()).json()
+    given = {"configurations": [HOME, NEAR], "time_per_segment": 1.5}
+    study = client.post("/studies", json={"name": "A study", "threshold": 1.0}).headers["location"]
+    step = client.post(f"{study}/iterations", json={"evaluate": given}).json()
+    round_ = {"start": {"q": HOME}, "stops": [{"target": {"q": NEAR}}], "candidates": "none", **PATIENT}
+    round_job = client.post("/cycle", json=round_, headers={"Prefer": "respond-async, wait=60"})
+    assert round_job.status_code == 200
+    pages, query = [], "/answers?limit=2"
+    for _ in range(3):
+        page = client.get(query)
+        AnswerList.model_validate_json(page.content)
+        pages.append(page.json())
+        query = f"/answers?limit=2&after={pages[-1]['next']}"
+    found = [each for page in pages for each in page["answers"]]
+    assert [len(page["answers"]) for page in pages[:2]] == [2, 2]
+    assert len({each["id"] for each in found}) == len(found) > 4
+    assert sorted((each["created"] for each in found), reverse=True) == [each["created"] for each in found]
+    by_id = {each["id"]: each for each in found}
+    figures = [by_id[own["answer"].removeprefix("/answers/")], by_id[step["answer"]]]
+    energies = [own["energy"]["electrical"]["total"], step["energy"]]
+    assert [each["energy"] for each in figures] == energies
+    assert [each["duration"] for each in figures] == [own["duration"], 1.5]
+    assert [(each["kind"], each["robot"], each["status"]) for each in figures] == [
+        ("optimize", "ur5e", own["status"]),
+        ("evaluate", "ur5e", None),
+    ]
+    done = round_job.json()
+    (whole,) = [each for each in found if each["kind"] == "cycle"]
+    assert whole["energy"] == done["energy"]["electrical"]["total"] and whole["duration"] == done["duration"]
+
+
+@pytest.mark.parametrize("query", ["limit=0", "limit=201", "after=1", "after=x_y", "kind=optimize"])
+def test_a_wrong_page_is_refused(client: TestClient, query: str) -> None:
+    answer = client.get(f"/answers?{query}")
+    assert answer.status_code == 422
+    problems.Validation.model_validate_json(answer.content)
+
+
 def test_the_path_is_never_looked_for_in_the_callers_texts(client: TestClient) -> None:
     name = '","answer":"/answers/5c0a0e0f-8d1f-4f1c-9a43-2f4a3ad0d1b7"}'
     ball = {"name": name, "shape": "sphere", "radius": 0.01, "pose": {"position": [0.0, 0.0, 1.2], "rpy": [0, 0, 0]}}
@@ -61,7 +103,7 @@ def test_the_path_is_never_looked_for_in_the_callers_texts(client: TestClient) -
 
 
 def test_a_result_that_is_not_kept_says_so() -> None:
-    result = TaskResult.of_kept_json({"name": '","answer":"x"}', "q": [1.5]})
+    result = TaskResult.of_kept_json({"name": '","answer":"x"}', "q": [1.5]}, AnswerFigures())
     assert result.document.endswith(f'"answer":"/answers/{result.kept_as}"}}'.encode())
     without = result.without_path()
     assert without.document == b'{"name":"\\",\\"answer\\":\\"x\\"}","q":[1.5],"answer":null}'
@@ -70,7 +112,7 @@ def test_a_result_that_is_not_kept_says_so() -> None:
 
 @pytest.mark.parametrize(("most", "kept"), [(0, False), (100, False), (1 << 20, True)])
 def test_an_answer_larger_than_all_that_may_be_kept_is_not(tmp_path: Any, most: int, kept: bool) -> None:
-    result = TaskResult.of_kept_json({"q": list(range(1000))})
+    result = TaskResult.of_kept_json({"q": list(range(1000))}, AnswerFigures())
 
     async def test(store: Store) -> None:
         answered = await keep_answer(store, Settings(answers_max_bytes=most), "optimize", result, None)

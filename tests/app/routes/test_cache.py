@@ -21,6 +21,7 @@ from app.store.store import Store
 from app.store.store_answers import keep_answer
 from app.store.tables import CachedAnswer
 from app.tasks.answer_cache import AnswerCache
+from app.tasks.answer_figures import figures_of
 from app.tasks.read_body import HeldBody
 from tests.app.requests import HOME, NEAR, move
 from tests.app.store.test_store import with_store
@@ -88,7 +89,8 @@ def test_a_body_that_a_worker_reads_is_computed(client: TestClient) -> None:
 
 
 def result(number: int, status: str) -> TaskResult:
-    return TaskResult.of_kept_json({"id": "first", "status": status, "number": number})
+    content = {"id": "first", "status": status, "number": number}
+    return TaskResult.of_kept_json(content, figures_of(content))
 
 
 def numbers(document: bytes) -> Any:

@@ -16,17 +16,18 @@ import pytest
 from sqlalchemy import text
 
 from app.access.client import OPERATOR
+from app.engine.result import StoredAnswer
 from app.exceptions import StoreFault, StoreUnavailable
 from app.store import answers, studies
 from app.store.database import create_database_engine
 from app.store.store import Store
+from app.store.tables import new_id
 from tests.app.databases import postgres
 from tests.app.live import serving
 from tests.app.requests import move
 from tests.app.store.test_iterations import step
-from tests.app.store.test_store import MISSING, until_refused, with_store
+from tests.app.store.test_store import MISSING, put, until_refused, with_store
 
-PUT = partial(answers.put, kind="optimize", body=b"{}")
 NEARLY_FULL = 24 << 20
 
 
@@ -35,7 +36,7 @@ def database(tmp_path: Path) -> Path:
     return tmp_path / "joulepath.db"
 
 
-async def refused(store: Store, work: Any = PUT, writes: bool = True) -> StoreFault:
+async def refused(store: Store, work: Any = put, writes: bool = True) -> StoreFault:
     with pytest.raises(StoreUnavailable) as caught:
         await (store.write(work) if writes else store.read(work))
     return caught.value.cause
@@ -45,7 +46,7 @@ async def refused(store: Store, work: Any = PUT, writes: bool = True) -> StoreFa
 @pytest.mark.parametrize("how", ["deleted", "replaced"])
 def test_nothing_is_acknowledged_in_a_file_that_is_gone(database: Path, lost: str, how: str) -> None:
     async def test(store: Store) -> None:
-        await store.write(PUT)
+        await store.write(put)
         if how == "deleted":
             (database.parent / lost).unlink()
         else:
@@ -59,10 +60,10 @@ def test_nothing_is_acknowledged_in_a_file_that_is_gone(database: Path, lost: st
 
 def test_a_file_that_goes_during_the_work_is_seen_at_its_end(database: Path) -> None:
     async def test(store: Store) -> None:
-        await store.write(PUT)
+        await store.write(put)
 
         def work(session: Any) -> None:
-            PUT(session)
+            put(session)
             database.unlink()
 
         assert await refused(store, work) == "deleted"
@@ -72,7 +73,7 @@ def test_a_file_that_goes_during_the_work_is_seen_at_its_end(database: Path) -> 
 
 def test_a_missing_database_is_not_replaced_by_an_empty_one(database: Path) -> None:
     async def test(store: Store) -> None:
-        kept = await store.write(PUT)
+        kept = await store.write(put)
         await store.write(lambda session: session.connection().exec_driver_sql("SELECT 1"))
         aside = database.with_name("aside")
         with closing(sqlite3.connect(database)) as connection:
@@ -98,7 +99,7 @@ def test_a_read_only_database_is_read(database: Path) -> None:
     kept: list[str] = []
 
     async def fill(store: Store) -> None:
-        kept.append(await store.write(PUT))
+        kept.append(await store.write(put))
 
     async def test(store: Store) -> None:
         assert (await store.read(partial(answers.get, answer_id=kept[0])))[1] == b"{}"
@@ -115,7 +116,7 @@ def test_a_lock_of_another_process_is_waited_for_once(database: Path) -> None:
 
     async def test(store: Store) -> None:
         nonlocal now
-        kept = await store.write(PUT)
+        kept = await store.write(put)
         # the clock stands for the wait, which is left out
         began = iter((0.0, 0.0, 100.0, 100.0))
         with closing(sqlite3.connect(database, isolation_level=None)) as other:
@@ -137,18 +138,18 @@ def test_a_lock_of_another_process_is_waited_for_once(database: Path) -> None:
         now = 102.0
         await store.check()
         assert store.fault is None
-        await store.write(PUT)
+        await store.write(put)
 
     with_store(f"sqlite:///{database}", test)
 
 
 def test_too_little_room_is_told_by_its_code(database: Path) -> None:
     async def test(store: Store) -> None:
-        await store.write(PUT)
+        await store.write(put)
 
         def work(session: Any) -> None:
             session.connection().exec_driver_sql("PRAGMA max_page_count = 1")
-            answers.put(session, "optimize", os.urandom(1 << 20))
+            put(session, os.urandom(1 << 20))
 
         assert await refused(store, work) == "full"
 
@@ -160,7 +161,7 @@ def test_faults_of_postgresql_are_told_by_their_codes() -> None:
     with postgres() as server:
 
         async def test(store: Store) -> None:
-            kept = await store.write(PUT)
+            kept = await store.write(put)
             with other.connect() as connection:
                 connection.execute(text("LOCK TABLE answers IN SHARE MODE"))
                 assert await refused(store) == "locked"
@@ -202,7 +203,7 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
         count = 0
         while count < 10_000:
             try:
-                large = replace(step(50.0), answer=os.urandom(200_000))
+                large = replace(step(50.0), answer=StoredAnswer(new_id(), os.urandom(200_000)))
                 await store.write(partial(studies.add, study_id=study_id, step=large, key=None, client=OPERATOR))
             except StoreUnavailable as error:
                 causes.append(error.cause)
@@ -231,7 +232,7 @@ def test_a_full_disk_is_freed_by_deleting(small_disk: Path) -> None:
             (small_disk / "other").unlink()
             # the last round has no reserve left to begin with: the log's own space does
             await store.check()
-        kept = await store.write(PUT)
+        kept = await store.write(put)
         assert (await store.read(partial(answers.get, answer_id=kept)))[1] == b"{}"
 
     with_store(f"sqlite:///{database}", test)

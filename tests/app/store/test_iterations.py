@@ -11,11 +11,12 @@ from alembic.config import Config
 from sqlalchemy import event, text
 
 from app.access.client import OPERATOR
+from app.engine.result import StoredAnswer
 from app.store import studies
 from app.store.database import create_database_engine, migrate
 from app.store.store import Store
 from app.store.studies import Step
-from app.store.tables import Iteration, Study
+from app.store.tables import Iteration, Study, new_id
 from app.studies.answers import detail, entries
 from tests.app.store.test_store import with_store
 
@@ -26,7 +27,8 @@ MET_BY = [None, 2, 2, 2, 2, 2]
 
 
 def step(energy: float) -> Step:
-    return Step("optimize", {"energy": energy}, b"{}", duration=1.0, electrical=energy, mechanical=1000.0 - energy)
+    answer = StoredAnswer(new_id(), b"{}")
+    return Step("optimize", {"energy": energy}, answer, duration=1.0, electrical=energy, mechanical=1000.0 - energy)
 
 
 async def begun(store: Store, objective: str = "electrical", count: int = len(ENERGIES)) -> Study:

@@ -12,10 +12,11 @@ import pytest
 from sqlalchemy import func, select
 
 from app.access.client import OPERATOR
+from app.engine.result import AnswerFigures, StoredAnswer
 from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
 from app.store import answers, job_events, jobs, leases
 from app.store.jobs import NewJob, NewRequest
-from app.store.leases import Figures, Lease, Outcome
+from app.store.leases import Lease, Outcome
 from app.store.store import Store
 from app.store.tables import Answer, JobEvent, JobRequest, new_id
 
@@ -60,7 +61,7 @@ class Bench:
 
 
 def done(lease: Lease, answer: bytes = b"{}") -> Outcome:
-    return Outcome(lease, "done", Figures(0.1, 2.0, 1.0, "optimal"), zlib.compress(answer))
+    return Outcome(lease, "done", 0.1, AnswerFigures("ur5e", 2.0, 1.0, "optimal"), zlib.compress(answer))
 
 
 @pytest.fixture
@@ -233,7 +234,10 @@ def test_answers_live_as_long_as_their_job(bench: Bench) -> None:
         (lease,) = await bench.lease("a")
         part = new_id()
         await bench.settle(
-            "a", Outcome(lease, "done", answer=BODY, parts=((part, "optimize", zlib.compress(b'"part"')),))
+            "a",
+            Outcome(
+                lease, "done", answer=BODY, parts=(StoredAnswer(part, zlib.compress(b'"part"')),), parts_kind="optimize"
+            ),
         )
         await bench.store.write(partial(answers.prune, max_bytes=0, max_age=timedelta(0)))
         await bench.store.write(partial(jobs.prune, max_age=timedelta(days=36500)))

@@ -40,6 +40,13 @@ A_DAY = timedelta(days=1)
 MUCH = 1 << 30
 
 
+def put(session: Any, body: bytes = b"{}", kind: str = "optimize", owner: str | None = None) -> str:
+    """Stores an answer and returns its id."""
+    answer = StoredAnswer(new_id(), body)
+    answers.put(session, kind, answer, owner=owner)
+    return answer.id
+
+
 def with_store(url: str, test: Callable[[Store], Awaitable[None]]) -> None:
     async def run() -> None:
         store = Store(url)
@@ -104,7 +111,7 @@ def test_answers_are_kept_whole(url: str) -> None:
 
     async def test(store: Store) -> None:
         before = now()
-        answer_id = await store.write(partial(answers.put, kind="optimize", body=body))
+        answer_id = await store.write(partial(put, body=body))
         answer, kept = await store.read(partial(answers.get, answer_id=answer_id))
         assert (answer.kind, kept) == ("optimize", body)
         assert before <= answer.created <= now()
@@ -133,7 +140,7 @@ def test_nothing_is_replaced_in_a_document(tmp_path: Path) -> None:
 
 def test_the_oldest_answers_make_room(url: str) -> None:
     async def test(store: Store) -> None:
-        ids = [await store.write(partial(answers.put, kind="optimize", body=b"{}")) for _ in range(5)]
+        ids = [await store.write(put) for _ in range(5)]
         size = await store.read(lambda session: session.get_one(Answer, ids[0]).size)
         await store.write(partial(answers.prune, max_bytes=3 * size, max_age=A_DAY))
         assert await left(store) == set(ids[2:])
@@ -153,7 +160,7 @@ def test_the_oldest_answers_make_room(url: str) -> None:
 
 def test_work_that_fails_changes_nothing(url: str) -> None:
     def fail(session: Any) -> None:
-        answers.put(session, "optimize", b"{}")
+        put(session)
         session.flush()
         raise ZeroDivisionError
 
@@ -167,7 +174,6 @@ def test_work_that_fails_changes_nothing(url: str) -> None:
 
 def test_writers_wait_for_each_other(url: str) -> None:
     async def test(store: Store) -> None:
-        put = partial(answers.put, kind="optimize", body=b"{}")
         assert len(set(await asyncio.gather(*(store.write(put) for _ in range(50))))) == 50
 
     with_store(url, test)
@@ -176,7 +182,7 @@ def test_writers_wait_for_each_other(url: str) -> None:
 def test_answers_over_http(client: TestClient) -> None:
     store: Store = client.app.state.store  # type: ignore[attr-defined]
     assert client.portal is not None
-    answer_id = client.portal.call(store.write, partial(answers.put, kind="ik", body=b'{"solutions": [1.5]}'))
+    answer_id = client.portal.call(store.write, partial(put, kind="ik", body=b'{"solutions": [1.5]}'))
     answer = client.get(f"/answers/{answer_id}")
     assert answer.status_code == 200, answer.text
     schemas.StoredAnswer.model_validate_json(answer.content)
@@ -218,7 +224,7 @@ def test_without_its_database_the_service_goes_on(url: str) -> None:
 @pytest.mark.skipif(MISSING is not None, reason=str(MISSING))
 def test_a_database_that_comes_back_is_used_again(server: Postgres) -> None:
     async def test(store: Store) -> None:
-        answer_id = await store.write(partial(answers.put, kind="ik", body=b"{}"))
+        answer_id = await store.write(put)
         server.stop()
         with pytest.raises(StoreUnavailable):
             await store.read(partial(answers.get, answer_id=answer_id))
