@@ -26,30 +26,17 @@ class PathTolerance(Request):
     )
 
 
-class Path(Request):
-    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis; a
-    smooth curve; or an arc.
-
-    The branch and the timing are chosen; the tool is on the path from the start to the goal.
-    """
-
+class _OnPath(Request):
     shape: PathShape = described(
         "`lines`: straight from pose to pose, with rounded corners. `curve`: smoothly through every pose, as through "
-        "those of a recorded curve. `arc`: on the circle through the start, the one pose of `via` and the goal.",
+        "those of a recorded curve. `arc`: on the circle through the start, the one pose between and the end.",
         None,
         "lines",
         default="lines",
     )
-    via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
-        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
-        "a curve, exactly one of an arc.",
-        None,
-        [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
-        default=[],
-    )
     blend: float = described(
-        "Length of path before and after each pose of `via` on which a smooth curve replaces the corner of two lines. "
-        "Needed with lines over `via`, as the arm cannot turn a sharp corner without a stop.",
+        "Length of path before and after each pose between start and end on which a smooth curve replaces the corner "
+        "of two lines. Needed where there are such poses, as the arm cannot turn a sharp corner without a stop.",
         "m",
         0.02,
         default=0.0,
@@ -63,6 +50,37 @@ class Path(Request):
         default=PathTolerance(),
     )
     speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)
+
+
+class Path(_OnPath):
+    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis; a
+    smooth curve; or an arc.
+
+    The branch and the timing are chosen; the tool is on the path from the start to the goal.
+    """
+
+    via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
+        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
+        "a curve, exactly one of an arc.",
+        None,
+        [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
+        default=[],
+    )
+
+
+class StopPath(_OnPath):
+    """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose, follows it, and rests
+    at its last. The branch is chosen for the whole round."""
+
+    points: Annotated[list[BasePose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)] = described(
+        f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to {MOST_POINTS['curve'] + 2} of a curve, "
+        "exactly three of an arc.",
+        None,
+        [
+            {"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+            {"position": [0.4, 0.3, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+        ],
+    )
 
 
 class Line(Request):

@@ -14,7 +14,7 @@ from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
-from optimizer.trajectories import quintic
+from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.spline import Spline, sample
 
@@ -24,6 +24,8 @@ SPANS, BEND_SPANS, FINER_SCALING, MOST_SPANS = 12, 6, 2, 72
 # spans that the motion has more than its path, and at most at first; it has so many times as many until it keeps to
 # the path
 MORE_SPANS, FIRST_SPANS, FINER = 12, 67, (1, 2, 4, 8)
+# shares of the time that each ramp of a first guess takes, at least and at most
+RAMPS = (0.1, 0.5)
 # instants at which the path's tolerances are checked; samples of the path per control point, to measure along it
 CHECKED, SAMPLED = 2000, 16
 NOT_FINER = "there is no other space of time scalings"
@@ -50,6 +52,9 @@ class ToolPathMotion(Method):
         if path is None:
             return SolveResult(SolveStatus.INFEASIBLE, TOO_SHARP)
         results = [self._kept(path, interval, self._scaling(1)) for interval in self._intervals()]
+        if all(result.spline is None for result in results):
+            # what the first space cannot express, a finer one may: a motion that is nearly the fastest one
+            results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
         found = min(results, key=lambda result: self.prepared.cost_of(result.spline))
         if found.spline is not None:
             hit = self.prepared.surroundings.worst_violation(found.spline)
@@ -114,11 +119,16 @@ class ToolPathMotion(Method):
         derivatives = np.stack([path.curve(s, d) for d in (1, 2, 3)])
         ratios = np.abs(derivatives) / self.prepared.arm.active_limits.rates[:, None]
         pace: Array = (ratios.max(axis=2) ** (1 / np.arange(1, 4))[:, None]).max(axis=0)
+        if self.prepared.path is not None:
+            pace = np.maximum(pace, self.prepared.path.speed_ratios(path.curve(s), path.curve(s, 1)))
         t = np.asarray(cumulative_trapezoid(pace, s, initial=0))
         at = np.linspace(0.0, 1.0, CHECKED)
-        # as fast at most as this pace, whose peak is that of the quintic
+        # as fast at most as this pace, whose peak is that of the quintic; in less time, with shorter ramps
         duration = float(np.clip(quintic.PEAKS[0] * t[-1], self.t_min, self.t_max))
-        return at * duration, np.interp(quintic.fraction(at), t / t[-1], s)
+        law = quintic.fraction(at)
+        if duration < quintic.PEAKS[0] * t[-1]:
+            law = ramped.fraction(at, float(np.clip(1 - t[-1] / duration, *RAMPS)))
+        return at * duration, np.interp(law, t / t[-1], s)
 
     def _keeps_to_path(self, motion: Spline) -> bool:
         """Whether a motion is within the path's tolerances."""

@@ -15,8 +15,9 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle, Hold
 from optimizer.problem.free_order import FreeOrder, check_order
 from optimizer.problem.names import check_name, first_repeated
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
-from optimizer.problem.stops import APPROACH, RETREAT, PlannedMove, Stop, moves_over
+from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over
 from optimizer.problem.targets import Target, members, validated
 
 MOST_STOPS = 100
@@ -72,6 +73,8 @@ class WorkRound:
         for k, stop in enumerate(self.stops):
             if not 0 <= stop.dwell <= LONGEST_DURATION:
                 raise InvalidProblem(f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s.")
+            if stop.path is not None and not isinstance(stop.target, Pose):
+                raise InvalidProblem(f"stops.{k}.target", "The target of a stop with a path is one pose: its start.")
             self._check_limits(k, stop)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
@@ -99,8 +102,8 @@ class WorkRound:
         if repeated is not None:
             raise InvalidProblem(
                 f"stops.{places[repeated][0]}.name",
-                f"Give each stop a name of its own. {START!r} is the start's, and a stop's name with {APPROACH} or "
-                f"{RETREAT} is that of the outer end of its line.",
+                f"Give each stop a name of its own. {START!r} is the start's, a stop's name with {APPROACH} or "
+                f"{RETREAT} is that of the outer end of its line, and with {ENTRY} that of the start of its path.",
             )
 
     def _check_limits(self, k: int, stop: Stop) -> None:
@@ -146,7 +149,7 @@ class WorkRound:
 
     @cached_property
     def moves(self) -> list[PlannedMove]:
-        """The moves of the round in their order, those along lines included."""
+        """The moves of the round in their order, those along lines and paths included."""
         moves, place = list[PlannedMove](), START
         for stop, before, after in zip(self.stops, self.arms, self.arms[1:], strict=False):
             moves += moves_over(stop, place, before, after)
