@@ -34,7 +34,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     return Problem(
         start=to_target(request.start, arm.robot),
         goal=to_target(request.goal, arm.robot),
-        arm=arm if path is None else arm.no_faster_than(path.speed),
+        arm=arm if path is None else arm.no_faster_than(path.bounds.max),
         tool_path=None if path is None else to_tool_path(path, path.via, arm.robot),
         method=request.method,
         objective=request.objective,
@@ -57,6 +57,8 @@ def to_tool_path(path: Path | StopPath, via: Sequence[BasePose], robot: Robot) -
         blend=path.blend,
         position_tolerance=path.tolerance.position,
         rotation_tolerance=path.tolerance.rotation,
+        least_speed=path.bounds.min,
+        ramp=path.bounds.ramp,
     )
 
 

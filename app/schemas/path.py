@@ -2,17 +2,63 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import Speed
-from app.schemas.common import BasePose, Request, described
+from app.schemas.common import BasePose, Request, described, number_or_object
 from app.schemas.orientation import Axis
 from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
-from optimizer.problem.tool_path import LEAST_TOLERANCE, MOST_POINTS, POSITION_TOLERANCE, ROTATION_TOLERANCE, PathShape
+from optimizer.problem.tool_path import (
+    LEAST_RAMP,
+    LEAST_TOLERANCE,
+    MOST_POINTS,
+    POSITION_TOLERANCE,
+    RAMP,
+    ROTATION_TOLERANCE,
+    SPEED_RANGE,
+    PathShape,
+)
 
 SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
+
+
+class SpeedRange(Request):
+    """Bounds on the speed of the TCP along a path."""
+
+    min: Speed | None = described(
+        "Smallest speed, but for the ramps at both ends, where the arm comes from rest and to rest. Null: no bound.",
+        "m/s",
+        0.1,
+        default=None,
+    )
+    max: Speed | None = described(
+        "Largest speed, at least 1.05 times `min`. Null: as fast as the limits allow.", "m/s", 0.2, default=None
+    )
+    ramp: float = described(
+        "Length of the path at either end on which the speed may be below `min`.",
+        "m",
+        0.02,
+        default=RAMP,
+        ge=LEAST_RAMP,
+        le=1,
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.min is not None and self.max is not None and self.max < SPEED_RANGE * self.min:
+            raise PydanticCustomError(
+                "range", f"`max` must be at least {SPEED_RANGE:g} times `min`: a motion needs some freedom"
+            )
+        return self
+
+
+PathSpeed = Annotated[
+    Annotated[Speed, Tag("by number")] | Annotated[SpeedRange, Tag("range")],
+    number_or_object("by number", "speed", "Give null, a number of m/s, or an object with `min`, `max` or both"),
+]
 
 
 class PathTolerance(Request):
@@ -49,7 +95,17 @@ class _OnPath(Request):
         {"position": 1e-4, "rotation": 2e-3},
         default=PathTolerance(),
     )
-    speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)
+    speed: PathSpeed | None = described(
+        "Largest speed of the TCP on the way, or bounds on it. Null: as fast as the limits allow.",
+        "m/s",
+        0.1,
+        default=None,
+    )
+
+    @property
+    def bounds(self) -> SpeedRange:
+        """The bounds on the speed."""
+        return self.speed if isinstance(self.speed, SpeedRange) else SpeedRange(max=self.speed)
 
 
 class Path(_OnPath):

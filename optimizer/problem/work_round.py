@@ -17,6 +17,7 @@ from optimizer.problem.free_order import FreeOrder, check_order
 from optimizer.problem.names import check_name, first_repeated
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over
 from optimizer.problem.targets import Target, members, validated
 
@@ -76,6 +77,8 @@ class WorkRound:
             if stop.path is not None and not isinstance(stop.target, Pose):
                 raise InvalidProblem(f"stops.{k}.target", "The target of a stop with a path is one pose: its start.")
             self._check_limits(k, stop)
+            if stop.path is not None:
+                self._check_speed(k, stop, stop.path)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
         if self.arm.bus.mode == "storage":
@@ -105,6 +108,13 @@ class WorkRound:
                 f"Give each stop a name of its own. {START!r} is the start's, a stop's name with {APPROACH} or "
                 f"{RETREAT} is that of the outer end of its line, and with {ENTRY} that of the start of its path.",
             )
+
+    def _check_speed(self, k: int, stop: Stop, path: StopPath) -> None:
+        most = self.arm.no_faster_than(stop.tcp_speed).no_faster_than(path.speed).tcp_speed
+        try:
+            path.path.check_speed(most)
+        except InvalidProblem as error:
+            raise at_stop(k, error) from None
 
     def _check_limits(self, k: int, stop: Stop) -> None:
         given = {name: getattr(stop, name) for name in ("limits", "tcp_speed", "elbow_speed")}
