@@ -30,6 +30,7 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.line import Line
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
+from optimizer.problem.stop_path import StopPath
 from optimizer.problem.stops import Stop
 from optimizer.problem.targets import AnyOf
 from optimizer.problem.tool_path import ToolPath
@@ -62,6 +63,7 @@ __all__ = [
     "SingularPose",
     "Solution",
     "Stop",
+    "StopPath",
     "ToolPath",
     "TorqueInfeasible",
     "UnknownRobot",

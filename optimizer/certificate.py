@@ -28,6 +28,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Single, single
 from optimizer.problem.tool_cone import ToolCone
+from optimizer.problem.tool_path import ToolPath
 from optimizer.solution import Certificate, Energy
 from optimizer.trajectories.limit_ratios import limit_ratios
 from optimizer.trajectories.quadrature import grid, simpson_weights
@@ -176,7 +177,22 @@ class _Replay:
         return {
             "path_position": float(position.max() + between) / path.position_tolerance,
             "path_rotation": float(rotation.max() + between) / path.rotation_tolerance,
-        }
+        } | self._path_speed_ratio(path)
+
+    def _path_speed_ratio(self, path: ToolPath) -> dict[str, float]:
+        """The least speed that the path asks for over that of the TCP where it is beyond the ramps at both ends.
+
+        Between two samples the speed is less than on the line between them by at most an eighth of its curvature times
+        the squared time, which is taken from second differences.
+        """
+        if path.least_speed is None:
+            return {}
+        speed = _speeds(self._link_motions(False, [self._last])[1][self._last], self._T_last_tcp[:3, 3])
+        gone = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(self.t)))
+        beyond = (gone >= path.ramp) & (gone <= gone[-1] - path.ramp)
+        dip = 2 * float(np.abs(np.diff(speed, n=2)[beyond[1:-1]]).max(initial=0.0)) / 8
+        least = float(speed[beyond].min(initial=np.inf)) - dip
+        return {"path_speed": path.least_speed / least if least > 0 else np.inf}
 
     def _link_motions(self, rotating: bool, moving: list[int]) -> tuple[Array, dict[int, Array]]:
         """Rotations (k, 3, 3) of the last link in the base frame, if `rotating`, and the motions of the links `moving`.
@@ -224,7 +240,12 @@ class _Replay:
 
 def _greatest_speed(motions: Array, point: Array) -> float:
     """Greatest speed [m/s] of a point (3,) [m], fixed to a link and given in its frame, over the link's `motions`."""
-    return float(np.linalg.norm(motions[:, :3] + np.cross(motions[:, 3:], point), axis=1).max())
+    return float(_speeds(motions, point).max())
+
+
+def _speeds(motions: Array, point: Array) -> Array:
+    """Speeds (k,) [m/s] of a point (3,) [m], fixed to a link and given in its frame, in the link's `motions`."""
+    return np.asarray(np.linalg.norm(motions[:, :3] + np.cross(motions[:, 3:], point), axis=1))
 
 
 def _tool_angles(cone: ToolCone, R_base_tcp: Array) -> Array:

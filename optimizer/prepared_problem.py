@@ -13,6 +13,7 @@ from optimizer.energy.interval import arm_spread
 from optimizer.energy.plant import Plant
 from optimizer.energy.sensitivity import waiting_sensitivity
 from optimizer.kinematics.course_tracing import Trace, joint_path, traces
+from optimizer.kinematics.least_speed import LeastSpeed
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
@@ -60,6 +61,11 @@ class PreparedProblem(Plant):
         return ToolCourse.of(path, T_start, T_goal)
 
     @cached_property
+    def least_speed(self) -> LeastSpeed | None:
+        """The least speed on the tool path; None if there is none."""
+        return None if self.course is None else LeastSpeed.of(self.arm, self.course)
+
+    @cached_property
     def traces(self) -> dict[bytes, Trace]:
         """The tool path as it was followed from starts q (nq,) [rad], by the bytes of these."""
         return {}
@@ -86,6 +92,9 @@ class PreparedProblem(Plant):
             worst = self.path.ratios(q, v).max(axis=0)
             ratios = dict(sorted(zip(self.path.names, worst, strict=True), key=lambda each: each[1]))
             broken = [too_much(name, ratio) for name, ratio in ratios.items() if ratio > 1 + RATIO_ROUNDING]
+        slowest = np.inf if self.least_speed is None else self.least_speed.reached(q, v)
+        if slowest < 1 - RATIO_ROUNDING:
+            broken.append(f"path speed {(1 - slowest) * 100:.3g} % below its least one")
         collision = self.surroundings.worst_collision(q)
         if collision is not None:
             first, second = collision.pair

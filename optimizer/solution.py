@@ -259,12 +259,13 @@ class Clearance:
 class Certificate:
     """The answer recomputed by Pinocchio on a 1 ms grid, apart from the solver.
 
-    `worst_ratio` maps position, velocity, acceleration, jerk, torque, and of tool_cone, tcp_speed and elbow_speed those
-    that are limited, to the worst value / limit. `clearance` is proven over continuous time, None if no bodies are
-    compared; `close_pass` is the least distance without margins, None unless it may be below 2 mm. `start_error` and
-    `goal_error` are (position [m], rotation [rad]) of the TCP against the pose asked for (or the forward kinematics of
-    the joints asked for). `rest_error` is the worst |v| / v_max and |a| / a_max at the two ends. `energy_error` is
-    |fine quadrature - reported| / reported, `balance_error` |sum of parts - total| / total.
+    `worst_ratio` maps position, velocity, acceleration, jerk, torque, and of tool_cone, tcp_speed, elbow_speed,
+    path_position, path_rotation and path_speed those that are limited, to the worst value / limit. `clearance` is
+    proven over continuous time, None if no bodies are compared; `close_pass` is the least distance without margins,
+    None unless it may be below 2 mm. `start_error` and `goal_error` are (position [m], rotation [rad]) of the TCP
+    against the pose asked for (or the forward kinematics of the joints asked for). `rest_error` is the worst
+    |v| / v_max and |a| / a_max at the two ends. `energy_error` is |fine quadrature - reported| / reported,
+    `balance_error` |sum of parts - total| / total.
     """
 
     worst_ratio: dict[str, float]

@@ -35,6 +35,7 @@ PUBLIC = {
     "SingularPose",
     "Solution",
     "Stop",
+    "StopPath",
     "ToolPath",
     "TorqueInfeasible",
     "UnknownRobot",

@@ -9,19 +9,23 @@ import numpy as np
 
 from app.convert.arm import to_arm, to_limits, to_payload
 from app.convert.fields import fields
-from app.convert.pose import to_base
-from app.convert.request import to_branch, to_target
+from app.convert.pose import to_base, to_base_pose
+from app.convert.request import to_branch, to_target, to_tool_path
 from app.convert.solution import energy_fields, optimality_gap
 from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
 from app.schemas.arm import MoveLimits
 from app.schemas.path import Line as LineRequest
+from app.schemas.path import StopPath as StopPathRequest
 from app.schemas.response import Clearance
+from app.schemas.stop import StopRequest
 from models.robot import Robot
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.line import Line
+from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import Stop
+from optimizer.problem.targets import Target
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_solution import Move, RoundSolution
 from optimizer.solution import Solution
@@ -60,7 +64,7 @@ def _to_order(request: asked.CycleRequest) -> FreeOrder | None:
     return FreeOrder(before=[(first, second) for first, second in request.before], together=request.together)
 
 
-def _to_stop(k: int, stop: asked.StopRequest, robot: Robot) -> Stop:
+def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
     try:
         # left out: what is carried stays
         payload = to_payload(stop.payload) if "payload" in stop.model_fields_set else None
@@ -69,7 +73,7 @@ def _to_stop(k: int, stop: asked.StopRequest, robot: Robot) -> Stop:
         raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
     return Stop(
         name=str(k + 1) if stop.name is None else stop.name,
-        target=to_target(stop.target, robot),
+        target=_target(stop, robot),
         dwell=stop.dwell,
         payload=payload,
         branch=to_branch(stop.branch),
@@ -78,8 +82,27 @@ def _to_stop(k: int, stop: asked.StopRequest, robot: Robot) -> Stop:
         elbow_speed=stop.limits.elbow_speed,
         approach=_to_line(f"stops.{k}.approach", stop.approach, robot),
         retreat=_to_line(f"stops.{k}.retreat", stop.retreat, robot),
+        path=_to_path(k, stop.path, robot),
         obstacles_ignored=stop.obstacles_ignored,
     )
+
+
+def _target(stop: StopRequest, robot: Robot) -> Target:
+    """The target of a stop: where its path starts, if it has one."""
+    if stop.path is not None:
+        return to_base_pose(stop.path.points[0], robot)
+    assert stop.target is not None
+    return to_target(stop.target, robot)
+
+
+def _to_path(k: int, path: StopPathRequest | None, robot: Robot) -> StopPath | None:
+    if path is None:
+        return None
+    try:
+        way = to_tool_path(path, path.points[1:-1], robot)
+        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.max)
+    except InvalidProblem as error:
+        raise at_stop(k, error) from None
 
 
 def _to_line(field: str, line: LineRequest | None, robot: Robot) -> Line | None:
@@ -151,7 +174,7 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
     goal = {**fields(solution.goal, "label", "q", "target"), "stop": move.planned.goal}
     legs: list[dict[str, Any]] = [
         {
-            "kind": "move" if move.planned.line is None else "line",
+            "kind": move.planned.kind,
             "start": start,
             "goal": goal,
             "t0": move.t0,

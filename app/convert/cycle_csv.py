@@ -33,7 +33,7 @@ def to_cycle_csv(found: RoundSolution) -> str:
 
 
 def _of_move(move: Move, leg: int) -> list[Row]:
-    samples, kind = move.solution.trajectory, "move" if move.planned.line is None else "line"
+    samples, kind = move.solution.trajectory, move.planned.kind
     table = zip(
         (samples.t + move.t0).tolist(),
         *(getattr(samples, name).tolist() for name in ("q", "v", "a", "tau_motor")),

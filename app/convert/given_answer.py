@@ -23,8 +23,9 @@ from optimizer.trajectories.spline import Spline
 from optimizer.trajectories.through_samples import spline_through
 
 MOST_KNOTS, HIGHEST_DEGREE, LONGEST_REST = 4096, 31, LONGEST_ROUND
-# of a stop: a move, two lines, a dwell and a wait
-MOST_LEGS = 5 * MOST_STOPS + 5
+# of a stop: a move, two lines, a path, a dwell and a wait
+MOST_LEGS = 6 * MOST_STOPS + 5
+MOVING = ("move", "line", "path")
 Number = Annotated[float, Field(ge=-1e9, le=1e9)]
 _Row = Annotated[list[Number], Field(min_length=1, max_length=16)]
 
@@ -78,7 +79,7 @@ class _Stop(Part):
 
 
 class _Leg(Part):
-    kind: Literal["move", "line", "dwell", "wait"]
+    kind: Literal["move", "line", "path", "dwell", "wait"]
     start: _Stop
     goal: _Stop
     duration: Annotated[float, Field(ge=0, le=LONGEST_REST)]
@@ -116,7 +117,7 @@ def paths_of_moves(answer: dict[str, Any]) -> list[str]:
     InvalidProblem."""
     if "legs" not in answer:
         return []
-    legs = [leg for leg in _Round.model_validate(answer).legs if leg.kind in ("move", "line")]
+    legs = [leg for leg in _Round.model_validate(answer).legs if leg.kind in MOVING]
     if any(leg.answer is None for leg in legs):
         raise InvalidProblem("answer", "The moves of the round are not kept: send the round to POST /cycle again.")
     return [leg.answer for leg in legs if leg.answer is not None]
@@ -128,7 +129,7 @@ def _round(found: _Round, arm: ArmRequest | None, kept: Callable[[list[str]], li
     moves = iter(kept([leg.answer for leg in found.legs if leg.answer is not None]))
     steps = list[Move | Rest]()
     for leg in found.legs:
-        if leg.kind in ("move", "line"):
+        if leg.kind in MOVING:
             steps.append(_move(next(moves), None, f"{leg.start.stop} to {leg.goal.stop}"))
         else:
             steps.append(Rest(leg.duration, f"{leg.kind} at {leg.goal.stop}"))

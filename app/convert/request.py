@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from app.convert.arm import to_arm
 from app.convert.pose import to_base, to_base_pose, to_pose
 from app.schemas import request as asked
+from app.schemas.common import BasePose
 from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
 from app.schemas.orientation import InCone
-from app.schemas.path import Path
+from app.schemas.path import Path, StopPath
 from models.robot import Array, Robot
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -31,8 +34,8 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     return Problem(
         start=to_target(request.start, arm.robot),
         goal=to_target(request.goal, arm.robot),
-        arm=arm if path is None else arm.no_faster_than(path.speed),
-        tool_path=None if path is None else to_tool_path(path, arm.robot),
+        arm=arm if path is None else arm.no_faster_than(path.bounds.max),
+        tool_path=None if path is None else to_tool_path(path, path.via, arm.robot),
         method=request.method,
         objective=request.objective,
         duration_min=shortest,
@@ -46,14 +49,16 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     )
 
 
-def to_tool_path(path: Path, robot: Robot) -> ToolPath:
-    """The tool path of the library. Raises InvalidProblem."""
+def to_tool_path(path: Path | StopPath, via: Sequence[BasePose], robot: Robot) -> ToolPath:
+    """The tool path of the library, over poses `via` between its ends. Raises InvalidProblem."""
     return ToolPath(
         shape=path.shape,
-        via=[to_base_pose(pose, robot) for pose in path.via],
+        via=[to_base_pose(pose, robot) for pose in via],
         blend=path.blend,
         position_tolerance=path.tolerance.position,
         rotation_tolerance=path.tolerance.rotation,
+        least_speed=path.bounds.min,
+        ramp=path.bounds.ramp,
     )
 
 

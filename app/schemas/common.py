@@ -122,6 +122,22 @@ def by_field(*names: str, beside: str | None = None) -> Discriminator:
     )
 
 
+def number_or_object(number: str, error: str, message: str) -> Discriminator:
+    """Discriminator of a union of a number, with the tag `number`, and an object, with the tag `range`.
+
+    Anything else is an error of type `error`.
+    """
+
+    def kind(value: Any) -> str | None:
+        if isinstance(value, bool):
+            return None
+        if isinstance(value, int | float):
+            return number
+        return "range" if isinstance(value, dict | Request) else None
+
+    return Discriminator(kind, custom_error_type=error, custom_error_message=message)
+
+
 def _is_unit(quaternion: list[float]) -> list[float]:
     norm = sum(part * part for part in quaternion) ** 0.5
     if abs(norm - 1) > QUATERNION_TOLERANCE:

@@ -7,11 +7,10 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from app.schemas.arm import ArmRequest, MoveLimits, Payload
-from app.schemas.common import NO_CONTROLS, PLAIN, Answer, Request, Response, described, part
+from app.schemas.arm import ArmRequest
+from app.schemas.common import Answer, Response, described, part
 from app.schemas.energy import MotionEnergy, SavingInterval
 from app.schemas.examples.values import ANSWER_PATH
-from app.schemas.path import Line
 from app.schemas.request import (
     SECONDS_OR_RANGE,
     Branch,
@@ -22,66 +21,12 @@ from app.schemas.request import (
     which_candidates,
 )
 from app.schemas.response import GAP, WARNINGS, Clearance, Configuration, WorstRatio
+from app.schemas.stop import PlainName, StopRequest
 from app.settings import LONGEST_DEADLINE
 from optimizer.problem.free_order import MOST_FREE_STOPS
-from optimizer.problem.names import LONGEST_NAME
-from optimizer.problem.problem import LONGEST_DURATION, MethodName
-from optimizer.problem.scene import MOST_OBSTACLES
+from optimizer.problem.problem import MethodName
 from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
 from optimizer.solution import Objective
-
-PlainName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=NO_CONTROLS), PLAIN]
-
-
-class StopRequest(Request):
-    """A stop: the arm comes to rest at the target, and may take up or put down a payload."""
-
-    name: PlainName | None = described(
-        "Name of the stop, different from those of the others. Null: its number, from 1.", None, "pick", default=None
-    )
-    target: Target = described(
-        "Joint positions, a pose of the TCP, or one of several targets. Orientations are given in full.",
-        None,
-        {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
-    )
-    dwell: float = described("Time at rest at the stop.", "s", 0.4, default=0.0, ge=0, le=LONGEST_DURATION)
-    payload: Payload | None = described(
-        "What the arm carries from here on, the dwell included. Null: nothing, it is put down. Left out: unchanged.",
-        None,
-        {"mass": 2.0, "com": [0.0, 0.0, 0.1]},
-        default=None,
-    )
-    branch: Branch | None = described(
-        "Allowed branches of the arm configurations at this stop. Null: all branches.",
-        None,
-        {"elbow": "up"},
-        default=None,
-    )
-    limits: MoveLimits = described(
-        "Limits of the moves into this stop, its line included, where they are tighter than those of the request.",
-        None,
-        {"acceleration": 5.0, "tcp_speed": 0.5},
-        default=MoveLimits(),
-    )
-    approach: Line | None = described(
-        "Straight line of the TCP into the stop. The arm rests at its outer end. Null: none.",
-        None,
-        {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
-        default=None,
-    )
-    retreat: Line | None = described(
-        "Straight line of the TCP out of the stop. The arm rests at its outer end. Null: none.",
-        None,
-        {"direction": [0.0, 0.0, -1.0], "distance": 0.08},
-        default=None,
-    )
-    obstacles_ignored: Annotated[list[PlainName], Field(max_length=MOST_OBSTACLES)] = described(
-        "Names of obstacles that do not count at the stop and on its lines, like the part that is grasped.",
-        None,
-        ["part"],
-        default=[],
-    )
-
 
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
 
@@ -228,7 +173,8 @@ class StopConfiguration(Configuration):
     """The arm configuration at a place of the round."""
 
     stop: str = described(
-        "Name of the stop, with `/approach` or `/retreat` at the outer end of its line; `start` for the start.",
+        "Name of the stop; with `/approach` or `/retreat` at the outer end of its line, with `/entry` at the start of "
+        "its path; `start` for the start.",
         None,
         "pick",
     )
@@ -237,8 +183,9 @@ class StopConfiguration(Configuration):
 class CycleLeg(Response):
     """A move from one place to the next, the dwell at a stop, or a wait."""
 
-    kind: Literal["move", "line", "dwell", "wait"] = described(
-        "`move`; `line` into or out of a stop; `dwell` at a stop; `wait` there for what is left of the time.",
+    kind: Literal["move", "line", "path", "dwell", "wait"] = described(
+        "`move`; `line` into or out of a stop; `path` of a stop; `dwell` at a stop; `wait` there for what is left of "
+        "the time.",
         None,
         "move",
     )

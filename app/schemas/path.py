@@ -2,17 +2,63 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import Speed
-from app.schemas.common import BasePose, Request, described
+from app.schemas.common import BasePose, Request, described, number_or_object
 from app.schemas.orientation import Axis
 from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
-from optimizer.problem.tool_path import LEAST_TOLERANCE, MOST_POINTS, POSITION_TOLERANCE, ROTATION_TOLERANCE, PathShape
+from optimizer.problem.tool_path import (
+    LEAST_RAMP,
+    LEAST_TOLERANCE,
+    MOST_POINTS,
+    POSITION_TOLERANCE,
+    RAMP,
+    ROTATION_TOLERANCE,
+    SPEED_RANGE,
+    PathShape,
+)
 
 SPEED = "Largest speed of the TCP on the way. Null: as fast as the limits allow."
+
+
+class SpeedRange(Request):
+    """Bounds on the speed of the TCP along a path."""
+
+    min: Speed | None = described(
+        "Smallest speed, but for the ramps at both ends, where the arm comes from rest and to rest. Null: no bound.",
+        "m/s",
+        0.1,
+        default=None,
+    )
+    max: Speed | None = described(
+        "Largest speed, at least 1.05 times `min`. Null: as fast as the limits allow.", "m/s", 0.2, default=None
+    )
+    ramp: float = described(
+        "Length of the path at either end on which the speed may be below `min`.",
+        "m",
+        0.02,
+        default=RAMP,
+        ge=LEAST_RAMP,
+        le=1,
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.min is not None and self.max is not None and self.max < SPEED_RANGE * self.min:
+            raise PydanticCustomError(
+                "range", f"`max` must be at least {SPEED_RANGE:g} times `min`: a motion needs some freedom"
+            )
+        return self
+
+
+PathSpeed = Annotated[
+    Annotated[Speed, Tag("by number")] | Annotated[SpeedRange, Tag("range")],
+    number_or_object("by number", "speed", "Give null, a number of m/s, or an object with `min`, `max` or both"),
+]
 
 
 class PathTolerance(Request):
@@ -26,30 +72,17 @@ class PathTolerance(Request):
     )
 
 
-class Path(Request):
-    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis; a
-    smooth curve; or an arc.
-
-    The branch and the timing are chosen; the tool is on the path from the start to the goal.
-    """
-
+class _OnPath(Request):
     shape: PathShape = described(
         "`lines`: straight from pose to pose, with rounded corners. `curve`: smoothly through every pose, as through "
-        "those of a recorded curve. `arc`: on the circle through the start, the one pose of `via` and the goal.",
+        "those of a recorded curve. `arc`: on the circle through the start, the one pose between and the end.",
         None,
         "lines",
         default="lines",
     )
-    via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
-        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
-        "a curve, exactly one of an arc.",
-        None,
-        [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
-        default=[],
-    )
     blend: float = described(
-        "Length of path before and after each pose of `via` on which a smooth curve replaces the corner of two lines. "
-        "Needed with lines over `via`, as the arm cannot turn a sharp corner without a stop.",
+        "Length of path before and after each pose between start and end on which a smooth curve replaces the corner "
+        "of two lines. Needed where there are such poses, as the arm cannot turn a sharp corner without a stop.",
         "m",
         0.02,
         default=0.0,
@@ -62,7 +95,48 @@ class Path(Request):
         {"position": 1e-4, "rotation": 2e-3},
         default=PathTolerance(),
     )
-    speed: Speed | None = described(SPEED, "m/s", 0.1, default=None)
+    speed: PathSpeed | None = described(
+        "Largest speed of the TCP on the way, or bounds on it. Null: as fast as the limits allow.",
+        "m/s",
+        0.1,
+        default=None,
+    )
+
+    @property
+    def bounds(self) -> SpeedRange:
+        """The bounds on the speed."""
+        return self.speed if isinstance(self.speed, SpeedRange) else SpeedRange(max=self.speed)
+
+
+class Path(_OnPath):
+    """A path of the TCP from `start` to `goal`: straight lines, on which the orientation turns evenly about one axis; a
+    smooth curve; or an arc.
+
+    The branch and the timing are chosen; the tool is on the path from the start to the goal.
+    """
+
+    via: Annotated[list[BasePose], Field(max_length=max(MOST_POINTS.values()))] = described(
+        f"Poses of the TCP between start and goal: at most {MOST_POINTS['lines']} of lines, {MOST_POINTS['curve']} of "
+        "a curve, exactly one of an arc.",
+        None,
+        [{"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]}],
+        default=[],
+    )
+
+
+class StopPath(_OnPath):
+    """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose, follows it, and rests
+    at its last. The branch is chosen for the whole round."""
+
+    points: Annotated[list[BasePose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)] = described(
+        f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to {MOST_POINTS['curve'] + 2} of a curve, "
+        "exactly three of an arc.",
+        None,
+        [
+            {"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+            {"position": [0.4, 0.3, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+        ],
+    )
 
 
 class Line(Request):

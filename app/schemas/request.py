@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
+from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest
-from app.schemas.common import JointPositions, Request, by_field, described
+from app.schemas.common import JointPositions, Request, by_field, described, number_or_object
 from app.schemas.orientation import TargetPose
 from app.schemas.path import Path
 from app.settings import LONGEST_DEADLINE
@@ -92,19 +92,8 @@ class DurationRange(Request):
         return self
 
 
-def by_kind(value: Any) -> str | None:
-    """Discriminator of a union of a number, tagged `seconds`, and an object, tagged `range`."""
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, int | float):
-        return "seconds"
-    return "range" if isinstance(value, dict | Request) else None
-
-
-SECONDS_OR_RANGE = Discriminator(
-    by_kind,
-    custom_error_type="duration",
-    custom_error_message="Give null, a number of seconds, or an object with `min`, `max` or both",
+SECONDS_OR_RANGE = number_or_object(
+    "seconds", "duration", "Give null, a number of seconds, or an object with `min`, `max` or both"
 )
 
 Duration = Annotated[Annotated[Seconds, Tag("seconds")] | Annotated[DurationRange, Tag("range")], SECONDS_OR_RANGE]

@@ -192,6 +192,12 @@ class WorstRatio(Response):
         0.01,
         default=None,
     )
+    path_speed: float | None = described(
+        "`speed.min` of the path / least speed of the TCP between the ramps, between the samples, too.",
+        "1",
+        0.98,
+        default=None,
+    )
 
 
 class EndError(Response):

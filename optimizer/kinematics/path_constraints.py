@@ -139,6 +139,12 @@ class PathConstraints:
         frames = link_frames(self.placements, q)
         return np.concatenate([limit.ratios(frames, q, v) for limit in self.limits], axis=1)
 
+    def speed_ratios(self, q: Array, v: Array) -> Array:
+        """The largest ratio (n,) of a speed at q [rad] and v [rad/s] (n, nq); 0 without such limits."""
+        frames, speeds = link_frames(self.placements, q), np.zeros((len(q), 1))
+        limited = [each.ratios(frames, q, v) for each in self.limits if isinstance(each, PointSpeedConstraint)]
+        return np.asarray(np.hstack([speeds, *limited]).max(axis=1))
+
     def linearised(self, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
         """Ratios and gradients at q [rad] and v [rad/s] (n, nq); those not `wanted` (n, c) may be zero."""
         frames = link_frames(self.placements, q)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from models.robot import Array
+from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.course_shapes import Shape, shape_of
 from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 
@@ -17,6 +19,8 @@ from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 COMPARED, STEP = 100, 0.002
 # a pose is looked for so many times as far ahead on the course as the motion and its tolerances reach
 AHEAD = 2.0
+# how much of the length of a course by distance its turns are counted as
+TURNS = 1e-3
 # m²: two poses of the course that are nearer are the same
 TINY = 1e-24
 
@@ -27,20 +31,50 @@ class ToolCourse:
 
     path: ToolPath
     shape: Shape
+    # ways [m] along the shape, and the fractions of this course at them; None where these are those of the way
+    by_distance: tuple[Array, Array] | None = None
 
     @classmethod
     def of(cls, path: ToolPath, T_start: Array, T_goal: Array) -> ToolCourse:
-        """The course of a path from T_start to T_goal (4, 4). Raises InvalidProblem; see `shape_of`."""
-        return cls(path, shape_of(path, np.array([T_start, *(pose.T for pose in path.via), T_goal])))
+        """The course of a path from T_start to T_goal (4, 4). Raises InvalidProblem; see `shape_of`. Its ramps must
+        leave something between them."""
+        course = cls(path, shape_of(path, np.array([T_start, *(pose.T for pose in path.via), T_goal])))
+        return course if path.least_speed is None else course._by_distance()
 
     @property
     def length(self) -> float:
         """Length of the way [m]; a radian of turning counts as TURNING."""
         return float(self.shape.pieces[-1])
 
+    def measured(self, count: int, step: float) -> tuple[Array, Array]:
+        """Fractions (k,) of the way, as of `grid`, and how far the TCP has moved until there (k,) [m], turns left
+        out."""
+        at = self.grid(count, step)
+        moved = np.linalg.norm(np.diff(self.poses(at)[:, :3, 3], axis=0), axis=1)
+        return at, np.concatenate([[0.0], np.cumsum(moved)])
+
+    def _by_distance(self) -> ToolCourse:
+        """The same course, whose fractions are those of the distance that the TCP moves: at an even speed they rise
+        evenly. Raises InvalidProblem if the ramps leave nothing between them."""
+        at, gone = self.measured(COMPARED, STEP)
+        length = float(gone[-1])
+        if length <= 2 * self.path.ramp:
+            raise InvalidProblem(
+                "path.speed.ramp",
+                f"The TCP moves {length:.4g} m along this path: its ramps, {self.path.ramp:g} m at either end, leave "
+                "nothing between them for path.speed.min.",
+            )
+        # where the tool turns in place, the fractions have to rise, too
+        rising = gone + TURNS * length * at
+        return replace(self, by_distance=(at * self.length, rising / rising[-1]))
+
     def poses(self, fraction: Array) -> Array:
         """T_base_tcp (k, 4, 4) at fractions (k,) of the way."""
-        return self.shape.poses(np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0) * self.length)
+        fraction = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0)
+        if self.by_distance is None:
+            return self.shape.poses(fraction * self.length)
+        way, at = self.by_distance
+        return self.shape.poses(np.clip(CubicSpline(at, way)(fraction), 0.0, self.length))
 
     def deviation(self, T: Array) -> tuple[Array, Array]:
         """How far poses T (k, 4, 4) of a motion and the course are from each other: at most so many metres and radians.
@@ -72,7 +106,8 @@ class ToolCourse:
         pieces = [
             np.linspace(a, b, max(count, int(np.ceil((b - a) / step))), endpoint=False) for a, b in pairwise(knots)
         ]
-        return np.append(np.concatenate(pieces) / self.length, 1.0)
+        at = np.append(np.concatenate(pieces) / self.length, 1.0)
+        return at if self.by_distance is None else np.interp(at * self.length, *self.by_distance)
 
     def _matched(self, at: Array, known: Array, asked: Array) -> tuple[Array, Array, float]:
         """Fractions (k,) of the way that are compared with a motion; what is left out before each (k,) [m], and after

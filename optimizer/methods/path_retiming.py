@@ -27,6 +27,9 @@ from optimizer.deadline import checkpoint
 from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.limit_repair import (
     MARGIN,
+    PATH_REPAIR,
+    PATH_SAMPLES,
+    REPAIR_MARGIN,
     initial_bounds,
     path_excess,
     repair_factors,
@@ -36,7 +39,7 @@ from optimizer.methods.limit_repair import (
 from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline
-from optimizer.trajectories.spline import Spline, lasting, least_time_scale, spline_of
+from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample, spline_of
 
 # control values of the time scaling, and how many more control points than the path the motion has, up to a number
 SCALING_POINTS, MORE_POINTS, MOST_POINTS = 17, 12, 72
@@ -84,6 +87,7 @@ class PathRetiming:
         scaling: bspline.Basis | None = None,
     ) -> None:
         self.prepared, self.path, self.interval = prepared, path, interval
+        self.least_speed, self.floor = prepared.least_speed, 1 + REPAIR_MARGIN
         self.space = space or bspline.uniform(min(len(path.control_points) + MORE_POINTS, MOST_POINTS))
         self.scaling = scaling or bspline.uniform(SCALING_POINTS)
         at = np.linspace(0.0, 1.0, FITTED * self.space.n)
@@ -117,13 +121,22 @@ class PathRetiming:
             if factors is not None:
                 spline = slightly_retimed(spline, factors, self.interval.t_max)
                 factors = repair_factors(prepared, spline, (none, none))
-            excess = path_excess(prepared, spline, prepared.path, None)
-            if factors is None and not excess.any():
+            excess, lacking = path_excess(prepared, spline, prepared.path, None), self._lacking(spline)
+            if factors is None and not excess.any() and lacking <= 0:
                 return SolveResult(SolveStatus.SOLVED, CONVERGED, iterations, solves, spline)
             bounds = bounds - excess
+            self.floor += max(lacking, 0.0)
             if factors is not None:
                 limits = tightened(limits, factors)
         return SolveResult(SolveStatus.FAILED, NONE, iterations, REPAIRS)
+
+    def _lacking(self, spline: Spline) -> float:
+        """By how much the least speed that is aimed at, as a ratio, has to rise: between the points it is missed."""
+        if self.least_speed is None:
+            return 0.0
+        q, v, _ = sample(spline, np.linspace(0.0, spline.duration, PATH_SAMPLES))
+        missed = 1 + REPAIR_MARGIN / 4 - self.least_speed.reached(q, v)
+        return PATH_REPAIR * missed + REPAIR_MARGIN if missed > 0 else 0.0
 
     def motion(self, x: Array) -> Spline:
         """The motion of the variables x (n,)."""
@@ -144,8 +157,26 @@ class PathRetiming:
 
     def _fractions(self, x: Array) -> Array:
         """s (k,) at the fitted instants."""
+        return self._at(self._instants, x)
+
+    def _at(self, basis: Array, x: Array) -> Array:
+        """s (k,) at the instants at which the scaling's basis functions are `basis` (k, n)."""
         resting = np.zeros(self.scaling.resting)
-        return np.asarray(np.clip(self._instants @ np.concatenate([resting, x[:-1], resting + 1.0]), 0.0, 1.0))
+        return np.asarray(np.clip(basis @ np.concatenate([resting, x[:-1], resting + 1.0]), 0.0, 1.0))
+
+    def speed_slack(self, x: Array, z: Array, Z: Array) -> tuple[Array, Array]:
+        """Slack (k,) of the least speed at the path points, and its derivatives (k, n) by x.
+
+        `z` are q and v (2, k, nq) there, `Z` their derivatives (2, k, nq, n).
+        """
+        if self.least_speed is None:
+            return np.zeros(0), np.zeros((0, len(x)))
+        basis = self.scaling.at_path[0]
+        aim, slope = self.least_speed.aimed_at(self._at(basis, x))
+        found = self.least_speed.linearised(*z)
+        by_x = (found.by_q @ Z[0] + found.by_v @ Z[1])[:, 0]
+        by_x[:, :-1] -= self.floor * slope[:, None] * basis[:, self.scaling.free]
+        return found.value[:, 0] - self.floor * aim, by_x
 
     def _first(self, limits: Limits) -> Array:
         """The quintic time scaling, in the duration of least cost among a few within the limits on its rates."""
@@ -272,7 +303,7 @@ class RetimingProgram:
         values = [rates / limits, torque.copy()]
         slack = [1 - value.ravel() ** 2 for value in values]
         rows = [-2 * values[0][..., None] * R / limits[..., None], -2 * values[1][..., None] * torque_slopes]
-        along, along_slopes = self._path(P, slopes, T)
+        along, along_slopes = self._path(x, P, slopes, T)
         rising = np.diff(np.concatenate([[0.0], x[:-1], [1.0]]))
         return RetimingState(
             cost=retiming.interval.constant + total,
@@ -287,16 +318,22 @@ class RetimingProgram:
             ),
         )
 
-    def _path(self, P: Array, slopes: Array, T: float) -> tuple[Array, Array]:
-        """Slack of the path constraints at the path points, and its derivatives by x."""
+    def _path(self, x: Array, P: Array, slopes: Array, T: float) -> tuple[Array, Array]:
+        """Slack of the path constraints and of the least speed at the path points, and its derivatives by x."""
         path, space = self.retiming.prepared.path, self.retiming.space
-        if path is None:
-            return np.zeros(0), np.zeros((0, slopes.shape[2] + 1))
+        if path is None and self.retiming.least_speed is None:
+            return np.zeros(0), np.zeros((0, len(x)))
         z = space.at_path @ P / np.array([1.0, T])[:, None, None]
-        Q, V = self._by_variables(space.at_path, slopes, z, np.arange(2.0), T)
+        Z = self._by_variables(space.at_path, slopes, z, np.arange(2.0), T)
+        slack, rows = self.retiming.speed_slack(x, z, Z)
+        if path is None:
+            return slack, rows
         found = path.linearised(*z)
-        by_x = found.by_q @ Q + found.by_v @ V
-        return (self.bounds - found.value).ravel(), -by_x.reshape(-1, by_x.shape[-1])
+        by_x = found.by_q @ Z[0] + found.by_v @ Z[1]
+        return (
+            np.concatenate([(self.bounds - found.value).ravel(), slack]),
+            np.concatenate([-by_x.reshape(-1, by_x.shape[-1]), rows]),
+        )
 
     @staticmethod
     def _by_variables(matrices: Array, slopes: Array, values: Array, orders: Array, T: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -14,7 +15,7 @@ from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
-from optimizer.trajectories import quintic
+from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.spline import Spline, sample
 
@@ -24,9 +25,21 @@ SPANS, BEND_SPANS, FINER_SCALING, MOST_SPANS = 12, 6, 2, 72
 # spans that the motion has more than its path, and at most at first; it has so many times as many until it keeps to
 # the path
 MORE_SPANS, FIRST_SPANS, FINER = 12, 67, (1, 2, 4, 8)
+# shares of the time that each ramp of a first guess takes, at least and at most
+RAMPS = (0.1, 0.5)
+# share of the way of a ramp on which a first guess comes to speed, where there is a least one
+ON_RAMP = 0.8
 # instants at which the path's tolerances are checked; samples of the path per control point, to measure along it
 CHECKED, SAMPLED = 2000, 16
 NOT_FINER = "there is no other space of time scalings"
+TOO_SLOW = (
+    "found no motion within the limits that keeps path.speed.min between its ramps: give a smaller one, a longer "
+    "path.speed.ramp, or a larger path.blend"
+)
+OUT_OF_REACH = (
+    "at {0:.1%} of the path the joints' speed limits allow the TCP {1:.3g} m/s, less than path.speed.min: give a "
+    "smaller one"
+)
 NOT_KEPT = "found no motion within the path's tolerance: give a larger one, or a larger path.blend"
 TOO_SHARP = "the path turns too sharply for its tolerance: give a larger path.blend"
 
@@ -49,7 +62,16 @@ class ToolPathMotion(Method):
         path = self.prepared.joint_path(self.q_start)
         if path is None:
             return SolveResult(SolveStatus.INFEASIBLE, TOO_SHARP)
+        if self.prepared.least_speed is not None:
+            s = np.linspace(0.0, 1.0, SAMPLED * len(path.control_points))
+            v_max = self.prepared.arm.active_limits.v_max
+            slow = self.prepared.least_speed.out_of_reach(path.curve(s), path.curve(s, 1), v_max)
+            if slow is not None:
+                return SolveResult(SolveStatus.INFEASIBLE, OUT_OF_REACH.format(*slow))
         results = [self._kept(path, interval, self._scaling(1)) for interval in self._intervals()]
+        if all(result.spline is None for result in results):
+            # what the first space cannot express, a finer one may: a motion that is nearly the fastest one
+            results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
         found = min(results, key=lambda result: self.prepared.cost_of(result.spline))
         if found.spline is not None:
             hit = self.prepared.surroundings.worst_violation(found.spline)
@@ -77,7 +99,22 @@ class ToolPathMotion(Method):
     def _scaling(self, finer: int) -> Basis:
         """The space of the time scaling, so many times finer than the first one."""
         assert self.prepared.course is not None
-        return _evenly((SPANS + BEND_SPANS * self.prepared.course.shape.bends) * finer)
+        return self._space((SPANS + BEND_SPANS * self.prepared.course.shape.bends) * finer)
+
+    def _space(self, spans: int) -> Basis:
+        """A space with so many even spans, and with knots where the ramps of a least speed end."""
+        breaks = np.linspace(0.0, 1.0, spans + 1)
+        if self.prepared.least_speed is not None:
+            breaks = np.unique(np.append(breaks, [self._ramp, 1 - self._ramp]).round(9))
+        return Basis.of(clamped(breaks), grid_points=0)
+
+    @cached_property
+    def _ramp(self) -> float:
+        """The share of the time that each ramp takes, at an even speed between them, where there is a least speed."""
+        least = self.prepared.least_speed
+        assert least is not None
+        way = ON_RAMP * least.ramp / float(least.gone[-1])
+        return 2 * way / (1 + 2 * way)
 
     def _intervals(self) -> list[DurationInterval]:
         """The durations that are tried. Work without friction falls with the duration, its smoothed corners do not."""
@@ -97,9 +134,11 @@ class ToolPathMotion(Method):
         t, s = self._paced(path) if guess is None else _on_path(path, *guess)
         spans = min(len(np.unique(path.knots)) + MORE_SPANS, FIRST_SPANS)
         for finer in FINER:
-            retiming = PathRetiming(self.prepared, path, interval, _evenly(spans * finer), scaling)
+            retiming = PathRetiming(self.prepared, path, interval, self._space(spans * finer), scaling)
             results.append(retiming.solve(retiming.variables(s, t) if x is None else x))
             found, x = results[-1].spline, retiming.found
+            if found is None and self.prepared.least_speed is not None:
+                results[-1] = replace(results[-1], reason=TOO_SLOW)
             if found is None or self._keeps_to_path(found):
                 return with_effort(results[-1], results)
         failed = replace(results[-1], status=SolveStatus.FAILED, reason=NOT_KEPT, spline=None)
@@ -114,22 +153,25 @@ class ToolPathMotion(Method):
         derivatives = np.stack([path.curve(s, d) for d in (1, 2, 3)])
         ratios = np.abs(derivatives) / self.prepared.arm.active_limits.rates[:, None]
         pace: Array = (ratios.max(axis=2) ** (1 / np.arange(1, 4))[:, None]).max(axis=0)
+        if self.prepared.path is not None:
+            pace = np.maximum(pace, self.prepared.path.speed_ratios(path.curve(s), path.curve(s, 1)))
         t = np.asarray(cumulative_trapezoid(pace, s, initial=0))
         at = np.linspace(0.0, 1.0, CHECKED)
-        # as fast at most as this pace, whose peak is that of the quintic
+        # as fast at most as this pace, whose peak is that of the quintic; in less time, with shorter ramps
         duration = float(np.clip(quintic.PEAKS[0] * t[-1], self.t_min, self.t_max))
-        return at * duration, np.interp(quintic.fraction(at), t / t[-1], s)
+        law = quintic.fraction(at)
+        if self.prepared.least_speed is not None:
+            duration = float(np.clip(t[-1] / (1 - self._ramp), self.t_min, self.t_max))
+            law = ramped.fraction(at, self._ramp)
+        elif duration < quintic.PEAKS[0] * t[-1]:
+            law = ramped.fraction(at, float(np.clip(1 - t[-1] / duration, *RAMPS)))
+        return at * duration, np.interp(law, t / t[-1], s)
 
     def _keeps_to_path(self, motion: Spline) -> bool:
         """Whether a motion is within the path's tolerances."""
         assert self.prepared.course is not None
         q, _, _ = sample(motion, np.linspace(0.0, motion.duration, CHECKED))
         return max(path_ratios(self.prepared.arm, self.prepared.course, q).values()) <= 1
-
-
-def _evenly(spans: int) -> Basis:
-    """A space with so many even spans."""
-    return Basis.of(clamped(np.linspace(0.0, 1.0, spans + 1)), grid_points=0)
 
 
 def _on_path(path: Spline, q: Array, t: Array) -> tuple[Array, Array]:

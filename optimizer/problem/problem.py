@@ -74,6 +74,7 @@ class Problem:
             for name in ("start", "goal"):
                 if isinstance(getattr(self, name), AnyOf | ConeOrientedPose):
                     raise InvalidProblem(name, f"With a path, {name} must be one pose or joint positions.")
+            self.tool_path.check_speed(self.arm.tcp_speed)
         if self.cycle is not None:
             if self.duration_min is not None and self.duration_min > self.cycle.time:
                 raise InvalidProblem("duration", "The shortest duration must not exceed cycle.time.")

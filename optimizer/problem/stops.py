@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -12,10 +13,13 @@ from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.line import Line
 from optimizer.problem.scene import Scene
+from optimizer.problem.stop_path import STRAIGHT, StopPath
 from optimizer.problem.targets import Target
+from optimizer.problem.tool_path import ToolPath
 
-# what follows the name of a stop in those of the outer ends of its lines
-APPROACH, RETREAT = "/approach", "/retreat"
+MoveKind = Literal["move", "line", "path"]
+# what follows the name of a stop in those of the outer ends of its lines, and of the start of its path
+APPROACH, RETREAT, ENTRY = "/approach", "/retreat", "/entry"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,8 +30,9 @@ class Stop:
     it unchanged. `branch` restricts the inverse kinematics branches of this stop. The moves into the stop, a line
     included, keep within `limits`, `tcp_speed` and `elbow_speed` [m/s], too; position limits are the arm's.
 
-    The TCP moves along the line `approach` into the stop and along `retreat` out of it, and rests at their outer ends;
-    at the stop and on these lines the obstacles named in `obstacles_ignored` do not count.
+    The TCP moves along the line `approach` into the stop and along `retreat` out of it, and rests at their outer ends.
+    At the stop it follows a `path`, from the target to where the path ends; there it dwells, and the payload changes.
+    At the stop, on its lines and its path the obstacles named in `obstacles_ignored` do not count.
     """
 
     name: str
@@ -40,13 +45,21 @@ class Stop:
     elbow_speed: float | None = None
     approach: Line | None = None
     retreat: Line | None = None
+    path: StopPath | None = None
     obstacles_ignored: Sequence[str] = ()
 
     @property
+    def entry(self) -> str:
+        """Name of the place of the target: the stop, or the start of its path."""
+        return self.name + ENTRY if self.path else self.name
+
+    @property
     def places(self) -> list[str]:
-        """Names of the places at which the arm rests, in their order: the stop, and the outer ends of its lines."""
+        """Names of the places at which the arm rests, in their order: the ends of the stop's path, or the stop, and the
+        outer ends of its lines."""
         return [
             *([self.name + APPROACH] if self.approach else []),
+            *([self.entry] if self.path else []),
             self.name,
             *([self.name + RETREAT] if self.retreat else []),
         ]
@@ -54,7 +67,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class PlannedMove:
-    """A move of a round from one place to another, by their names, with `arm`; along a `line` if there is one.
+    """A move of a round from one place to another, by their names, with `arm`; along a `tool_path` if there is one.
 
     After it `arm_after` rests, for `dwell` [s]. `at_stop`: the goal is a stop, and neither an outer end nor the start.
     """
@@ -64,23 +77,30 @@ class PlannedMove:
     arm: Arm
     arm_after: Arm
     dwell: float = 0.0
-    line: Line | None = None
+    kind: MoveKind = "move"
+    tool_path: ToolPath | None = None
     at_stop: bool = False
 
 
 def moves_over(stop: Stop, place: str, before: Arm, after: Arm) -> list[PlannedMove]:
-    """The moves from `place` to a stop, and along its lines; `before` and `after` it the arm carries other payloads."""
+    """The moves from `place` to a stop, along its lines and its path; `before` and `after` it the arm carries other
+    payloads."""
     moves, resting, before = list[PlannedMove](), _at(after, stop), _within(before, stop)
+    there = PlannedMove(place, stop.name, before, resting, stop.dwell, at_stop=True)
+    if stop.path is not None:
+        there = PlannedMove(place, stop.entry, before, _at(before, stop))
     if stop.approach is not None:
         outer = stop.name + APPROACH
         moves.append(PlannedMove(place, outer, before, before))
-        on_line = _on_line(before, stop, stop.approach)
-        moves.append(PlannedMove(outer, stop.name, on_line, resting, stop.dwell, stop.approach, True))
-    else:
-        moves.append(PlannedMove(place, stop.name, before, resting, stop.dwell, at_stop=True))
+        on_line = _on_way(before, stop, stop.approach.speed)
+        there = replace(there, start=outer, arm=on_line, kind="line", tool_path=STRAIGHT)
+    moves.append(there)
+    if stop.path is not None:
+        on_path, way = _on_way(before, stop, stop.path.speed), stop.path.path
+        moves.append(PlannedMove(stop.entry, stop.name, on_path, resting, stop.dwell, "path", way, True))
     if stop.retreat is not None:
-        on_line = _on_line(after, stop, stop.retreat)
-        moves.append(PlannedMove(stop.name, stop.name + RETREAT, on_line, after, 0.0, stop.retreat))
+        on_line = _on_way(after, stop, stop.retreat.speed)
+        moves.append(PlannedMove(stop.name, stop.name + RETREAT, on_line, after, 0.0, "line", STRAIGHT))
     return moves
 
 
@@ -95,13 +115,13 @@ def _within(arm: Arm, stop: Stop) -> Arm:
     return arm.no_faster_than(stop.tcp_speed)
 
 
-def _on_line(arm: Arm, stop: Stop, line: Line) -> Arm:
-    """The arm on a line of a stop: no faster than this allows."""
-    return _at(arm, stop).no_faster_than(line.speed)
+def _on_way(arm: Arm, stop: Stop, speed: float | None) -> Arm:
+    """The arm on a line of a stop or on its path: no faster than this allows."""
+    return _at(arm, stop).no_faster_than(speed)
 
 
 def _at(arm: Arm, stop: Stop) -> Arm:
-    """The arm at a stop and on its lines: without the obstacles that do not count there."""
+    """The arm at a stop, on its lines and its path: without the obstacles that do not count there."""
     if not stop.obstacles_ignored:
         return arm
     return replace(arm, scene=Scene([each for each in arm.scene.obstacles if each.name not in stop.obstacles_ignored]))

@@ -20,6 +20,10 @@ LEAST_TOLERANCE = 1e-5
 POSITION_TOLERANCE, ROTATION_TOLERANCE = 1e-4, 1.745e-3
 # how much path [m] a radian of turning counts as: so a turn in place is a path, too
 TURNING = 0.25
+# m: way at either end of a path on which it may be slower than its least speed, unless given, and least of it
+RAMP, LEAST_RAMP = 0.02, 1e-3
+# a greatest speed must be so many times the least one: a motion needs some freedom between them
+SPEED_RANGE = 1.05
 # poses that are nearer than this [m] along the path are one
 SAME_POSE = 1e-6
 
@@ -32,7 +36,7 @@ class ToolPath:
     turns evenly about one axis; within `blend` [m] of path before and after a pose of `via`, a smooth curve leads past
     it. A curve goes through every pose, with continuous acceleration. An arc is part of the circle through the start,
     the one pose of `via` and the goal. The motion may be off by at most `position_tolerance` [m] and
-    `rotation_tolerance` [rad].
+    `rotation_tolerance` [rad]. The TCP is no slower than `least_speed` [m/s], but within `ramp` [m] of either end.
 
     Raises InvalidProblem, with the field named.
     """
@@ -42,6 +46,8 @@ class ToolPath:
     blend: float = 0.0
     position_tolerance: float = POSITION_TOLERANCE
     rotation_tolerance: float = ROTATION_TOLERANCE
+    least_speed: float | None = None
+    ramp: float = RAMP
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "via", tuple(self.via))
@@ -57,6 +63,10 @@ class ToolPath:
             if not (np.isfinite(value) and value >= LEAST_TOLERANCE):
                 field = f"path.tolerance.{name.removesuffix('_tolerance')}"
                 raise InvalidProblem(field, f"{field} must be at least {LEAST_TOLERANCE:g}.")
+        if self.least_speed is not None and not (np.isfinite(self.least_speed) and self.least_speed > 0):
+            raise InvalidProblem("path.speed.min", "path.speed.min must be a positive number of metres per second.")
+        if not (np.isfinite(self.ramp) and self.ramp >= LEAST_RAMP):
+            raise InvalidProblem("path.speed.ramp", f"path.speed.ramp must be at least {LEAST_RAMP:g} m.")
         if not (np.isfinite(self.blend) and self.blend >= 0):
             raise InvalidProblem("path.blend", "path.blend must be a length in metres, zero or more.")
         if self.shape != "lines" and self.blend > 0:
@@ -66,4 +76,13 @@ class ToolPath:
                 "path.blend",
                 "The arm cannot turn a sharp corner without a stop: give a path.blend of at least the position's "
                 f'tolerance, {self.position_tolerance:g} m, one path for each line, or the shape "curve".',
+            )
+
+    def check_speed(self, most: float | None) -> None:
+        """Raises InvalidProblem if the least speed leaves no room below the greatest one, `most` [m/s]."""
+        if self.least_speed is not None and most is not None and most < SPEED_RANGE * self.least_speed:
+            raise InvalidProblem(
+                "path.speed.min",
+                f"On the path the TCP may be no faster than {most:.4g} m/s: give a path.speed.min of at most "
+                f"{most / SPEED_RANGE:.4g} m/s.",
             )

@@ -15,8 +15,10 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle, Hold
 from optimizer.problem.free_order import FreeOrder, check_order
 from optimizer.problem.names import check_name, first_repeated
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
-from optimizer.problem.stops import APPROACH, RETREAT, PlannedMove, Stop, moves_over
+from optimizer.problem.stop_path import StopPath, at_stop
+from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over
 from optimizer.problem.targets import Target, members, validated
 
 MOST_STOPS = 100
@@ -72,7 +74,11 @@ class WorkRound:
         for k, stop in enumerate(self.stops):
             if not 0 <= stop.dwell <= LONGEST_DURATION:
                 raise InvalidProblem(f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s.")
+            if stop.path is not None and not isinstance(stop.target, Pose):
+                raise InvalidProblem(f"stops.{k}.target", "The target of a stop with a path is one pose: its start.")
             self._check_limits(k, stop)
+            if stop.path is not None:
+                self._check_speed(k, stop, stop.path)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
         if self.arm.bus.mode == "storage":
@@ -99,9 +105,16 @@ class WorkRound:
         if repeated is not None:
             raise InvalidProblem(
                 f"stops.{places[repeated][0]}.name",
-                f"Give each stop a name of its own. {START!r} is the start's, and a stop's name with {APPROACH} or "
-                f"{RETREAT} is that of the outer end of its line.",
+                f"Give each stop a name of its own. {START!r} is the start's, a stop's name with {APPROACH} or "
+                f"{RETREAT} is that of the outer end of its line, and with {ENTRY} that of the start of its path.",
             )
+
+    def _check_speed(self, k: int, stop: Stop, path: StopPath) -> None:
+        most = self.arm.no_faster_than(stop.tcp_speed).no_faster_than(path.speed).tcp_speed
+        try:
+            path.path.check_speed(most)
+        except InvalidProblem as error:
+            raise at_stop(k, error) from None
 
     def _check_limits(self, k: int, stop: Stop) -> None:
         given = {name: getattr(stop, name) for name in ("limits", "tcp_speed", "elbow_speed")}
@@ -146,7 +159,7 @@ class WorkRound:
 
     @cached_property
     def moves(self) -> list[PlannedMove]:
-        """The moves of the round in their order, those along lines included."""
+        """The moves of the round in their order, those along lines and paths included."""
         moves, place = list[PlannedMove](), START
         for stop, before, after in zip(self.stops, self.arms, self.arms[1:], strict=False):
             moves += moves_over(stop, place, before, after)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.deadline import Deadline
 from optimizer.exceptions import PathAttempt, PathInfeasible
 from optimizer.kinematics.angles import wrapped
@@ -41,7 +41,7 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
                 found.append(candidate)
                 prepared.traces[whole.q[0].tobytes()] = whole
                 continue
-        attempts.append(_attempt(prepared, start, trace))
+        attempts.append(attempt_of(limits, start, trace))
     if not found:
         raise PathInfeasible(course.length, attempts)
     return found
@@ -93,9 +93,8 @@ def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[f
     return [some or each for some, each in zip(reaching, start.choices, strict=True)]
 
 
-def _attempt(prepared: PreparedProblem, start: EndConfiguration, trace: Trace) -> PathAttempt:
-    """How far the path is followed from a configuration, and what stops it."""
-    limits = prepared.arm.active_limits
+def attempt_of(limits: Limits, start: EndConfiguration, trace: Trace) -> PathAttempt:
+    """How far a path is followed from a configuration within `limits`, and what stops it."""
     shift = _least_turns(trace, start.choices)
     outside = ((trace.q + shift < limits.q_min) | (trace.q + shift > limits.q_max)).any(axis=1)
     if outside.any():

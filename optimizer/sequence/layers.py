@@ -12,6 +12,7 @@ from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target, members
@@ -48,14 +49,9 @@ def layer_of(asked: WorkRound, place: str, field: str, target: Target, branch: B
     for too many configurations.
     """
     name = place if place == START else f"stops/{place}"
-    arms = [
-        arm
-        for move in asked.moves
-        for arm in ([move.arm] * (place in (move.start, move.goal)) + [move.arm_after] * (place == move.goal))
-    ]
     problems = [
         Problem(arm=arm, start=target, goal=target, branch=branch, windings=asked.windings)
-        for arm in {id(arm): arm for arm in arms}.values()
+        for arm in arms_at(asked, place)
     ]
     problem = problems[0]
     found, _ = ends_of(PreparedProblem.of(problem), name, problem.goal)
@@ -78,6 +74,16 @@ def layer_of(asked: WorkRound, place: str, field: str, target: Target, branch: B
     kinematics = inverse_kinematics_for(asked.arm.robot)
     given = all(isinstance(member, np.ndarray) for member in members(problem.goal))
     return Layer(name, held, positions, end, turns, given or (kinematics is not None and kinematics.complete))
+
+
+def arms_at(asked: WorkRound, place: str) -> list[Arm]:
+    """The different arms that come to a place, rest at it, or leave it."""
+    arms = [
+        arm
+        for move in asked.moves
+        for arm in ([move.arm] * (place in (move.start, move.goal)) + [move.arm_after] * (place == move.goal))
+    ]
+    return list({id(arm): arm for arm in arms}.values())
 
 
 def _nodes(end: EndConfiguration, windings: bool, middle: Array) -> list[tuple[float, ...]]:

@@ -23,8 +23,8 @@ from optimizer.trajectories.spline import Spline
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000
-# nodes of a stop with lines: they make a matrix, of which the diagonal alone counts
-MOST_ON_LINE = 2000
+# nodes of a stop with lines or a path: they make a matrix, of which the diagonal alone counts
+MOST_ON_WAY = 2000
 # kinds between two looks at the deadline: some ten milliseconds
 KINDS_PER_CHECK = 2048
 # rad: a motion whose control points are farther from the limits is not held back by them
@@ -53,6 +53,7 @@ class Leg:
     dwell: Array
     cost: Array
     solved: dict[int, float] = field(default_factory=dict)
+    _by_target: dict[int, PreparedProblem] = field(default_factory=dict)
     exact: dict[tuple[int, int], float] = field(default_factory=dict)
 
     @classmethod
@@ -67,12 +68,12 @@ class Leg:
         return cls._between(prepared, start, goal, *_kinds(start, goal, prepared), dwell)
 
     @classmethod
-    def of_line(cls, prepared: PreparedProblem, start: Layer, goal: Layer, dwell: Array) -> Leg:
-        """The pairs of nodes of the same number, which a straight line of the TCP connects; a kind for each end."""
-        if len(start.q) > MOST_ON_LINE:
+    def of_way(cls, prepared: PreparedProblem, start: Layer, goal: Layer, dwell: Array) -> Leg:
+        """The pairs of nodes of the same number, which a line or path of the TCP connects; a kind for each end."""
+        if len(start.q) > MOST_ON_WAY:
             raise InvalidProblem(
-                "stops", f"{goal.name} has {len(start.q)} arm configurations, of at most {MOST_ON_LINE} with a line: "
-                "give fewer targets, a `branch`, or `windings` false.",
+                "stops", f"{goal.name} has {len(start.q)} arm configurations, of at most {MOST_ON_WAY} with a line "
+                "or a path: give fewer targets, a `branch`, or `windings` false.",
             )  # fmt: skip
         _, first, number = np.unique(start.end, return_index=True, return_inverse=True)
         kind = np.full((len(start.q), len(goal.q)), -1)
@@ -105,6 +106,16 @@ class Leg:
             lambda x, gain: priced_bounds(self.prepared, x, gain, price, longest), self.displacement, self.gain
         )
         return replace(self, bound=bound, cost=_costs(bound, self.kind, self.dwell), solved={}, exact={})
+
+    def prepared_for(self, s: int, g: int) -> PreparedProblem:
+        """The problem of a pair's motion: what reaches another target goes along another line."""
+        if self.prepared.problem.tool_path is None:
+            return self.prepared
+        target = self.start.ends[self.start.end[s]].target
+        if target not in self._by_target:
+            problem = replace(self.prepared.problem, start=self.start.q[s], goal=self.goal.q[g])
+            self._by_target[target] = PreparedProblem.of(problem)
+        return self._by_target[target]
 
     @property
     def least_costs(self) -> Array:

@@ -36,8 +36,7 @@ def priced_motion(
 
     `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
     """
-    prepared = leg.prepared
-    interval = DurationInterval(prepared.parameters(electrical=1.0, time=price), LEAST_DURATION, longest)
+    interval = DurationInterval(leg.prepared.parameters(electrical=1.0, time=price), LEAST_DURATION, longest)
     return _solved(leg, s, g, interval, deadline, guess)
 
 
@@ -49,7 +48,7 @@ def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion
 def _solved(
     leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None = None
 ) -> PricedMotion | None:
-    solver = solver_for(leg.prepared, leg.start.q[s], leg.goal.q[g], deadline, interval)
+    solver = solver_for(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval)
     try:
         with watch(deadline):
             result = solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)

@@ -133,9 +133,9 @@ def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBas
     """
     node, total, duration, held, nodes, sensitivities = start, 0.0, 0.0, True, [start], list[Sensitivity]()
     for k, leg in enumerate(search.legs):
-        if search.asked.moves[k].line is not None:
-            # a controller's own line is not known: the line is ours
-            own = _line(search, k, node)
+        if search.asked.moves[k].tool_path is not None:
+            # a controller's own line or path is not known: it is ours
+            own = _on_way(search, k, node)
             if own is None:
                 return None
             total += float(leg.cost[node, node])
@@ -187,8 +187,8 @@ def resting(search: RoundSearch, nodes: list[int], at: int = -1, waited: float =
     return reduce(add, rests)
 
 
-def _line(search: RoundSearch, move: int, node: int) -> Solution | None:
-    """The certified motion along a line; None if there is none, or the time is up."""
+def _on_way(search: RoundSearch, move: int, node: int) -> Solution | None:
+    """The certified motion along a line or a path; None if there is none, or the time is up."""
     key = (move, node, node)
     if key not in search.solutions:
         try:

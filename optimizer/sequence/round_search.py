@@ -17,7 +17,6 @@ from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.problem.stops import PlannedMove
-from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
 from optimizer.search.attempts import settled, solve
@@ -25,8 +24,8 @@ from optimizer.search.run import Run
 from optimizer.sequence.layers import Layer, layer_of
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
-from optimizer.sequence.lines import layers_with_lines
 from optimizer.sequence.rests import dwell_energies
+from optimizer.sequence.ways import layers_with_ways
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
 
@@ -67,7 +66,7 @@ class RoundSearch(LazySearch):
 
     def _leg(self, move: PlannedMove, start: Layer, goal: Layer) -> Leg:
         prepared = PreparedProblem.of(self._problem(move, start.q[0], goal.q[0], self.asked.deadline))
-        make = Leg.of if move.line is None else Leg.of_line
+        make = Leg.of if move.tool_path is None else Leg.of_way
         return make(prepared, start, goal, dwell_energies(self.asked, move, goal))
 
     def run(self) -> list[int]:
@@ -158,7 +157,10 @@ class RoundSearch(LazySearch):
             raise DeadlineExceeded([])
         problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], self.end.left)
         fixed = replace(problem, duration_min=duration, duration_max=duration)
-        return Run(fixed, clock=self.clock).solution()
+        own = self.solutions.get((k, s, g))
+        # a path that is followed as fast as it can be is not followed so fast again without a guess
+        known = [own.trajectory.spline] if own is not None and self.moves[k].tool_path is not None else []
+        return Run(fixed, known, self.clock).solution()
 
     def finish(self, k: int, s: int, g: int) -> None:
         """Optimise the motion of a pair to the end, and certify it. Raises DeadlineExceeded if no time is left."""
@@ -187,7 +189,7 @@ class RoundSearch(LazySearch):
             start=q_start,
             goal=q_goal,
             method=asked.method,
-            tool_path=None if move.line is None else ToolPath(),
+            tool_path=move.tool_path,
             windings=False,
             sample_period=asked.sample_period,
             deadline=max(time, LEAST_TIME),
@@ -199,6 +201,6 @@ def layers_of(asked: WorkRound) -> dict[str, Layer]:
     PathInfeasible."""
     layers = {START: layer_of(asked, START, "start", asked.start, asked.branch)}
     for k, stop in enumerate(asked.stops):
-        at = layer_of(asked, stop.name, f"stops.{k}.target", stop.target, stop.branch)
-        layers |= zip(stop.places, layers_with_lines(asked, stop, at), strict=True)
+        at = layer_of(asked, stop.entry, f"stops.{k}.target", stop.target, stop.branch)
+        layers |= zip(stop.places, layers_with_ways(asked, k, at), strict=True)
     return layers

@@ -10,16 +10,21 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from models.registry import load_robot
-from optimizer.exceptions import InvalidProblem, NoCollisionFreeTrajectory, PathInfeasible
+from optimizer.certificate import certify
+from optimizer.exceptions import InvalidProblem, NoCollisionFreeTrajectory, NoTrajectory, PathInfeasible
 from optimizer.kinematics.tcp import tcp_pose as pose_of
 from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.methods.duration_intervals import duration_intervals
+from optimizer.methods.path_retiming import PathRetiming, RetimingProgram
 from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene
 from optimizer.problem.targets import AnyOf
 from optimizer.problem.tool_path import ToolPath
+from optimizer.solution import Solution
 from tests.optimizer.moves import AMPLE, ROBOT, limits, tcp_pose
 from tests.optimizer.tool_paths import ARM, HOME, along, moved, poses_of
 from tests.selection import long_but
@@ -134,6 +139,63 @@ def test_the_speed_of_the_tool_is_kept() -> None:
     assert slow.trajectory.spline.duration > 0.3 / 0.2
 
 
+CORNERED = ToolPath(via=[moved([0.0, 0.2, 0.0])], blend=0.04, least_speed=0.19, ramp=0.03)
+
+
+def cornered(**given: Any) -> Problem:
+    """A line, a rounded corner and a line, on which the TCP is nearly even."""
+    return along(moved([0.0, 0.2, -0.15]), **{"arm": ARM.no_faster_than(0.2), "path": CORNERED} | given)
+
+
+def speeds_of(found: Solution, count: int = 4000) -> tuple[float, float, float]:
+    """Greatest speed [m/s] of the TCP, the least one between the ramps, and that at the start, by its positions."""
+    steps = np.linalg.norm(np.diff(poses_of(found, count)[:, :3, 3], axis=0), axis=1)
+    speed, gone = steps * (count - 1) / found.trajectory.spline.duration, np.cumsum(steps)
+    between = (gone > CORNERED.ramp) & (gone < gone[-1] - CORNERED.ramp)
+    return float(speed.max()), float(speed[between].min()), float(speed[0])
+
+
+def test_the_tool_is_no_slower_than_asked_between_the_ramps() -> None:
+    found = optimize(cornered())
+    most, least, first = speeds_of(found)
+    assert found.certificate.valid and 0.19 * (1 - 1e-6) < least < most < 0.2 * (1 + 1e-6) and first < 0.02
+    (even,) = found.baselines
+    assert not even.within_limits and even.reason is not None and "path speed" in even.reason
+
+
+def test_the_certificate_finds_a_motion_that_is_too_slow() -> None:
+    free = cornered(path=replace(CORNERED, least_speed=None), arm=ARM)
+    found = optimize(free)
+    slowest = speeds_of(found)[1]
+    for share in (0.9, 1.1):
+        asked = replace(free, tool_path=replace(CORNERED, least_speed=share * slowest))
+        certificate = certify(asked, found.trajectory.spline, found.start.q, found.goal.q, found.energy)
+        assert certificate.worst_ratio["path_speed"] == pytest.approx(share, rel=2e-2)
+        assert certificate.valid == (share < 1)
+
+
+def test_a_least_speed_that_no_motion_keeps_says_so() -> None:
+    fast = replace(CORNERED, least_speed=2.0)
+    with pytest.raises(NoTrajectory) as refusal:
+        optimize(cornered(arm=ARM, path=fast))
+    (candidate,) = refusal.value.candidates
+    assert "path.speed.min" in candidate.reason and "% of the path" in candidate.reason
+
+
+def test_the_gradient_of_the_least_speed_is_that_of_its_slack() -> None:
+    prepared = PreparedProblem.of(cornered())
+    path = prepared.joint_path(HOME)
+    assert path is not None
+    retiming = PathRetiming(prepared, path, duration_intervals(prepared, path.control_points[-1])[0])
+    x = retiming.variables(np.linspace(0.0, 1.0, 50) ** 1.5, np.linspace(0.0, 2.0, 50))
+    program = RetimingProgram(retiming, prepared.arm.active_limits, np.ones(1), x)
+    state, step = program.state(x), 1e-6
+    differences = np.stack(
+        [(program.state(x + d).slack - program.state(x - d).slack) / (2 * step) for d in step * np.eye(len(x))], axis=1
+    )
+    assert np.abs(differences - state.slopes).max() < 1e-5 * np.abs(state.slopes).max()
+
+
 def test_a_given_duration_is_met() -> None:
     found = optimize(along(moved([0.0, 0.3, 0.0]), duration_min=1.7, duration_max=1.7))
     assert found.trajectory.spline.duration == pytest.approx(1.7) and found.certificate.valid
@@ -182,9 +244,11 @@ def test_an_obstacle_on_the_line_is_hit() -> None:
         ({"path": ToolPath(), "start": tcp_pose(HOME)}, "path"),
         ({"path": ToolPath(via=[moved([0.0, 0.2, 0.0])] * 2, blend=0.01)}, "path.via.1"),
         ({"path": ToolPath(via=[moved([0.0, 0.01, 0.0])], blend=0.05)}, "path.via.0"),
+        ({"path": ToolPath(least_speed=0.1, ramp=0.15)}, "path.speed.ramp"),
+        ({"path": ToolPath(least_speed=0.1), "arm": ARM.no_faster_than(0.101)}, "path.speed.min"),
         ({"start": AnyOf((HOME,))}, "start"),
     ],
-    ids=["no way", "a pose twice", "too near for the blend", "several targets"],
+    ids=["no way", "a pose twice", "too near for the blend", "all ramps", "no freedom", "several targets"],
 )
 def test_a_path_that_is_none_names_its_field(given: dict[str, Any], field: str) -> None:
     goal = tcp_pose(HOME) if field == "path" else moved([0.0, 0.2, 0.1])
@@ -204,6 +268,9 @@ def test_a_path_that_is_none_names_its_field(given: dict[str, Any], field: str) 
         ({"shape": "arc", "via": [moved([0.0, 0.2, 0.0])] * 2}, "path.via"),
         ({"position_tolerance": 1e-7}, "path.tolerance.position"),
         ({"rotation_tolerance": np.nan}, "path.tolerance.rotation"),
+        ({"least_speed": 0.0}, "path.speed.min"),
+        ({"least_speed": np.nan}, "path.speed.min"),
+        ({"ramp": 0.0}, "path.speed.ramp"),
     ],
     ids=str,
 )

@@ -180,12 +180,15 @@ class PathAttempt(Response):
     """How far the path can be followed from one arm configuration."""
 
     label: str = described("Branch: shoulder/elbow/wrist.", None, LABEL)
-    followed: float = described("Share of the path that is followed; of a line of a stop, from the stop.", "1", 0.62)
-    reason: Literal["unreachable", "singular", "outside_limits", "in_collision", "other_goal"] = described(
-        "What ends it: the next pose is out of reach; a joint would have to jump, at a singularity; a joint leaves its "
-        "range; the arm collides at the end; the path ends at other joint positions than those of `goal`.",
-        None,
-        "outside_limits",
+    followed: float = described("Share of the path that is followed; of a line, from the stop.", "1", 0.62)
+    reason: Literal["unreachable", "singular", "outside_limits", "in_collision", "other_goal", "other_line"] = (
+        described(
+            "What ends it: the next pose is out of reach; a joint would have to jump, at a singularity; a joint leaves "
+            "its range; the arm collides at the end; the path ends at other joint positions than those of `goal`; "
+            "another line or the path of the stop cannot be followed.",
+            None,
+            "outside_limits",
+        )
     )
 
 
@@ -196,7 +199,9 @@ class PathInfeasible(ProblemDetails):
     type: Literal["/problems/path-infeasible"] = fixed("type", "/problems/path-infeasible")
     title: Literal["Path infeasible"] = fixed("title", "Path infeasible")
     status: Literal[422] = fixed("status", 422)
-    path: str = described("`path`, or `stops/`, the name of the stop, and its line.", None, "stops/pick/approach")
+    path: str = described(
+        "`path`; or `stops/` and the name of the stop whose path it is, or with its line.", None, "stops/pick/approach"
+    )
     length: float = described("Length of the path; a radian of turning counts as a quarter of a metre.", "m", 0.08)
     attempts: list[PathAttempt] = part("Arm configurations at the start, the one that gets farthest first; at most 64.")
 

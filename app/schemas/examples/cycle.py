@@ -92,4 +92,39 @@ CYCLE_EXAMPLES: dict[str, Example] = {
             },
         },
     },
+    "glue_path": {
+        "summary": "A bead of glue on a part",
+        "description": "The nozzle comes down to the part, follows its edge at no more than 0.15 m/s, and lifts. Then "
+        "it is cleaned. The branch that follows the whole path is chosen together with all others.",
+        "value": {
+            "start": {"q": HOME},
+            "tcp": {"position": [0.0, 0.0, 0.12], "quaternion": [0.0, 0.0, 0.0, 1.0]},
+            "stops": [
+                {
+                    "name": "glue",
+                    "path": {
+                        "points": [
+                            {"position": [0.5, -0.15, 0.112], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+                            {"position": [0.5, 0.15, 0.112], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+                            {"position": [0.35, 0.15, 0.112], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+                        ],
+                        "blend": 0.03,
+                        "tolerance": {"position": 2e-4},
+                        "speed": 0.15,
+                    },
+                    "approach": {"direction": [0.0, 0.0, 1.0], "distance": 0.06},
+                    "retreat": {"direction": [0.0, 0.0, -1.0], "distance": 0.06},
+                    "obstacles_ignored": ["part"],
+                },
+                {"name": "clean", "target": _down(0.1, 0.5, 0.2), "dwell": 0.5},
+            ],
+            "windings": False,
+            "scene": {
+                "obstacles": [
+                    {"name": "table", "shape": "box", "size": [1.6, 1.6, 0.1], "pose": at(0.0, 0.0, -0.1)},
+                    {"name": "part", "shape": "box", "size": [0.24, 0.4, 0.1], "pose": at(0.42, 0.0, 0.05)},
+                ]
+            },
+        },
+    },
 }

@@ -6,7 +6,7 @@ import { follow, state } from "./store.js";
 
 const NAMES = {
   position: "position", velocity: "speed", acceleration: "acceleration", jerk: "jerk", torque: "torque", tool_cone: "tool cone",
-  tcp_speed: "TCP speed", elbow_speed: "elbow speed", path_position: "path, position", path_rotation: "path, turn",
+  tcp_speed: "TCP speed", elbow_speed: "elbow speed", path_position: "path, position", path_rotation: "path, turn", path_speed: "least path speed",
 };
 const FULL = 0.995; // share of a limit that counts as reached
 

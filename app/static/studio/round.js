@@ -51,20 +51,22 @@ function resting({ duration, start, electrical }) {
   return { t, q: of(start.q), v: of(still), a: of(still), tau: of(still), tau_motor: of(still), power: of(electrical / (duration || 1)) };
 }
 
+const legName = ({ kind, start, goal }) => (kind === "move" ? `${start.stop} → ${goal.stop}` : `${kind} at ${goal.stop}`);
+
 function draw() {
   const { round } = state;
   $("round").hidden = !round;
   if (!round) return;
   const most = Math.max(...round.legs.map(({ electrical, duration }) => electrical / (duration || Infinity)));
   const legs = round.legs.map((leg) => {
-    const name = leg.kind === "move" ? `${leg.start.stop} → ${leg.goal.stop}` : `${leg.kind} at ${leg.goal.stop}`;
+    const name = legName(leg);
     const text = `${name}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
     const button = el("button", { type: "button", class: `leg ${leg.kind}`, title: text, "aria-label": text, onclick: () => goTo(leg.t0) }, el("span", {}, figure(leg.electrical)));
     button.style.flexGrow = leg.duration;
     button.style.setProperty("--height", `${(100 * leg.electrical) / (leg.duration || 1) / most}%`);
     return button;
   });
-  const rows = round.legs.filter(({ kind }) => kind === "move").map((leg) => el("tr", {}, el("td", {}, `${leg.start.stop} → ${leg.goal.stop}`),
+  const rows = round.legs.filter(({ kind }) => kind === "move" || kind === "path").map((leg) => el("tr", {}, el("td", {}, legName(leg)),
     [leg.duration, leg.electrical, leg.lower_bound].map((value) => el("td", { class: "number" }, figure(value)))));
   const head = el("tr", {}, ["move", "time s", "energy J", "bound J"].map((name) => el("th", {}, name)));
   $("timeline").replaceChildren(el("div", { class: "legs", role: "group", "aria-label": "Legs of the round" }, legs),

@@ -192,61 +192,6 @@ def test_a_round_that_cannot_be_so_fast_says_how_fast_it_can_be(client: TestClie
     assert 1.0 < problem["shortest"] <= answer["duration"]
 
 
-LINES = {
-    "approach": {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
-    "retreat": {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 0.06, "speed": 0.3},
-}
-
-
-def with_lines(**fields: Any) -> dict[str, Any]:
-    """The round of `a_round`, its first stop with lines."""
-    content = a_round()
-    content["stops"][0] |= LINES | fields
-    return content
-
-
-def test_lines_are_legs_of_their_own(client: TestClient) -> None:
-    reply = client.post("/cycle", json=with_lines())
-    assert reply.status_code == 200, reply.text
-    CycleResponse.model_validate_json(reply.content)
-    content = reply.json()
-    assert [(leg["kind"], leg["goal"]["stop"]) for leg in content["legs"]][:4] == [
-        ("move", "pick/approach"),
-        ("line", "pick"),
-        ("dwell", "pick"),
-        ("line", "pick/retreat"),
-    ]
-    worst = content["certificate"]["worst_ratio"]
-    assert 0 < worst["path_position"] <= 1 and 0.9 < worst["tcp_speed"] <= 1 + 1e-6
-    line = OptimizeResponse.model_validate(client.get(content["legs"][3]["answer"]).json()["answer"])
-    assert line.certificate.worst_ratio.path_rotation is not None
-
-
-@pytest.mark.parametrize(
-    ("fields", "where"),
-    [
-        ({"approach": {"direction": [0.0, 0.0, 0.0], "distance": 0.1}}, ["approach", "direction"]),
-        ({"approach": {"direction": [0.0, 0.0, 1.0]}}, ["approach", "distance"]),
-        ({"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 9.0}}, ["retreat", "distance"]),
-        ({"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 0.1, "frame": "world"}}, ["retreat", "frame"]),
-        ({"obstacles_ignored": ["part"]}, ["obstacles_ignored"]),
-    ],
-)
-def test_a_wrong_line_names_its_field(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:
-    reply = client.post("/cycle", json=with_lines(**fields))
-    assert reply.status_code == 422
-    assert reply.json()["errors"][0]["loc"] == ["body", "stops", 0, *where]
-
-
-def test_a_line_that_no_configuration_follows_says_how_far_each_gets(client: TestClient) -> None:
-    far = {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 1.8}
-    reply = client.post("/cycle", json=with_lines(retreat=far))
-    problem = reply.json()
-    assert (reply.status_code, problem["type"]) == (422, "/problems/path-infeasible")
-    assert problem["path"] == "stops/pick/retreat" and problem["length"] == pytest.approx(1.8)
-    assert len(problem["attempts"]) == 8 and all(0 < each["followed"] < 1 for each in problem["attempts"])
-
-
 def test_a_free_order_is_told(client: TestClient) -> None:
     content = a_round(order="free", together=[["pick", "place"]])
     content["stops"].append({"name": "look", "target": down(0.3, 0.3, 0.4)})

@@ -18,7 +18,6 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene
 from optimizer.problem.stops import Stop
-from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_search import layers_of
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
@@ -44,9 +43,9 @@ def test_the_tool_comes_and_leaves_straight() -> None:
     asked = with_lines(pick_and_place(1, 2, windings=False))
     found = optimize_round(asked)
     assert_true(asked, found)
-    assert [move.planned.line is not None for move in found.moves] == [False, True, True] * 2 + [False]
+    assert [move.planned.tool_path is not None for move in found.moves] == [False, True, True] * 2 + [False]
     for move in found.moves:
-        if move.planned.line is None:
+        if move.planned.tool_path is None:
             continue
         into = move.planned.goal in ("stop 0", "stop 1")
         spline = move.solution.trajectory.spline
@@ -78,7 +77,7 @@ def test_it_is_the_least_over_all_configurations_of_the_stop() -> None:
         ends = [HOME, *(layer.q[node] for layer in layers[1:]), HOME]
         total = 0.0
         for move, q_start, q_goal in zip(asked.moves, ends, ends[1:], strict=False):
-            path = None if move.line is None else ToolPath()
+            path = move.tool_path
             task = Problem(arm=move.arm, start=q_start, goal=q_goal, tool_path=path, windings=False, deadline=AMPLE)
             total += optimize(task).energy.electrical.total
         energies.append(total)

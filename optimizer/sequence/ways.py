@@ -1,0 +1,144 @@
+"""The layers of a stop with ways of the TCP that are given, lines and a path: the configurations from which the arm can
+follow all of them, and those to which they lead.
+
+A way leads from each configuration to one other, so a node of one place has one node at each of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Array, Mask
+from optimizer.exceptions import InvalidProblem, PathAttempt, PathInfeasible
+from optimizer.kinematics.course_tracing import Trace, traces
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.line import Line
+from optimizer.problem.problem import Problem
+from optimizer.problem.stop_path import StopPath, at_stop
+from optimizer.problem.stops import APPROACH, RETREAT, Stop
+from optimizer.problem.tool_path import ToolPath
+from optimizer.problem.work_round import WorkRound
+from optimizer.search.end_feasibility import check_configurations
+from optimizer.search.ends import EndConfiguration, label_of
+from optimizer.search.path_ends import attempt_of
+from optimizer.sequence.layers import Layer, arms_at
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A way from the place `origin` of a stop to the place `end`: its path; or a line, on the side of the `sign`."""
+
+    origin: str
+    end: str
+    path: StopPath | None = None
+    line: Line | None = None
+    sign: float = 1.0
+
+    def course(self, T: Array) -> ToolCourse:
+        """The course from the pose T (4, 4). Raises InvalidProblem, as `ToolCourse.of`."""
+        if self.path is not None:
+            return ToolCourse.of(self.path.path, T, self.path.goal.T)
+        assert self.line is not None
+        T_end = T.copy()
+        T_end[:3, 3] += self.sign * self.line.shift(T)
+        return ToolCourse.of(ToolPath(), T, T_end)
+
+
+def layers_with_ways(asked: WorkRound, k: int, at: Layer) -> list[Layer]:
+    """The layers of the places of stop `k` in their order, from that of its target, `at`.
+
+    Raises PathInfeasible if no configuration is left; InvalidProblem for a path through poses that make none.
+    """
+    stop = asked.stops[k]
+    layers, kept = {stop.entry: at}, np.ones(len(at.q), dtype=bool)
+    for way in _ways(stop):
+        origin = layers[way.origin]
+        try:
+            found, length = _followed(asked, way, origin.ends)
+        except InvalidProblem as error:
+            raise at_stop(k, error) from None
+        layers[way.end] = _end_of(asked, origin, way.end, found)
+        follows, blocked = _nodes_that_follow(asked, stop, origin, layers[way.end], found)
+        if not (kept & follows).any():
+            attempts = _attempts(asked, origin, found, blocked, follows)
+            raise PathInfeasible(length, attempts, layers[way.end].name)
+        kept &= follows
+    return [_only(layers[place], kept) for place in stop.places]
+
+
+def _ways(stop: Stop) -> Iterator[_Way]:
+    """The ways of a stop, each from a place to which those before lead."""
+    if stop.path is not None:
+        yield _Way(stop.entry, stop.name, path=stop.path)
+    if stop.approach is not None:
+        yield _Way(stop.entry, stop.name + APPROACH, line=stop.approach, sign=-1.0)
+    if stop.retreat is not None:
+        yield _Way(stop.name, stop.name + RETREAT, line=stop.retreat)
+
+
+def _followed(asked: WorkRound, way: _Way, ends: list[EndConfiguration]) -> tuple[list[Trace], float]:
+    """The way as it is followed from each of `ends`, and its length [m].
+
+    Those that reach the same target have the same course.
+    """
+    found: dict[int, Trace] = {}
+    length = 0.0
+    for target in {end.target for end in ends}:
+        own = [k for k, end in enumerate(ends) if end.target == target]
+        q = np.array([ends[k].q for k in own])
+        course = way.course(tcp_pose(asked.arm, q[0]))
+        length = course.length
+        found |= dict(zip(own, traces(asked.arm, course, q), strict=True))
+    return [found[k] for k in range(len(ends))], length
+
+
+def _end_of(asked: WorkRound, origin: Layer, place: str, found: list[Trace]) -> Layer:
+    """The layer of the end of a way; a configuration whose way ends early has that of its last point."""
+    q = np.array([trace.q[-1] for trace in found])
+    ends = [
+        EndConfiguration(label_of(asked.arm.robot, reached), reached, [[x] for x in reached.tolist()], True, end.target)
+        for reached, end in zip(q, origin.ends, strict=True)
+    ]
+    moved = (q - np.array([end.q for end in origin.ends]))[origin.end]
+    complete = origin.complete and not origin.sampled
+    return replace(origin, name=f"stops/{place}", ends=ends, q=origin.q + moved, complete=complete)
+
+
+def _nodes_that_follow(
+    asked: WorkRound, stop: Stop, origin: Layer, end: Layer, found: list[Trace]
+) -> tuple[Mask, Mask]:
+    """The nodes (n,) from which all of a way is followed; and the ends (e,) in which the arm cannot be."""
+    limits = asked.arm.active_limits
+    reach = np.array([[(trace.q - trace.q[0]).min(axis=0), (trace.q - trace.q[0]).max(axis=0)] for trace in found])
+    low, high = origin.q + reach[origin.end, 0], origin.q + reach[origin.end, 1]
+    inside = ((low >= limits.q_min) & (high <= limits.q_max)).all(axis=1)
+    problems = [
+        Problem(arm=arm, start=stop.target, goal=stop.target) for arm in arms_at(asked, end.name.removeprefix("stops/"))
+    ]
+    q = np.array([each.q for each in end.ends])
+    ruled = [check_configurations(PreparedProblem.of(problem), q) for problem in problems]
+    blocked = np.array([any(cause is not None for cause in causes) for causes in zip(*ruled, strict=True)])
+    whole = np.array([trace.obstacle is None for trace in found])
+    return inside & (whole & ~blocked)[origin.end], blocked
+
+
+def _attempts(asked: WorkRound, origin: Layer, found: list[Trace], blocked: Mask, follows: Mask) -> list[PathAttempt]:
+    """How far each configuration gets on a way, and what stops it there."""
+    attempts = list[PathAttempt]()
+    for k, (end, trace) in enumerate(zip(origin.ends, found, strict=True)):
+        attempt = attempt_of(asked.arm.active_limits, end, trace)
+        if follows[origin.end == k].any():
+            attempt = replace(attempt, followed=1.0, reason="other_line")
+        elif blocked[k] and trace.obstacle is None:
+            attempt = replace(attempt, followed=1.0, reason="in_collision")
+        attempts.append(attempt)
+    return attempts
+
+
+def _only(layer: Layer, kept: Mask) -> Layer:
+    return replace(layer, q=layer.q[kept], end=layer.end[kept], turns=layer.turns[kept])

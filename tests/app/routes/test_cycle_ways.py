@@ -1,0 +1,150 @@
+"""POST /cycle with lines and paths of the TCP at its stops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.schemas.cycle import CycleResponse
+from app.schemas.response import OptimizeResponse
+from tests.app.routes.test_cycle import a_round, down
+
+LINES = {
+    "approach": {"direction": [0.0, 0.0, 1.0], "distance": 0.08},
+    "retreat": {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 0.06, "speed": 0.3},
+}
+
+
+def with_lines(**fields: Any) -> dict[str, Any]:
+    """The round of `a_round`, its first stop with lines."""
+    content = a_round()
+    content["stops"][0] |= LINES | fields
+    return content
+
+
+def test_lines_are_legs_of_their_own(client: TestClient) -> None:
+    reply = client.post("/cycle", json=with_lines())
+    assert reply.status_code == 200, reply.text
+    CycleResponse.model_validate_json(reply.content)
+    content = reply.json()
+    assert [(leg["kind"], leg["goal"]["stop"]) for leg in content["legs"]][:4] == [
+        ("move", "pick/approach"),
+        ("line", "pick"),
+        ("dwell", "pick"),
+        ("line", "pick/retreat"),
+    ]
+    worst = content["certificate"]["worst_ratio"]
+    assert 0 < worst["path_position"] <= 1 and 0.9 < worst["tcp_speed"] <= 1 + 1e-6
+    line = OptimizeResponse.model_validate(client.get(content["legs"][3]["answer"]).json()["answer"])
+    assert line.certificate.worst_ratio.path_rotation is not None
+
+
+@pytest.mark.parametrize(
+    ("fields", "where"),
+    [
+        ({"approach": {"direction": [0.0, 0.0, 0.0], "distance": 0.1}}, ["approach", "direction"]),
+        ({"approach": {"direction": [0.0, 0.0, 1.0]}}, ["approach", "distance"]),
+        ({"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 9.0}}, ["retreat", "distance"]),
+        ({"retreat": {"direction": [0.0, 0.0, 1.0], "distance": 0.1, "frame": "world"}}, ["retreat", "frame"]),
+        ({"obstacles_ignored": ["part"]}, ["obstacles_ignored"]),
+    ],
+)
+def test_a_wrong_line_names_its_field(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:
+    reply = client.post("/cycle", json=with_lines(**fields))
+    assert reply.status_code == 422
+    assert reply.json()["errors"][0]["loc"] == ["body", "stops", 0, *where]
+
+
+def test_a_line_that_no_configuration_follows_says_how_far_each_gets(client: TestClient) -> None:
+    far = {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 1.8}
+    reply = client.post("/cycle", json=with_lines(retreat=far))
+    problem = reply.json()
+    assert (reply.status_code, problem["type"]) == (422, "/problems/path-infeasible")
+    assert problem["path"] == "stops/pick/retreat" and problem["length"] == pytest.approx(1.8)
+    assert len(problem["attempts"]) == 8 and all(0 < each["followed"] < 1 for each in problem["attempts"])
+
+
+POINTS = [
+    {"position": [0.45, -0.25, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+    {"position": [0.45, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+    {"position": [0.3, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
+]
+
+
+def with_path(**fields: Any) -> dict[str, Any]:
+    """One stop with a path, lines to it and from it, and a dwell."""
+    speed = {"min": 0.1, "max": 0.3}
+    stop = {"name": "glue", "path": {"points": POINTS, "blend": 0.03, "speed": speed} | fields, "dwell": 0.2, **LINES}
+    return a_round(stops=[stop])
+
+
+def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
+    reply = client.post("/cycle", json=with_path())
+    assert reply.status_code == 200, reply.text
+    CycleResponse.model_validate_json(reply.content)
+    content = reply.json()
+    legs = content["legs"]
+    assert [(leg["kind"], leg["goal"]["stop"]) for leg in legs] == [
+        ("move", "glue/approach"),
+        ("line", "glue/entry"),
+        ("path", "glue"),
+        ("dwell", "glue"),
+        ("line", "glue/retreat"),
+        ("move", "start"),
+    ]
+    assert content["order"] == ["glue"] and legs[2]["lower_bound"] <= legs[2]["electrical"]
+    path = client.get(legs[2]["answer"]).json()["answer"]
+    worst = path["certificate"]["worst_ratio"]
+    assert 0 < worst["path_position"] <= 1 and 0 < worst["path_speed"] <= 1 + 1e-6
+    assert path["arm"]["limits"]["tcp_speed"] == 0.3
+    program = client.post("/export/json", json={"answer": content})
+    assert program.status_code == 200, program.text
+    table = client.post("/cycle", json=with_path(), headers={"accept": "text/csv"}).text.splitlines()
+    assert {row.split(",")[2] for row in table[1:]} == {"move", "line", "path", "dwell"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "where"),
+    [
+        ({"points": POINTS[:1]}, ["path", "points"]),
+        ({"points": [POINTS[0], POINTS[0], POINTS[1]]}, ["path", "points", 1]),
+        ({"points": [POINTS[0], POINTS[1], POINTS[1]]}, ["path"]),
+        ({"blend": 0.0}, ["path", "blend"]),
+        ({"blend": 0.2}, ["path"]),
+        ({"shape": "arc", "blend": 0.0, "points": POINTS[:2]}, ["path", "points"]),
+        ({"speed": 0.0}, ["path", "speed"]),
+        ({"speed": "fast"}, ["path", "speed"]),
+        ({"speed": {"min": 0.3, "max": 0.3}}, ["path", "speed"]),
+        ({"speed": {"min": 0.3, "ramp": 0.4}}, ["path", "speed", "ramp"]),
+        ({"tolerance": {"position": 0.0}}, ["path", "tolerance", "position"]),
+    ],
+    ids=[
+        "one",
+        "twice",
+        "the end twice",
+        "sharp",
+        "too near",
+        "no arc",
+        "speed",
+        "word",
+        "no range",
+        "all ramps",
+        "tolerance",
+    ],
+)
+def test_a_wrong_path_names_its_field(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:
+    reply = client.post("/cycle", json=with_path(**fields))
+    assert reply.status_code == 422
+    assert reply.json()["errors"][0]["loc"] == ["body", "stops", 0, *where]
+
+
+@pytest.mark.parametrize("fields", [{"target": down(0.4, 0.0, 0.2)}, {"path": None}], ids=["both", "neither"])
+def test_a_stop_has_a_target_or_a_path(client: TestClient, fields: dict[str, Any]) -> None:
+    content = with_path()
+    content["stops"][0] |= fields
+    reply = client.post("/cycle", json=content)
+    assert reply.status_code == 422
+    (error,) = reply.json()["errors"]
+    assert error["loc"] == ["body", "stops", 0] and "exactly one" in error["msg"]
