@@ -6,7 +6,8 @@ held (wrist). The first are solutions like any other. The second are members of 
 `InverseKinematics` is the interface; `inverse_kinematics_for` chooses its implementation for a robot. For six joints
 they are the closed form of Universal Robots' arms in `ur_closed_form`, then that of `decomposition` for arms with three
 axes that are parallel or meet, then Newton's method from many starts (`multi_start`), which may miss branches. For
-seven joints it is that of arms with a spherical shoulder, which hold every pose on self-motions, in `redundant_arm`.
+seven joints, which hold every pose on self-motions, it is that of arms with a spherical shoulder in `redundant_arm`,
+then self-motions that are followed point by point (`traced_arm`), of which some may be missed.
 For any other arm it returns None: such an arm takes joint positions as targets, not poses.
 """
 
@@ -25,10 +26,12 @@ from models.robot import MOST_ROBOTS, Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.decomposition import DecomposedArm
+from optimizer.kinematics.isolated import distinct
 from optimizer.kinematics.multi_start import MultiStart
 from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
+from optimizer.kinematics.traced_arm import TracedArm
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
 from optimizer.problem.branches import BranchLabel
 
@@ -118,7 +121,8 @@ class InverseKinematics(Protocol):
 def inverse_kinematics_for(robot: Robot) -> InverseKinematics | None:
     """The robot's inverse kinematics, built once; None for an arm that has none here."""
     model = robot.model
-    form = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model) or MultiStart.of(model)
+    exact = URClosedForm.of(model) or DecomposedArm.of(model) or RedundantArm.of(model)
+    form = exact or MultiStart.of(model) or TracedArm.of(model)
     return None if form is None else ClosedFormInverseKinematics(robot, form)
 
 
@@ -207,11 +211,15 @@ class ClosedFormInverseKinematics:
         # never a wrong answer: a solution that forward kinematics does not confirm is dropped
         position = np.linalg.norm(T_reached[:, :3, 3] - T[:3, 3], axis=1)
         rotation = np.linalg.norm(T_reached[:, :3, :3] - T[:3, :3], axis=(1, 2)) / np.sqrt(2)
-        confirmed = np.maximum(position, rotation) < ACCURACY
+        missed = np.maximum(position, rotation)
+        chosen = np.flatnonzero(missed < ACCURACY)
+        if len(motions) > 1:
+            # two of a redundant arm's curves meet at an end that both have
+            chosen = chosen[distinct(q[chosen], missed[chosen])]
         q.setflags(write=False)
         return [
             PrincipalSolution(q[k], found[k][1], singular_values[k], self._form.singular_parts(q[k]), found[k][2])
-            for k in np.flatnonzero(confirmed).tolist()
+            for k in chosen.tolist()
         ]
 
     def solve(

@@ -15,9 +15,9 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf, Target
 from optimizer.search.candidates import Candidate
-from optimizer.search.free_goal_bound import ROUNDS, family_bound
+from optimizer.search.free_goal_bound import ROUNDS, TIGHT_ROUNDS, family_bound
 from optimizer.search.lower_bound import LeastBound
-from optimizer.search.self_motion_bound import EndCurves
+from optimizer.search.self_motion_bound import EndCurves, self_motion_bound
 
 
 def all_known(problem: Problem) -> bool:
@@ -26,22 +26,23 @@ def all_known(problem: Problem) -> bool:
     return (kinematics is None or kinematics.complete) or not (_poses(problem.start) + _poses(problem.goal))
 
 
-def bound_of_missed(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
-    """Lower bound [J] on the motions from or to branches that may have been missed; inf if all are known.
+def bound_of_others(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
+    """Lower bound [J] on the motions between poses in configurations that are none of the candidates; inf if there are
+    none.
 
-    From given joint positions it is that of the motions to the goal poses with any rotation about their z axes, by
-    boxes of joint positions that need no inverse kinematics. From poses it is that of the motions between any two
-    configurations.
+    If all branches are known, the others are on self-motions. Else they may be anywhere. From given joint positions
+    the bound is then that of the motions to the goal poses with any rotation about their z axes, by boxes of joint
+    positions that need no inverse kinematics. From poses it is that of the motions between any two configurations.
     """
     problem = prepared.problem
     if all_known(problem):
-        return np.inf
+        return self_motion_bound(prepared, candidates, deadline)
     if _poses(problem.start):
         return _bound_of_any(prepared)
     poses = [ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)]
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
-    rounds = max(1, ROUNDS // len(poses))
+    rounds = max(1, (TIGHT_ROUNDS if problem.bound == "tight" else ROUNDS) // len(poses))
     return min(family_bound(prepared, pose, starts, rounds, deadline, half) for pose in poses)
 
 

@@ -16,8 +16,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.targets import Target
 from optimizer.search.candidates import Candidate, bound, pairs
 from optimizer.search.ends import EndConfiguration, ends, label_of
-from optimizer.search.missed_branches import bound_of_missed
-from optimizer.search.self_motion_bound import self_motion_bound
+from optimizer.search.missed_branches import bound_of_others
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6
@@ -59,7 +58,7 @@ def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadl
     candidates = pairs(free, starts, goals)
     bound(free, candidates)
     others = (each.lower_bound for each in candidates if not each.sampled and not _is_among(each, followed))
-    return min([self_motion_bound(free, candidates, deadline), bound_of_missed(free, candidates, deadline), *others])
+    return min([bound_of_others(free, candidates, deadline), *others])
 
 
 def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:

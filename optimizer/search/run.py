@@ -25,11 +25,10 @@ from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
-from optimizer.search.missed_branches import all_known, bound_of_missed
+from optimizer.search.missed_branches import all_known, bound_of_others
 from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.refinement import compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
-from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.search.tight_bound import tighten
 from optimizer.solution import (
     Baseline,
@@ -270,8 +269,7 @@ class Run:
         # rules all of it out
         family = min(
             family_bound_of(prepared, candidates, incumbent.deadline, objective),
-            self_motion_bound(prepared, candidates, incumbent.deadline),
-            bound_of_missed(prepared, candidates, incumbent.deadline),
+            bound_of_others(prepared, candidates, incumbent.deadline),
         )
         beside = np.inf
         if self.problem.tool_path is not None:

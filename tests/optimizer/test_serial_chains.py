@@ -31,7 +31,7 @@ from tests.optimizer import moves
 from tests.optimizer.chains import move, serial_chain
 from tests.selection import long_but
 
-JOINTS = (2, 3, 5, 7)
+JOINTS = (2, 3, 5, 8)
 OBJECTIVES: dict[str, dict[str, Any]] = {"electrical": {}, "mechanical": {"duration_max": 1.5}}
 # relative, of the energy: a sum over this many equal steps, of powers that have corners where they change sign
 STEPS, SUMMED = 20001, 1e-3

@@ -26,7 +26,7 @@ def test_robots(client: TestClient) -> None:
     # other tests add robots of their own
     robots = [robot for robot in robots if not robot.added]
     assert [robot.name for robot in robots] == list(robot_names())
-    assert {robot.name for robot in robots if len(robot.joints) == 7} == {"fr3", "iiwa14", "panda", "xarm7"}
+    assert {robot.name for robot in robots if len(robot.joints) == 7} == {"fr3", "gen3", "iiwa14", "panda", "xarm7"}
     # copper loss of the one is a rule's, of the other a sister robot's: no reader may miss that
     trust = {robot.name: robot.energy_trust for robot in robots}
     assert "engineering defaults without a source (copper loss" in trust["ur3e"]

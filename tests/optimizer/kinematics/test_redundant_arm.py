@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +13,7 @@ from models.robot import Array, Robot
 from optimizer.exceptions import UnreachablePose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.free_turn import LOOPS, FreeTurn
-from optimizer.kinematics.inverse import inverse_kinematics_for, required_inverse_kinematics
+from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.redundant_curve import RedundantCurve
 from tests.optimizer.chains import serial_chain
@@ -250,9 +249,9 @@ def test_poses_out_of_reach_say_by_how_much(robot: Robot) -> None:
 
 
 def test_arms_of_another_form_have_none() -> None:
-    assert inverse_kinematics_for(serial_chain(7)) is None
+    assert RedundantArm.of(serial_chain(7).model) is None
     robot = load_robot("panda")
     for joint in (2, 3, 6):
         model = robot.model.copy()
         model.jointPlacements[joint].translation += np.array([1e-4, 2e-4, 3e-4])
-        assert inverse_kinematics_for(replace(robot, model=model)) is None
+        assert RedundantArm.of(model) is None

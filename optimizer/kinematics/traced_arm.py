@@ -1,0 +1,125 @@
+"""Inverse kinematics of any seven-joint arm: the curves of configurations that hold a pose, followed point by point.
+
+Starts near the pose come from a table of configurations inside the joint ranges (`seed_table`), Newton's method leads
+them onto curves, and each curve is followed all around (`curve_tracing`). A curve that no start leads to is missed, and
+so may be what passes a singularity: nothing here is `complete`.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+
+from models.robot import Array, Limits
+from optimizer.deadline import checkpoint
+from optimizer.exceptions import SingularPose
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.chain import Chain
+from optimizer.kinematics.curve_tracing import TracedPath, traced
+from optimizer.kinematics.newton import solved
+from optimizer.kinematics.seed_table import SeedTable
+from optimizer.kinematics.traced_curve import TracedCurve
+from optimizer.problem.branches import BranchLabel, NumberedBranch
+
+JOINTS = 7
+# Newton steps of a start, and its error [m, rad] from which on it is on a curve; if none is, few starts get more steps
+STEPS, SOLVED, FEW, MOST_STEPS = 12, 1e-9, 24, 60
+# error [m, rad] after many steps of a pose at the edge of reach
+ON_EDGE = 1e-6
+# smallest singular value below which no curve is followed: configurations may go off in several directions
+SINGULAR = 1e-4
+# poses whose curves are kept
+KEPT = 32
+# phases [rad] of the waves that order curves: one for each joint, so that mirrored curves differ
+PHASES = np.arange(1.0, JOINTS + 1)
+
+
+class TracedArm:
+    """`ClosedForm` of an arm with one joint too many and without a closed form. It has no isolated configurations."""
+
+    complete = False
+
+    def __init__(self, chain: Chain, seeds: SeedTable) -> None:
+        self._chain, self._seeds = chain, seeds
+        self._found = lru_cache(maxsize=KEPT)(self._curves)
+
+    @classmethod
+    def of(cls, model: pin.Model) -> TracedArm | None:
+        """The inverse kinematics of a Pinocchio model with a frame `flange`; None if it has not seven joints."""
+        if model.nq != JOINTS:
+            return None
+        chain, q_min, q_max = Chain.of(model), model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
+        turns = q_max / 2 - q_min / 2 >= np.pi
+        return cls(chain, SeedTable(chain, np.where(turns, -np.pi, q_min), np.where(turns, np.pi, q_max)))
+
+    def label(self, q: Array) -> NumberedBranch:
+        """The number of the curve nearest to a configuration (7,) [rad] among those of its pose; 1 if it has none."""
+        try:
+            curves = self.self_motions(self._chain.flange(q[None])[0])
+        except SingularPose:
+            return NumberedBranch(1)
+        away = [float(np.abs(wrapped(each.at(np.array([each.parameter(q)]))[0] - q)).max()) for each in curves]
+        return NumberedBranch(int(np.argmin(away)) + 1 if away else 1)
+
+    def singular_parts(self, q: Array) -> tuple[str, ...]:
+        """None: the branches have no parts."""
+        return ()
+
+    def solve(self, T: Array) -> tuple[Array, list[BranchLabel]]:
+        """No configuration: all are on self-motions."""
+        return np.zeros((0, JOINTS)), []
+
+    def self_motions(self, T: Array, limits: Limits | None = None) -> list[TracedCurve]:
+        """The curves that were found to hold the flange at T (4, 4), cut to the limits.
+
+        Raises SingularPose if T was reached in singular configurations only, which no curve leads away from.
+        """
+        curves = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
+        if limits is None:
+            return curves
+        cut = (each.within(limits.q_min, limits.q_max) for each in curves)
+        return [each for each in cut if each is not None]
+
+    def distance_to_reach(self, T: Array) -> None:
+        """None: not known."""
+        return
+
+    def _curves(self, matrix: bytes) -> list[TracedCurve]:
+        T = np.frombuffer(matrix).reshape(4, 4)
+        checkpoint()
+        starts = self._seeds.starts(T)
+        q, missed = solved(self._chain, starts, T, STEPS)
+        if not (missed < SOLVED).any():
+            # next to a singularity Newton's method is slow
+            q, missed = solved(self._chain, starts[:FEW], T, MOST_STEPS)
+        # what Newton's method nearly reaches after many steps is on a singularity
+        q = q[missed < (SOLVED if (missed < SOLVED).any() else ON_EDGE)]
+        smallest = np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
+        regular = smallest > SINGULAR
+        if len(q) and not regular.any():
+            raise SingularPose("goal", float(smallest.min()))
+        paths = sorted(traced(self._chain, q[regular], T), key=_place)
+        found: list[TracedCurve] = []
+        for path in paths:
+            # where a curve bends, one start may pass another unseen
+            if not any(each.passes(path.q[0]) for each in found):
+                found.append(TracedCurve.of(self._chain, T, path, NumberedBranch(len(found) + 1)))
+        return found
+
+
+def _place(path: TracedPath) -> float:
+    """A number that tells where a curve is, but not where its start is: curves are ordered by it.
+
+    It is the mean of a sum of waves along the curve, which full turns do not change.
+    """
+    q, tangents = np.array(path.q), np.array(path.tangents)
+    wave = np.sin(q + PHASES).sum(axis=1)
+    if len(q) == 1:
+        return float(wave[0])
+    slope = (np.cos(q + PHASES) * tangents).sum(axis=1)
+    length = np.linalg.norm(np.diff(q, axis=0), axis=1)
+    # the trapezoidal rule with its end correction
+    parts = length / 2 * (wave[1:] + wave[:-1]) - length**2 / 12 * np.diff(slope)
+    return float(parts.sum() / length.sum())

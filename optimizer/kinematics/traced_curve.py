@@ -1,0 +1,204 @@
+"""A self-motion that is known by points along it: cubics between them, which Newton's method leads onto the curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.robot import Array, Mask
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.chain import Chain, miss, pose_error
+from optimizer.kinematics.curve_tracing import TracedPath
+from optimizer.kinematics.hermite import hermite
+from optimizer.problem.branches import BranchLabel
+
+# half the range of the parameter of a curve with two ends: no full turn, whose ends would be one
+OPEN = 3.0
+# Newton steps onto the curve, the error [m, rad] that needs no more, and what is added to J Jᵀ there
+CORRECTIONS, EXACT, DAMPING = 4, 1e-14, 1e-18
+# points of each piece at which a curve is held against limits, and steps that find where it crosses them
+POINTS, CROSSINGS = 4, 8
+# steps that find the member nearest to a configuration, the distance [rad] that needs no more, and the difference of
+# parameters for its derivative
+NEAREST, FOUND, STEP = 6, 1e-10, 1e-6
+# distance [rad] from the cubics within which a member is, and from the curve at which a configuration is one
+BESIDE, SAME = 0.05, 1e-5
+# rounding of an angle on a limit [rad]
+ROUNDING = 1e-9
+# how much faster [1] a joint may turn between points than on the way from one to the next
+FASTER = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class TracedCurve:
+    """`SelfMotion` by configurations `nodes` (m, nq) [rad] with unit `tangents` (m, nq) at parameters `knots` (m,).
+
+    The parameter goes evenly with the length of the curve: from -π to π once around, or from -OPEN to OPEN.
+    `arcs` are the intervals of it that are meant: all of it, or what is within limits.
+    """
+
+    chain: Chain
+    T: Array
+    nodes: Array
+    tangents: Array
+    knots: Array
+    closed: bool
+    label: BranchLabel
+    arcs: list[tuple[float, float]]
+
+    @classmethod
+    def of(cls, chain: Chain, T: Array, path: TracedPath, label: BranchLabel) -> TracedCurve:
+        """The whole curve, which holds the flange at T (4, 4)."""
+        nodes = np.array(path.q)
+        length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1)))
+        half = np.pi if path.closed else OPEN if len(nodes) > 1 else 0.0
+        knots = half * (2 * length / max(length[-1], 1e-300) - 1)
+        return cls(chain, T, nodes, np.array(path.tangents), knots, path.closed, label, [(-half, half)])
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Indices of the joints that move."""
+        return tuple(np.flatnonzero(np.ptp(self.nodes, axis=0) > ROUNDING).tolist())
+
+    def at(self, parameter: Array) -> Array:
+        """The configurations (n, nq) [rad] at parameters (n,) on the arcs."""
+        q = self._between(np.asarray(parameter, dtype=float))
+        rows = np.arange(len(q))
+        for _ in range(CORRECTIONS):
+            T_reached, jacobian = self.chain.flange_and_jacobian(q[rows])
+            error = pose_error(T_reached, self.T)
+            off = miss(error) > EXACT
+            rows, error, jacobian = rows[off], error[off], jacobian[off]
+            if not len(rows):
+                break
+            across = jacobian.transpose(0, 2, 1)
+            square = jacobian @ across + DAMPING * np.eye(6)
+            q[rows] += (across @ np.linalg.solve(square, error[:, :, None]))[:, :, 0]
+        return np.clip(wrapped(q), -np.pi, np.pi)
+
+    def _between(self, u: Array) -> Array:
+        """The curve (n, nq) [rad] at parameters (n,), nearly."""
+        if len(self.knots) == 1:
+            return np.repeat(self.nodes, len(u), axis=0)
+        if self.closed:
+            u = wrapped(u)
+        k = np.clip(np.searchsorted(self.knots, u, side="right") - 1, 0, len(self.knots) - 2)
+        share = (u - self.knots[k]) / (self.knots[k + 1] - self.knots[k])
+        return self._on_piece(k, share)
+
+    def _on_piece(self, k: NDArray[np.intp], share: Array) -> Array:
+        """Points (n, nq) [rad] at shares (n,) of pieces k (n,) of the curve."""
+        q0, q1 = self.nodes[k], self.nodes[k + 1]
+        way = np.linalg.norm(q1 - q0, axis=1)[:, None]
+        return hermite(share, q0, q1, way * self.tangents[k], way * self.tangents[k + 1])
+
+    def parameter(self, q: Array) -> float:
+        """The parameter of the member nearest to q (nq,) [rad], nearly."""
+        u = self._nearest(q)
+        best, least = u, np.inf
+        for _ in range(NEAREST):
+            before, here, after = self.at(np.array([u - STEP, u, u + STEP]))
+            gap = wrapped(q - here)
+            away = float(np.abs(gap).max())
+            if away < least:
+                best, least = u, away
+            tangent = wrapped(after - before) / (2 * STEP)
+            if away < FOUND or not tangent.any():
+                break
+            u = self.clipped(u + float(tangent @ gap) / float(tangent @ tangent))
+        return best
+
+    def passes(self, q: Array) -> bool:
+        """Whether a configuration (nq,) [rad] that holds the pose is a member."""
+        nearly = self._between(np.array([self._nearest(q)]))[0]
+        if np.abs(wrapped(nearly - q)).max() > BESIDE:
+            return False
+        return bool(np.abs(wrapped(self.at(np.array([self.parameter(q)]))[0] - q)).max() < SAME)
+
+    def _nearest(self, q: Array) -> float:
+        """The parameter of the point between nodes nearest to q (nq,), without Newton's method."""
+        if len(self.knots) == 1:
+            return 0.0
+        away = wrapped(q - self.nodes[:-1])
+        chord = np.diff(self.nodes, axis=0)
+        share = np.clip((away * chord).sum(axis=1) / (chord * chord).sum(axis=1), 0.0, 1.0)
+        pieces = np.arange(len(chord))
+        k = int(np.abs(wrapped(self._on_piece(pieces, share) - q)).max(axis=1).argmin())
+        return self.clipped(float(self.knots[k] + share[k] * (self.knots[k + 1] - self.knots[k])))
+
+    def clipped(self, parameter: float) -> float:
+        """The nearest parameter on an arc."""
+        found = []
+        for lower, upper in self.arcs:
+            middle = (lower + upper) / 2
+            near = parameter + 2 * np.pi * round((middle - parameter) / (2 * np.pi)) if self.closed else parameter
+            on_arc = float(np.clip(near, lower, upper))
+            found.append((abs(near - on_arc), on_arc))
+        return min(found)[1]
+
+    def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
+        """See `SelfMotion`; by the greatest rate of each joint between nodes.
+
+        No bound rests on this alone: where curves may be missed, bounds cover all configurations.
+        """
+        centre = self.at(np.asarray(parameter, dtype=float))
+        if len(self.knots) == 1:
+            return centre, np.full_like(centre, ROUNDING)
+        rates = np.abs(np.diff(self.nodes, axis=0) / np.diff(self.knots)[:, None]).max(axis=0)
+        return centre, np.minimum(FASTER * np.asarray(half, dtype=float)[:, None] * rates + ROUNDING, np.pi)
+
+    def within(self, q_min: Array, q_max: Array) -> TracedCurve | None:
+        """The curve, cut to where it is within limits (nq,) [rad] but for full turns; None if it is nowhere."""
+        u = self._sampled
+        excess = self._excess(self._between(u), q_min, q_max)
+        inside = excess <= 0
+        if inside.all():
+            return self
+        if not inside.any():
+            return None
+        edges = np.flatnonzero(inside[:-1] != inside[1:])
+        at = self._crossings(u[edges], u[edges + 1], inside[edges], q_min, q_max)
+        ends = at.tolist()
+        if inside[0]:
+            ends.insert(0, float(u[0]))
+        if inside[-1]:
+            ends.append(float(u[-1]))
+        arcs = list(zip(ends[::2], ends[1::2], strict=True))
+        if self.closed and inside[0] and inside[-1]:
+            # the arc goes on behind the curve's own start
+            (_, first), (last, _) = arcs[0], arcs[-1]
+            arcs = [*arcs[1:-1], (last, first + 2 * np.pi)]
+        return replace(self, arcs=arcs)
+
+    @cached_property
+    def _sampled(self) -> Array:
+        """Parameters of points along the whole curve."""
+        share = np.arange(POINTS) / POINTS
+        between = self.knots[:-1, None] + share * np.diff(self.knots)[:, None]
+        return np.append(between.ravel(), self.knots[-1])
+
+    def _excess(self, q: Array, q_min: Array, q_max: Array) -> Array:
+        """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
+        away = np.abs(wrapped(q - (q_min + q_max) / 2)) - (q_max - q_min) / 2
+        # a joint that may turn all around has no limits
+        return np.asarray(np.where(q_max - q_min >= 2 * np.pi, -np.pi, away).max(axis=1))
+
+    def _crossings(self, low: Array, high: Array, inside: Mask, q_min: Array, q_max: Array) -> Array:
+        """Where (n,) the curve crosses limits between parameters low and high (n,); `inside` (n,): at low it is in."""
+        low, high = low.copy(), high.copy()
+        f_low, f_high = (self._excess(self.at(u), q_min, q_max) for u in (low, high))
+        for _ in range(CROSSINGS):
+            # regula falsi after Illinois: the end that stays counts half
+            span = np.where(f_high == f_low, 1.0, f_high - f_low)
+            u = np.clip(low - f_low * (high - low) / span, low, high)
+            f = self._excess(self.at(u), q_min, q_max)
+            is_low = (f <= 0) == inside
+            f_high = np.where(is_low, f_high / 2, f)
+            f_low = np.where(is_low, f, f_low / 2)
+            low, high = np.where(is_low, u, low), np.where(is_low, high, u)
+            if (np.abs(f) < ROUNDING / 2).all():
+                break
+        return np.where(inside, low, high)

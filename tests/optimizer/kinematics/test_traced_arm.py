@@ -1,0 +1,145 @@
+"""Seven-joint arms without a closed form: curves that are followed point by point, against Pinocchio and the closed
+form of another arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array, Robot
+from optimizer import Arm, Pose, Problem, optimize
+from optimizer.exceptions import SingularPose, UnreachablePose
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.kinematics.redundant_arm import RedundantArm
+from optimizer.kinematics.traced_arm import TracedArm
+from optimizer.kinematics.traced_curve import TracedCurve
+from tests.optimizer.chains import move, serial_chain
+from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, inside
+from tests.selection import long_but
+
+GEN3, CHAIN, PANDA = load_robot("gen3"), serial_chain(7), load_robot("panda")
+# rad: a parameter's derivative against a difference, and how far apart members of the least step are at most
+LIMIT = 1e-8
+# share of the members of a closed form that are on the curves found: of a pose next to a singularity some are not
+COVERED = 0.99
+# s: no search comes near it, however busy the machine
+AMPLE = 300.0
+
+
+@pytest.fixture(params=["gen3", "chain"], scope="module")
+def robot(request: pytest.FixtureRequest) -> Robot:
+    return {"gen3": GEN3, "chain": CHAIN}[request.param]
+
+
+@pytest.fixture(scope="module")
+def arm(robot: Robot) -> TracedArm:
+    found = TracedArm.of(robot.model)
+    assert found is not None and RedundantArm.of(robot.model) is None
+    return found
+
+
+def away(curve: TracedCurve, q: Array) -> float:
+    """How far [rad] q (7,) is from a curve."""
+    return float(np.abs(wrapped(curve.at(np.array([curve.parameter(q)]))[0] - q)).max())
+
+
+@pytest.mark.parametrize("count", long_but((12,), (12, 10_000)))
+def test_every_configuration_is_on_a_curve_of_its_pose(robot: Robot, arm: TracedArm, count: int) -> None:
+    rng, missed = np.random.default_rng(51), 0
+    for _ in range(count):
+        q = inside(robot, rng)
+        curves = arm.self_motions(flange(robot, q), robot.limits)
+        nearest = min(curves, key=lambda each: away(each, q), default=None)
+        missed += nearest is None or away(nearest, q) > FOUND
+        assert nearest is None or away(nearest, q) > FOUND or arm.label(q) == nearest.label
+    assert missed <= 0.001 * count
+
+
+def test_members_reach_the_pose_within_the_limits(robot: Robot, arm: TracedArm) -> None:
+    rng, limits = np.random.default_rng(52), robot.limits
+    middle, half = (limits.q_min + limits.q_max) / 2, (limits.q_max - limits.q_min) / 2
+    for _ in range(5):
+        T = flange(robot, inside(robot, rng))
+        for curve in arm.self_motions(T, limits):
+            at = np.concatenate([np.append(rng.uniform(*arc, 5), arc) for arc in curve.arcs])
+            for q in curve.at(at):
+                assert np.abs(flange(robot, q) - T).max() < ACCURACY
+                assert (np.abs(wrapped(q - middle)) < half + LIMIT).all()
+
+
+def test_what_limits_cut_off_is_outside(robot: Robot, arm: TracedArm) -> None:
+    rng, q_min, q_max = np.random.default_rng(53), np.full(7, -2.0), np.full(7, 2.2)
+    narrow, cut = replace(robot.limits, q_min=q_min, q_max=q_max), 0
+    for _ in range(5):
+        T = flange(robot, rng.uniform(q_min, q_max))
+        kept = {str(each.label): each.arcs for each in arm.self_motions(T, narrow)}
+        for curve in arm.self_motions(T):
+            at = np.linspace(-np.pi, np.pi, 100)
+            held = [any(a <= u + turn <= b for a, b in kept.get(str(curve.label), []) for turn in (0, 2 * np.pi))
+                    for u in at]  # fmt: skip
+            inside_limits = (np.abs(wrapped(curve.at(at) - (q_min + q_max) / 2)) < (q_max - q_min) / 2).all(axis=1)
+            assert (inside_limits == held).all()
+            cut += len(at) - sum(held)
+    assert cut > 0
+
+
+def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
+    rng = np.random.default_rng(54)
+    for curve in arm.self_motions(flange(robot, inside(robot, rng))):
+        middle, half = rng.uniform(-np.pi, np.pi, 6), rng.uniform(0.0, 0.5, 6)
+        centre, sides = curve.boxes(middle, half)
+        for k in range(6):
+            members = curve.at(middle[k] + half[k] * np.linspace(-1, 1, 15))
+            assert (np.abs(wrapped(members - centre[k])) <= sides[k]).all()
+
+
+def test_no_curve_of_a_closed_form_is_missing() -> None:
+    """The Panda's closed form knows all curves."""
+    exact, traced = RedundantArm.of(PANDA.model), TracedArm.of(PANDA.model)
+    assert exact is not None and traced is not None
+    rng, members, found = np.random.default_rng(55), 0, 0
+    for _ in range(4):
+        T = flange(PANDA, inside(PANDA, rng))
+        curves = traced.self_motions(T, PANDA.limits)
+        for other in exact.self_motions(T, PANDA.limits):
+            for q in other.at(np.array([rng.uniform(*arc) for arc in other.arcs])):
+                within = ((q > PANDA.limits.q_min) & (q < PANDA.limits.q_max)).all()
+                members += bool(within)
+                found += bool(within and min(away(each, q) for each in curves) < FOUND)
+    assert members > 15 and found >= COVERED * members
+
+
+def test_out_of_reach_no_distance_is_claimed() -> None:
+    T = np.eye(4)
+    T[0, 3] = 3.0
+    with pytest.raises(UnreachablePose, match="No arm configuration was found") as refusal:
+        required_inverse_kinematics(GEN3, "goal").solve(T)
+    assert refusal.value.distance is None
+
+
+def test_an_upright_arm_is_refused_as_singular() -> None:
+    """Four axes are in one line: the configurations are no curve."""
+    with pytest.raises(SingularPose):
+        required_inverse_kinematics(GEN3, "goal").solve(flange(GEN3, np.zeros(7)))
+    assert str(required_inverse_kinematics(GEN3, "goal").label(np.zeros(7))) == "branch 1"
+
+
+@pytest.mark.parametrize("from_pose", long_but((False,), (False, True)))
+def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: bool) -> None:
+    start, goal = move(7)
+    problem = Problem(
+        arm=Arm(robot=replace(CHAIN, default_motion=None)),
+        start=Pose(flange(CHAIN, start)) if from_pose else start,
+        goal=Pose(flange(CHAIN, goal)),
+        deadline=AMPLE,
+    )
+    found = optimize(problem)
+    assert found.certificate.valid and found.status == "feasible" and not found.complete
+    assert 0 <= found.lower_bound <= found.energy.electrical.total
+    to_joints = optimize(replace(problem, goal=goal)) if not from_pose else None
+    # any posture of the goal pose needs no more than the one that the pose was made of
+    assert to_joints is None or found.energy.electrical.total <= 1.001 * to_joints.energy.electrical.total
