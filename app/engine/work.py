@@ -9,6 +9,8 @@ from app.engine.result import TaskResult
 from app.engine.task import Task
 from optimizer.progress import Tell, nobody
 
+SHORT = 0.05
+"""Most that short work takes [s]."""
 Ended = TaskResult | Exception
 """How a task ends: its result, or the error that it raises."""
 
@@ -18,6 +20,7 @@ class Work:
     """A task, for which `deadline` [s] is left once work on it begins. `ended` gets what becomes of it.
 
     `stoppable`: a caller may take its worker. `tell` gets what the task finds. `expected` [s] is what it may take.
+    `is_small`: its pickled task has a few kilobytes at most.
     """
 
     task: Task
@@ -26,6 +29,12 @@ class Work:
     stoppable: bool = True
     tell: Tell = nobody
     expected: float = float("inf")
+    is_small: bool = False
+
+    @property
+    def is_short(self) -> bool:
+        """Whether it may lie in the pipe of a worker that is at work: it holds up neither a caller nor the pipe."""
+        return self.is_small and self.expected <= SHORT
 
 
 Take = Callable[[], Work | None]

@@ -109,6 +109,9 @@ class Worker:
 
     def _exchange(self, task: Task, deadline: float, heard: Heard) -> Ended:
         self._pipe.send((task, deadline, heard is not None))
+        return self._receive(heard)
+
+    def _receive(self, heard: Heard) -> Ended:
         received: Event | Ended = self._pipe.recv()
         while isinstance(received, Event):
             if heard is not None:
@@ -117,12 +120,23 @@ class Worker:
         return received
 
     def _exchange_all(self, first: Work, take: Take, turn: Turn, loop: asyncio.AbstractEventLoop) -> None:
+        self._send(first)
         work: Work | None = first
         while work is not None:
-            ended = self._exchange(work.task, work.deadline, _heard(work.tell, loop))
-            last, work = work, take()
+            # after a short one, the next one is there already
+            following = take() if work.is_short else None
+            is_sent = following is not None and following.is_short
+            if following is not None and is_sent:
+                self._send(following)
+            ended = self._receive(_heard(work.tell, loop))
+            last, work = work, following or take()
             # before the next one is sent: if the process dies of it, this one has ended
             loop.call_soon_threadsafe(turn, last, ended, work)
+            if work is not None and not is_sent:
+                self._send(work)
+
+    def _send(self, work: Work) -> None:
+        self._pipe.send((work.task, work.deadline, work.tell is not nobody))
 
     def _has_ended(self) -> None:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)

@@ -15,6 +15,9 @@ from app.jobs.work import MOST_PREEMPTIONS, task_of
 from app.store.leases import Lease
 from optimizer.progress import nobody
 
+SMALL = 1 << 12
+"""Size of a small request [byte], compressed."""
+
 
 @dataclass(eq=False)
 class Held:
@@ -111,4 +114,5 @@ class Taker:
 
         tell = held.found.tell if lease.kind in HEARD else nobody
         stoppable = lease.preempted < MOST_PREEMPTIONS
-        return Work(task_of(lease), lease.deadline, ended, stoppable, tell, self._expected(lease.kind))
+        is_small = len(lease.body) <= SMALL
+        return Work(task_of(lease), lease.deadline, ended, stoppable, tell, self._expected(lease.kind), is_small)

@@ -120,18 +120,19 @@ def test_a_crash_is_told(tmp_path: Path) -> None:
     with_engine(tmp_path, test)
 
 
-def test_one_after_another_on_one_worker(tmp_path: Path) -> None:
-    """Errors of tasks end nothing but themselves; what kills the worker leaves the rest."""
+@pytest.mark.parametrize("is_short", [False, True])
+def test_one_after_another_on_one_worker(tmp_path: Path, is_short: bool) -> None:
+    """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones are sent ahead."""
 
     async def test(bench: Bench) -> None:
         ended: list[Ended] = []
         tasks = [ProcessId(), Fail(OutsideLimits("start", 1, 9.0, -1.0, 1.0)), ProcessId(), Die(), ProcessId()]
-        take = taking(*(Work(task, LONG, ended.append) for task in tasks))
-        await bench.engine.spare.run(take)
+        works = [Work(task, LONG, ended.append, expected=0.0, is_small=is_short) for task in tasks]
+        await bench.engine.spare.run(taking(*works))
         first, limits, second, died = ended
         assert isinstance(limits, OutsideLimits) and isinstance(died, WorkerDied)
         assert isinstance(first, TaskResult) and first == second
-        await bench.engine.spare.run(take)
+        await bench.engine.spare.run(taking(works[4]))
         assert isinstance(ended[4], TaskResult) and ended[4] != first
 
     with_engine(tmp_path, test)
