@@ -9,11 +9,10 @@ import uuid
 from concurrent.futures import CancelledError as Cancelled
 from typing import TYPE_CHECKING, Any
 
-from app.cluster.machine import RESOURCE, Ended, compute
-from app.engine.result import TaskResult
-from app.engine.task import Task
+from app.cluster.machine import RESOURCE, compute
+from app.engine.work import Ended, Take, Work
 from app.exceptions import ClusterUnavailable, WorkerDied
-from optimizer.progress import Tell, nobody
+from optimizer.progress import nobody
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -22,6 +21,10 @@ logger = logging.getLogger(__name__)
 
 LOOK = 0.5
 """Time [s] between two looks at the machines, and between two attempts to reach the scheduler."""
+TOGETHER = 0.25
+"""Work [s] that becomes one task of Dask."""
+PER_PROCESS = 2
+"""Tasks of Dask for each process of a machine: while one is computed, the next one is there."""
 _PATIENCE = 5.0
 """Time [s] in which the scheduler must answer."""
 
@@ -34,7 +37,7 @@ class Cluster:
         self._client: Client | None = None
         self._workers: dict[str, int] = {}
         self._topic = f"joulepath-{uuid.uuid4().hex}"
-        self._tells: dict[str, Tell] = {}
+        self._works: dict[str, list[Work]] = {}
         self._releasing: set[asyncio.Task[None]] = set()
         self._keeper: asyncio.Task[None] | None = None
 
@@ -47,8 +50,8 @@ class Cluster:
 
     @property
     def slots(self) -> int:
-        """Tasks that the machines can compute at the same time; 0 if the scheduler cannot be reached."""
-        return 0 if self._client is None else sum(self._workers.values())
+        """Runs that keep all machines at work; 0 if the scheduler cannot be reached."""
+        return 0 if self._client is None else PER_PROCESS * sum(self._workers.values())
 
     def start(self) -> None:
         """Connects in the background, and again whenever the connection is lost."""
@@ -60,35 +63,50 @@ class Cluster:
             self._keeper.cancel()
             await asyncio.gather(self._keeper, *self._releasing, return_exceptions=True)
 
-    async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
-        """The task's result from some machine; `deadline` [s] counts from the begin of the work there.
+    async def run(self, take: Take) -> None:
+        """Runs works on some machine, one after another: several short ones as one task of Dask, which costs more than
+        each of them.
 
-        `tell` gets what the task finds. If cancelled, the work is stopped. Raises what the task raises,
-        DeadlineExceeded, WorkerDied, or ClusterUnavailable.
+        Each ends with what it raises if it fails, DeadlineExceeded, or WorkerDied. If cancelled, the work is stopped.
+        Raises ClusterUnavailable.
         """
+        works, expected = list[Work](), 0.0
+        while expected < TOGETHER and (work := take()) is not None:
+            works.append(work)
+            expected += work.expected
+        if works:
+            await self._run(works, expected)
+
+    async def _run(self, works: list[Work], expected: float) -> None:
         from distributed import KilledWorker
 
         client = self._client
         if client is None:
             raise ClusterUnavailable
         key = f"joulepath-{uuid.uuid4().hex}"
-        topic = None if tell is nobody else self._topic
-        self._tells[key] = tell
-        once = {"pure": False, "retries": 0, "resources": {RESOURCE: 1}}
-        future = client.submit(compute, task, deadline, key, topic, key=key, **once)
+        asked = [(work.task, work.deadline, work.tell is not nobody) for work in works]
+        self._works[key] = works
+        # short ones share a process with others, which are at the machine when it has ended these
+        is_long = len(works) == 1 and expected >= TOGETHER
+        use = {RESOURCE: 1.0 if is_long else 1.0 / PER_PROCESS}
+        future = client.submit(compute, asked, key, self._topic, key=key, pure=False, retries=0, resources=use)
         try:
-            ended: Ended = await future.result()
+            ended: list[Ended] = await future.result()
         except KilledWorker:
-            raise WorkerDied from None
+            ended = [WorkerDied()]
         except (Cancelled, OSError) as error:
-            logger.warning("the cluster lost a task", extra={"request_id": task.request_id, "reason": str(error)})
+            ids = [work.task.request_id for work in works]
+            logger.warning("the cluster lost tasks", extra={"request_ids": ids, "reason": str(error)})
             raise ClusterUnavailable from None
         finally:
-            del self._tells[key]
+            del self._works[key]
             self._release(future)
-        if isinstance(ended, Exception):
-            raise ended
-        return ended
+        if len(ended) < len(works):  # machines died of one of them
+            for work in works:
+                await self._run([work], TOGETHER)
+            return
+        for work, each in zip(works, ended, strict=True):
+            work.ended(each)
 
     def _release(self, future: Future[Any]) -> None:
         """Has the cluster forget a task: nobody waits for it any more."""
@@ -145,6 +163,7 @@ class Cluster:
     def _heard(self, event: tuple[float, dict[str, Any]]) -> None:
         """Something that a task has found."""
         _, message = event
-        tell = self._tells.get(message["key"], nobody)
-        for each in pickle.loads(message["events"]):
-            tell(each)
+        works = self._works.get(message["key"])
+        if works is not None:
+            for index, each in pickle.loads(message["events"]):
+                works[index].tell(each)

@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from app.engine.pool import Engine
-from app.engine.result import TaskResult
 from app.engine.task import Task
 from app.engine.warm_up import warm
-from app.exceptions import ServiceError, WorkerDied
+from app.engine.work import Ended, Work, taking
+from app.exceptions import WorkerDied
 from app.settings import read_settings
-from optimizer.exceptions import JoulepathError
 from optimizer.progress import Event, nobody
 
 if TYPE_CHECKING:
@@ -32,7 +31,8 @@ _WANTED = ("executing", "long-running", "resumed")
 """States of a task, in a Dask worker, whose result somebody waits for."""
 _engines: WeakKeyDictionary[Worker, Engine] = WeakKeyDictionary()
 
-Ended = TaskResult | JoulepathError | ServiceError
+Asked = tuple[Task, float, bool]
+"""A task, its deadline [s], and whether somebody listens to what it finds."""
 
 
 async def dask_setup(worker: Worker) -> None:
@@ -50,33 +50,44 @@ async def dask_teardown(worker: Worker) -> None:
         await _engines[worker].stop()
 
 
-async def compute(task: Task, deadline: float, key: str, topic: str | None) -> Ended:
-    """The task's result, or its error, as `SpareWorkers.run` has it. Runs in a Dask worker, as its task `key`.
+async def compute(asked: list[Asked], key: str, topic: str) -> list[Ended]:
+    """How each of several tasks ended, as `SpareWorkers.run` has it. Runs in a Dask worker, as its task `key`.
 
-    What the task finds goes to those who subscribed to `topic`, if there is one.
+    One worker computes them, one after another. What a task finds goes to those who subscribed to `topic`.
     """
     from distributed import Reschedule, get_worker
 
     worker = get_worker()
-    engine, found = _engines[worker], list[Event]()
-    tell = nobody if topic is None else found.append
-    working = asyncio.create_task(engine.spare.run(task, deadline, stoppable=False, tell=tell))
+    engine, found, ended = _engines[worker], list[tuple[int, Event]](), dict[int, Ended]()
+    works = [_work(index, each, found, ended) for index, each in enumerate(asked)]
+    working = asyncio.create_task(_all(works, ended, engine))
     try:
         while not working.done() and _is_wanted(worker, key):
             await asyncio.wait({working}, timeout=LOOK)
             if found:
-                worker.log_event(topic or "", {"key": key, "events": pickle.dumps(found)})
+                worker.log_event(topic, {"key": key, "events": pickle.dumps(found)})
                 found.clear()
         if not working.done():
             raise Reschedule
-        return working.result()
-    except (JoulepathError, ServiceError) as error:
-        if isinstance(error, WorkerDied) and engine.draining:
-            raise Reschedule from None
-        return error
+        working.result()
+        if engine.draining and any(isinstance(each, WorkerDied) for each in ended.values()):
+            raise Reschedule
+        return [ended[index] for index in range(len(works))]
     finally:
         working.cancel()
         await asyncio.gather(working, return_exceptions=True)
+
+
+def _work(index: int, asked: Asked, found: list[tuple[int, Event]], ended: dict[int, Ended]) -> Work:
+    task, deadline, is_heard = asked
+    tell = (lambda event: found.append((index, event))) if is_heard else nobody
+    return Work(task, deadline, partial(ended.__setitem__, index), stoppable=False, tell=tell)
+
+
+async def _all(works: list[Work], ended: dict[int, Ended], engine: Engine) -> None:
+    # a worker that dies, or is killed at a deadline, leaves the rest to another one
+    while left := [work for index, work in enumerate(works) if index not in ended]:
+        await engine.spare.run(taking(*left))
 
 
 def _is_wanted(worker: Worker, key: str) -> bool:

@@ -80,6 +80,11 @@ class FairQueue(Generic[W]):
             self._release(place)
             self.put(worker)
 
+    @property
+    def someone_waits(self) -> bool:
+        """Whether a request waits for a worker. May be read in any thread."""
+        return bool(self._waiting)
+
     def put(self, worker: W) -> None:
         """Takes a worker that has nothing to do. One that has ended is left out."""
         if worker.alive:

@@ -9,21 +9,31 @@ from dataclasses import dataclass
 
 from app.engine.census import Census
 from app.engine.fair_queue import PATIENCE, FairQueue
-from app.engine.result import TaskResult
-from app.engine.task import Task
+from app.engine.work import Ended, Take, Work
 from app.engine.worker import Worker
-from app.exceptions import Preempted
+from app.exceptions import Preempted, WorkerDied
 from optimizer.exceptions import DeadlineExceeded
-from optimizer.progress import Tell, nobody
 
 
 @dataclass(eq=False)
 class _Run:
-    """Work on a worker. `stoppable`: a caller may take the worker."""
+    """Work on a worker. `at`: what it is at work on, since `began` [s]. `preempted`: a caller took the worker."""
 
-    asking: asyncio.Task[TaskResult]
-    stoppable: bool
+    at: Work | None
+    began: float
+    asking: asyncio.Task[None] | None = None
     preempted: bool = False
+
+    @property
+    def is_stoppable(self) -> bool:
+        """Whether a caller may take the worker now."""
+        return self.at is not None and self.at.stoppable and not self.preempted
+
+    def stop(self) -> None:
+        """Takes the worker away."""
+        self.preempted = True
+        if self.asking is not None:
+            self.asking.cancel()
 
 
 class SpareWorkers:
@@ -33,29 +43,56 @@ class SpareWorkers:
         self._queue, self._workers, self._census, self._grace = queue, workers, census, grace
         self._runs: dict[Worker, _Run] = {}
 
-    async def run(self, task: Task, deadline: float, stoppable: bool = True, tell: Tell = nobody) -> TaskResult:
-        """The task's result, once a worker is idle and no caller waits for one. `deadline` [s] counts from then on.
-        `tell` gets what the task finds.
+    async def run(self, take: Take) -> None:
+        """Runs works one after another on one worker, once it is idle and no caller waits for one.
 
-        If cancelled, its worker is killed. Raises what the task raises, DeadlineExceeded, WorkerDied, or, if it is
-        `stoppable`, Preempted: a caller took the worker.
+        It ends if there is no more work, a caller waits, or the worker is gone. The work that it was at then has ended
+        with DeadlineExceeded, WorkerDied, or, if it is `stoppable`, Preempted: a caller took the worker. If cancelled,
+        the worker is killed, and what it was at has not ended.
         """
         worker = await self._queue.spare()
-        run = self._runs[worker] = _Run(asyncio.create_task(worker.ask(task, deadline, tell)), stoppable)
+        first = take()
+        try:
+            if first is not None:
+                await self._run(worker, first, take)
+        finally:
+            self._queue.put(worker)
+
+    async def _run(self, worker: Worker, first: Work, take: Take) -> None:
+        clock = asyncio.get_running_loop().time
+        run = self._runs[worker] = _Run(first, clock())
+
+        def turn(ended: Work, how: Ended, following: Work | None) -> None:
+            # if the worker is being killed, the next one has not begun
+            run.at = None if run.preempted or limit.expired() else following
+            if run.at is not None:
+                run.began = clock()
+                limit.reschedule(run.began + run.at.deadline + self._grace)
+            ended.ended(how)
+
+        def stopped(error: Exception) -> None:
+            if run.at is not None:
+                run.at.ended(error)
+
+        def following() -> Work | None:
+            return None if self._queue.someone_waits else take()
+
+        run.asking = asyncio.create_task(worker.ask_all(first, following, turn))
         try:
             with self._census.works():
-                async with asyncio.timeout(deadline + self._grace):
-                    return await run.asking
+                async with asyncio.timeout(first.deadline + self._grace) as limit:
+                    await run.asking
         except TimeoutError:
-            raise DeadlineExceeded([]) from None
+            stopped(DeadlineExceeded([]))
+        except WorkerDied as error:
+            stopped(error)
         except asyncio.CancelledError:
-            if run.preempted:
-                raise Preempted from None
-            raise
+            if not run.preempted:
+                raise
+            stopped(Preempted())
         finally:
             run.asking.cancel()
             del self._runs[worker]
-            self._queue.put(worker)
 
     @contextmanager
     def someone_waits(self) -> Iterator[None]:
@@ -69,7 +106,6 @@ class SpareWorkers:
     def _make_room(self) -> None:
         """Stops the work that began last, if work that can wait has all workers."""
         if self._runs.keys() >= {worker for worker in self._workers if worker.alive}:
-            stoppable = [run for run in self._runs.values() if run.stoppable and not run.preempted]
+            stoppable = [run for run in self._runs.values() if run.is_stoppable]
             if stoppable:
-                stoppable[-1].preempted = True
-                stoppable[-1].asking.cancel()
+                max(stoppable, key=lambda run: run.began).stop()

@@ -23,14 +23,18 @@ from app.engine.forkserver import CONTEXT
 from app.engine.listening import listening
 from app.engine.result import TaskResult
 from app.engine.task import Task, outcome
-from app.exceptions import ServiceError, WorkerDied
+from app.engine.work import Ended, Take, Work
+from app.exceptions import WorkerDied
 from app.logs import configure_logging
-from optimizer.exceptions import JoulepathError
 from optimizer.progress import Event, Tell, nobody
 
 logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
+Heard = Callable[[Event], object] | None
+"""What gets the events of a task in a thread; None if nobody listens."""
+Turn = Callable[[Work, Ended, Work | None], object]
+"""Told of a work that has ended, of what became of it, and of the next one."""
 
 
 class Worker:
@@ -65,9 +69,19 @@ class Worker:
 
         `tell` gets what the task finds, before the result. Raises what the task raises (see `Task.run`), or WorkerDied.
         """
+        heard = _heard(tell, asyncio.get_running_loop())
+        ended = await self._in_thread(partial(self._exchange, task, deadline, heard))
+        if isinstance(ended, Exception):
+            raise ended
+        return ended
+
+    async def ask_all(self, first: Work, take: Take, turn: Turn) -> None:
+        """Runs works one after another, until there is none. If cancelled, it kills the worker. Raises WorkerDied.
+
+        Each gets to the process as soon as the last one has ended: the event loop, which calls `turn`, may be late.
+        """
         loop = asyncio.get_running_loop()
-        heard = None if tell is nobody else lambda event: loop.call_soon_threadsafe(tell, event)
-        return await self._in_thread(partial(self._exchange, task, deadline, heard))
+        await self._in_thread(partial(self._exchange_all, first, take, turn, loop))
 
     def kill(self) -> None:
         """Ends the process at once. Does nothing if it has ended."""
@@ -93,16 +107,36 @@ class Worker:
         self._child_pipe.close()
         self._pipe.recv()
 
-    def _exchange(self, task: Task, deadline: float, heard: Callable[[Event], object] | None) -> TaskResult:
+    def _exchange(self, task: Task, deadline: float, heard: Heard) -> Ended:
         self._pipe.send((task, deadline, heard is not None))
-        received: Event | TaskResult | JoulepathError | ServiceError = self._pipe.recv()
+        return self._receive(heard)
+
+    def _receive(self, heard: Heard) -> Ended:
+        received: Event | Ended = self._pipe.recv()
         while isinstance(received, Event):
             if heard is not None:
                 heard(received)
             received = self._pipe.recv()
-        if isinstance(received, Exception):
-            raise received
         return received
+
+    def _exchange_all(self, first: Work, take: Take, turn: Turn, loop: asyncio.AbstractEventLoop) -> None:
+        self._send(first)
+        work: Work | None = first
+        while work is not None:
+            # after a short one, the next one is there already
+            following = take() if work.is_short else None
+            is_sent = following is not None and following.is_short
+            if following is not None and is_sent:
+                self._send(following)
+            ended = self._receive(_heard(work.tell, loop))
+            last, work = work, following or take()
+            # before the next one is sent: if the process dies of it, this one has ended
+            loop.call_soon_threadsafe(turn, last, ended, work)
+            if work is not None and not is_sent:
+                self._send(work)
+
+    def _send(self, work: Work) -> None:
+        self._pipe.send((work.task, work.deadline, work.tell is not nobody))
 
     def _has_ended(self) -> None:
         asyncio.get_running_loop().remove_reader(self._process.sentinel)
@@ -110,6 +144,10 @@ class Worker:
         if not self._killed:
             logger.error("worker ended by itself", extra={"pid": self.pid, "exit_code": self._process.exitcode})
         self.ended.set()
+
+
+def _heard(tell: Tell, loop: asyncio.AbstractEventLoop) -> Heard:
+    return None if tell is nobody else lambda event: loop.call_soon_threadsafe(tell, event)
 
 
 def _serve(pipe: Connection, warm: Callable[[], None], log_level: str) -> None:

@@ -9,18 +9,19 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from functools import partial
 
-from app.exceptions import StoreUnavailable
+from app.engine.work import Ended
+from app.exceptions import StoreUnavailable, TaskFailed
 from app.jobs.changes import Changes
 from app.jobs.executor import Executor
+from app.jobs.heap import Heap, Held, Taker
 from app.jobs.holder import is_gone, new_holder
-from app.jobs.progress import HEARD, Found
+from app.jobs.progress import Found
 from app.jobs.work import defect, outcome_of
 from app.settings import Settings
 from app.store import jobs, leases
-from app.store.leases import Key, Lease, Outcome
+from app.store.leases import Key, Outcome
 from app.store.store import Store
 from app.store.tables import now as present_time
-from optimizer.progress import Tell, nobody
 
 logger = logging.getLogger(__name__)
 
@@ -40,21 +41,6 @@ _STOP = 3.0
 """Longest time [s] that the last exchange with the database may take when the service stops."""
 _LONGEST_PAUSE = 30.0
 """Longest time [s] until an unreachable database is tried again."""
-
-
-@dataclass(eq=False)
-class _Held:
-    """A lease and the work on it. `dropped`: nobody wants it any more."""
-
-    lease: Lease
-    found: Found
-    work: asyncio.Task[Outcome] | None = None
-    dropped: bool = False
-
-    @property
-    def tell(self) -> Tell:
-        """What gets the progress of the work."""
-        return self.found.tell if self.lease.kind in HEARD else nobody
 
 
 @dataclass
@@ -80,12 +66,13 @@ class Dispatcher:
         self.changes = Changes()
         self.holder = new_holder()
         self._store, self._executor, self._settings, self._now = store, executor, settings, now
-        self._held: dict[Key, _Held] = {}
-        self._ready: asyncio.Queue[_Held] = asyncio.Queue()
+        self._held: dict[Key, Held] = {}
+        self._heap = Heap()
         self._outcomes: list[Outcome] = []
         self._bell = asyncio.Event()
         self._times = _Times(now())
         self._mean_work = AHEAD
+        self._mean_of: dict[str, float] = {}
         self._more = True
         self._draining = False
         self._tasks: list[asyncio.Task[None]] = []
@@ -103,7 +90,7 @@ class Dispatcher:
         """Stops all work. What was begun waits again."""
         self._draining = True
         for held in self._held.values():
-            self._stop_work(held)
+            held.drop()
         self.changes.ring_all()
         self._bell.set()
 
@@ -131,33 +118,44 @@ class Dispatcher:
         """Stops the work on a job at once."""
         for held in self._held.values():
             if held.lease.job_id == job_id:
-                self._stop_work(held)
-
-    def _stop_work(self, held: _Held) -> None:
-        held.dropped = True
-        if held.work is not None:
-            held.work.cancel()
+                held.drop()
 
     async def _run(self) -> None:
-        """Runs one leased request after another."""
+        """Has leased requests run."""
         while True:
-            held = await self._ready.get()
-            # a request whose work is stopped waits again, unless its job was cancelled: `settle` knows
-            outcome = Outcome(held.lease, "waiting")
-            if not held.dropped:
-                held.work = asyncio.create_task(outcome_of(held.lease, self._executor, held.tell))
-                try:
-                    await asyncio.wait({held.work})
-                finally:
-                    held.work.cancel()
-                if not held.work.cancelled():
-                    outcome = held.work.result()
-                    taken = outcome.wall_time
-                    self._mean_work += 0.2 * ((AHEAD if taken is None else taken) - self._mean_work)
-            self._outcomes.append(outcome)
-            if self._held.get(held.lease.key) is held:
-                del self._held[held.lease.key]
-            self._bell.set()
+            await self._heap.filled()
+            taker = Taker(self._heap, self._ended, lambda kind: self._mean_of.get(kind, AHEAD))
+            taker.working = working = asyncio.create_task(self._executor.run(taker.take))
+            try:
+                await asyncio.wait({working})
+            finally:
+                taker.close()
+                working.cancel()
+            left = list(taker.left)
+            error = None if working.cancelled() else working.exception()
+            if error is not None:
+                for held in left:
+                    self._ended(held, error if isinstance(error, Exception) else TaskFailed())
+                continue
+            self._heap.put_back(held for held in left if not held.dropped)
+            for held in left:
+                if held.dropped:
+                    # it waits again, unless its job was cancelled: `settle` knows
+                    self._has_outcome(held, Outcome(held.lease, "waiting"))
+
+    def _ended(self, held: Held, how: Ended) -> None:
+        outcome = outcome_of(held.lease, how, held.began)
+        taken, kind = outcome.wall_time, held.lease.kind
+        if taken is not None:
+            self._mean_work += 0.2 * (taken - self._mean_work)
+            self._mean_of[kind] = self._mean_of.get(kind, taken) + 0.2 * (taken - self._mean_of.get(kind, taken))
+        self._has_outcome(held, outcome)
+
+    def _has_outcome(self, held: Held, outcome: Outcome) -> None:
+        self._outcomes.append(outcome)
+        if self._held.get(held.lease.key) is held:
+            del self._held[held.lease.key]
+        self._bell.set()
 
     async def _dispatch(self) -> None:
         """Exchanges leases and outcomes with the database."""
@@ -174,7 +172,7 @@ class Dispatcher:
                     logger.exception("unforeseen error")
                 pause = min(2 * pause, _LONGEST_PAUSE)
             await self._rung(pause)
-            if self._ready.qsize() >= self._executor.slots and not self._draining:
+            if len(self._heap) >= self._executor.slots and not self._draining:
                 await asyncio.sleep(GATHER)
 
     async def _rung(self, longest: float) -> None:
@@ -191,7 +189,8 @@ class Dispatcher:
         await self._watch()
         await self._report()
         # one of them dispatches; those beyond the slots find nothing to do
-        self._tasks += [asyncio.create_task(self._run()) for _ in range(self._executor.slots + 1 - len(self._tasks))]
+        more = self._executor.slots + 1 - len(self._tasks)
+        self._tasks += [asyncio.create_task(self._run()) for _ in range(more)]
         want = self._most_held - len(self._held)
         if want <= 0 or self._draining:
             return
@@ -201,8 +200,8 @@ class Dispatcher:
             leased, changed = await self._store.write(lease)
             self._more = len(leased) == want
             for each in leased:
-                self._held[each.key] = held = _Held(each, Found(each.attempt), dropped=self._draining)
-                self._ready.put_nowait(held)
+                self._held[each.key] = held = Held(each, Found(each.attempt), dropped=self._draining)
+                self._heap.put(held)
             self.changes.ring(changed)
 
     @property
@@ -242,7 +241,7 @@ class Dispatcher:
             self._times.looked = clock
             for each in held:
                 if (each.lease.key, each.lease.attempt) not in kept:
-                    self._stop_work(each)
+                    each.drop()
         if self._times.pruned is None or now - self._times.pruned >= PRUNING:
             prune = partial(jobs.prune, max_age=timedelta(days=self._settings.answers_max_age))
             await self._store.write(prune, frees=True)

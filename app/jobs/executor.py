@@ -3,56 +3,60 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 from app.cluster.link import Cluster
 from app.engine.pool import Engine
 from app.engine.result import TaskResult
 from app.engine.task import Task
+from app.engine.work import Ended, Take, Work, result_of
+from app.exceptions import Preempted, ServiceError, UnknownFigures
 from app.schemas.identifications import IdentifyRequest
 from app.store import logs
 from app.store.store import Store
 from app.tasks.arm_engine import ArmEngine
 from app.tasks.job_request import IDENTIFY, JobRequestTask
+from optimizer.exceptions import JoulepathError, UnknownRobot
 from optimizer.progress import Tell, nobody
 
 
 class Executor(Protocol):
-    """Runs one task at a time for each of its callers."""
+    """Runs works one after another for each of its callers."""
 
     @property
     def slots(self) -> int:
-        """Tasks that it can run at the same time at present."""
+        """Callers that keep it busy at present."""
         ...
 
-    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
-        """The task's result, for which `deadline` [s] is left once work on it begins. `tell` gets what it finds.
+    async def run(self, take: Take) -> None:
+        """Runs works until there is none, or a caller of the service needs the worker.
 
-        If cancelled, the work is stopped at once. Raises what the task raises, DeadlineExceeded, WorkerDied,
-        ShuttingDown, ClusterUnavailable, or, if it is `stoppable`, Preempted.
+        Each ends with its result, what its task raises, DeadlineExceeded, WorkerDied, or, if it is `stoppable`,
+        Preempted. If cancelled, the work is stopped at once. Raises ClusterUnavailable; what has not ended then is to
+        be run again.
         """
         ...
 
 
 @dataclass(frozen=True)
 class LocalExecutor:
-    """Runs tasks in workers of this service that no caller waits for. Users' own robots come from the database."""
+    """Runs works in workers of this service that no caller waits for. Users' own robots come from the database."""
 
     engine: Engine
     store: Store
     slots: int
 
-    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
+    async def run(self, take: Take) -> None:
         """See `Executor`."""
-        spare = _Spare(self.engine, stoppable)
-        return await ArmEngine(spare, self.store).run(await _with_logs(task, self.store), deadline, tell)
+        await _run(self.engine.spare.run, self.store, take)
 
 
 @dataclass(frozen=True)
 class ClusterExecutor:
-    """Runs tasks on a cluster. No caller waits for its workers, so that none is taken away."""
+    """Runs works on a cluster. No caller waits for its workers, so that none is taken away."""
 
     cluster: Cluster
     store: Store
@@ -62,14 +66,43 @@ class ClusterExecutor:
         """See `Executor`."""
         return self.cluster.slots
 
-    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
+    async def run(self, take: Take) -> None:
         """See `Executor`."""
-        return await ArmEngine(self.cluster, self.store).run(await _with_logs(task, self.store), deadline, tell)
+        await _run(self.cluster.run, self.store, take)
+
+
+async def _run(run: Callable[[Take], Awaitable[None]], store: Store, take: Take) -> None:
+    """Runs works; those that need something of the database come after the others, one by one."""
+    waiting: list[Work] = []
+
+    def ended(work: Work, how: Ended) -> None:
+        if isinstance(how, UnknownRobot | UnknownFigures):
+            waiting.append(work)
+        else:
+            work.ended(how)
+
+    def taken() -> Work | None:
+        while (work := take()) is not None and _needs_logs(work.task):
+            waiting.append(work)
+        return None if work is None else replace(work, ended=partial(ended, work))
+
+    await run(taken)
+    for work in waiting:
+        alone = _Alone(run, work.stoppable)
+        try:
+            task = await _with_logs(work.task, store)
+            work.ended(await ArmEngine(alone, store).run(task, work.deadline, work.tell))
+        except (JoulepathError, ServiceError, Preempted) as error:
+            work.ended(error)
+
+
+def _needs_logs(task: Task) -> TypeGuard[JobRequestTask]:
+    return isinstance(task, JobRequestTask) and task.kind == IDENTIFY
 
 
 async def _with_logs(task: Task, store: Store) -> Task:
     """The task with the logs that an identification names. Raises UnknownLog or StoreUnavailable."""
-    if not isinstance(task, JobRequestTask) or task.kind != IDENTIFY:
+    if not _needs_logs(task):
         return task
     asked = IdentifyRequest.model_validate_json(zlib.decompress(task.body))
     found = [await store.read(partial(logs.get, log_id=each)) for each in asked.all_logs]
@@ -77,9 +110,11 @@ async def _with_logs(task: Task, store: Store) -> Task:
 
 
 @dataclass(frozen=True)
-class _Spare:
-    engine: Engine
+class _Alone:
+    """Runs one task at a time on what runs many."""
+
+    many: Callable[[Take], Awaitable[None]]
     stoppable: bool
 
     async def run(self, task: Task, deadline: float, tell: Tell = nobody) -> TaskResult:
-        return await self.engine.spare.run(task, deadline, self.stoppable, tell)
+        return await result_of(self.many, task, deadline, self.stoppable, tell)

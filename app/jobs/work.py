@@ -8,7 +8,8 @@ from typing import Any
 
 import orjson
 
-from app.engine.result import json_document
+from app.engine.result import TaskResult, json_document
+from app.engine.work import Ended
 from app.exceptions import (
     ClusterUnavailable,
     Preempted,
@@ -20,11 +21,9 @@ from app.exceptions import (
     WorkerDied,
 )
 from app.http.problem_details import problem_content
-from app.jobs.executor import Executor
 from app.store.leases import Lease, Outcome
 from app.tasks.job_request import JobRequestTask, JobResult
 from optimizer.exceptions import JoulepathError
-from optimizer.progress import Tell
 
 logger = logging.getLogger(__name__)
 
@@ -34,25 +33,29 @@ MOST_PREEMPTIONS = 2
 """Times that a caller may take the worker of a request; then it is left to end."""
 
 
-async def outcome_of(lease: Lease, executor: Executor, tell: Tell) -> Outcome:
-    """Runs the request of a lease; `tell` gets what it finds. Raises CancelledError only."""
-    began = time.perf_counter()
-    task = JobRequestTask(lease.kind, lease.body, _request_id(lease))
-    try:
-        result = await executor.run(task, lease.deadline, lease.preempted < MOST_PREEMPTIONS, tell)
-    except Preempted:
+def task_of(lease: Lease) -> JobRequestTask:
+    """The task of a lease."""
+    return JobRequestTask(lease.kind, lease.body, _request_id(lease))
+
+
+def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
+    """The outcome of work that began at a time [s] by `perf_counter` and ended like this."""
+    if not isinstance(ended, Exception):
+        return _done(lease, ended)
+    if isinstance(ended, Preempted):
         return Outcome(lease, "waiting", preempted=True)
-    except (ShuttingDown, StoreUnavailable, ClusterUnavailable):
+    if isinstance(ended, ShuttingDown | StoreUnavailable | ClusterUnavailable):
         return Outcome(lease, "waiting")
-    except WorkerDied:
-        if lease.deaths + 1 < MOST_DEATHS:
-            return Outcome(lease, "waiting", died=True)
-        return _failed(lease, TooManyDeaths(), task.request_id, began)
-    except (JoulepathError, ServiceError) as error:
-        return _failed(lease, error, task.request_id, began)
-    except Exception:
-        logger.exception("unforeseen error", extra={"request_id": task.request_id})
-        return defect(lease)
+    if isinstance(ended, WorkerDied) and lease.deaths + 1 < MOST_DEATHS:
+        return Outcome(lease, "waiting", died=True)
+    error = TooManyDeaths() if isinstance(ended, WorkerDied) else ended
+    if isinstance(error, JoulepathError | ServiceError):
+        return _failed(lease, error, began)
+    logger.error("unforeseen error", exc_info=error, extra={"request_id": _request_id(lease)})
+    return defect(lease)
+
+
+def _done(lease: Lease, result: TaskResult) -> Outcome:
     assert isinstance(result, JobResult)
     return Outcome(
         lease,
@@ -76,8 +79,8 @@ def _request_id(lease: Lease) -> str:
     return f"{lease.job_id}.{lease.number}"
 
 
-def _failed(lease: Lease, error: Exception, request_id: str, began: float) -> Outcome:
-    return Outcome(lease, "failed", time.perf_counter() - began, problem=_content(error, request_id))
+def _failed(lease: Lease, error: Exception, began: float) -> Outcome:
+    return Outcome(lease, "failed", time.perf_counter() - began, problem=_content(error, _request_id(lease)))
 
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:

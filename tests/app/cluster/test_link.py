@@ -6,11 +6,14 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
+import dask
 import pytest
 from distributed import Scheduler, Worker
 
-from app.cluster.link import Cluster
+from app.cluster.link import PER_PROCESS, Cluster
+from app.engine.result import TaskResult
 from app.engine.task import Task
+from app.engine.work import Ended, Work, result_of, taking
 from app.exceptions import ClusterUnavailable, TaskFailed, WorkerDied
 from optimizer.exceptions import OutsideLimits
 from optimizer.progress import CandidatesFound, Event
@@ -41,7 +44,7 @@ def with_cluster(test: Callable[[Cluster, Scheduler], Awaitable[None]], monkeypa
             cluster = Cluster(scheduler.address)
             cluster.start()
             try:
-                await until(lambda: cluster.slots == 1)
+                await until(lambda: cluster.slots == PER_PROCESS)
                 await test(cluster, scheduler)
             finally:
                 await cluster.stop()
@@ -53,7 +56,7 @@ def start(cluster: Cluster, task: Task) -> asyncio.Task[int]:
     """A task whose result is the id of the process that computes it."""
 
     async def process() -> int:
-        return int((await cluster.run(task, LONG)).document)
+        return int((await result_of(cluster.run, task, LONG)).document)
 
     return asyncio.create_task(process())
 
@@ -66,18 +69,18 @@ def hold(folder: Path) -> Hold:
 def test_results_errors_and_what_is_found_come_back(monkeypatch: pytest.MonkeyPatch) -> None:
     async def test(cluster: Cluster, _: Scheduler) -> None:
         told: list[Event] = []
-        first = int((await cluster.run(Count(100), LONG, told.append)).document)
+        first = int((await result_of(cluster.run, Count(100), LONG, tell=told.append)).document)
         await until(lambda: len(told) == 100)
         assert told == [CandidatesFound(number) for number in range(100)]
         assert first == await start(cluster, ProcessId()), "the same warm process"
         limits = OutsideLimits("start", 1, 9.0, -1.0, 1.0)
         with pytest.raises(OutsideLimits) as raised:
-            await cluster.run(Fail(limits), LONG)
+            await result_of(cluster.run, Fail(limits), LONG)
         assert vars(raised.value) == vars(limits)
         with pytest.raises(TaskFailed):
-            await cluster.run(Fail(ZeroDivisionError("caller-secret")), LONG)
+            await result_of(cluster.run, Fail(ZeroDivisionError("caller-secret")), LONG)
         with pytest.raises(WorkerDied):
-            await cluster.run(Die(), LONG)
+            await result_of(cluster.run, Die(), LONG)
         assert first != await start(cluster, ProcessId()), "another one in its place"
 
     with_cluster(test, monkeypatch)
@@ -105,7 +108,7 @@ def test_what_a_service_leaves_behind_is_stopped(monkeypatch: pytest.MonkeyPatch
     async def test(cluster: Cluster, scheduler: Scheduler) -> None:
         other = Cluster(scheduler.address)
         other.start()
-        await until(lambda: other.slots == 1)
+        await until(lambda: other.slots == PER_PROCESS)
         process = await start(cluster, ProcessId())
         orphan = start(other, hold(tmp_path / "orphan"))
         await until((tmp_path / "orphan" / "started").exists)
@@ -125,7 +128,7 @@ def test_work_of_a_machine_that_stops_is_done_elsewhere(monkeypatch: pytest.Monk
         running = start(cluster, hold(tmp_path / "runs"))
         await until((tmp_path / "runs" / "started").exists)
         async with machine(scheduler, workers=2):
-            await until(lambda: cluster.slots == 3)
+            await until(lambda: cluster.slots == 3 * PER_PROCESS)
             (tmp_path / "runs" / "started").unlink()
             first = next(address for address, count in cluster.workers.items() if count == 1)
             scheduler.close_worker(first)
@@ -133,7 +136,7 @@ def test_work_of_a_machine_that_stops_is_done_elsewhere(monkeypatch: pytest.Monk
             (tmp_path / "runs" / "released").touch()
             assert await running != process
             assert not alive(process)
-            await until(lambda: cluster.slots == 2)
+            await until(lambda: cluster.slots == 2 * PER_PROCESS)
 
     with_cluster(test, monkeypatch)
 
@@ -148,11 +151,11 @@ def test_a_scheduler_that_goes_and_comes_back(monkeypatch: pytest.MonkeyPatch, t
             await running
         await until(lambda: cluster.slots == 0)
         with pytest.raises(ClusterUnavailable):
-            await cluster.run(ProcessId(), LONG)
+            await result_of(cluster.run, ProcessId(), LONG)
         with pytest.raises(ClusterUnavailable):
             assert cluster.workers
         async with Scheduler(host="127.0.0.1", port=port, dashboard=False) as again, machine(again):
-            await until(lambda: cluster.slots == 1)
+            await until(lambda: cluster.slots == PER_PROCESS)
             await start(cluster, ProcessId())
 
     with_cluster(test, monkeypatch)
@@ -165,3 +168,48 @@ def test_workers_of_others_get_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
             assert list(cluster.workers.values()) == [1]
 
     with_cluster(test, monkeypatch)
+
+
+def short(task: Task, ended: list[Ended]) -> Work:
+    return Work(task, LONG, ended.append, expected=0.01)
+
+
+def test_short_works_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that dies takes none of the others with it, and what each finds gets to those who listen to it."""
+
+    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
+        ended, told = list[Ended](), list[Event]()
+        works = [short(task, ended) for task in (ProcessId(), Count(3), Die(), ProcessId())]
+        works[1].tell = told.append
+        before = len(scheduler.tasks)
+        running = asyncio.create_task(cluster.run(taking(*works)))
+        await until(lambda: len(scheduler.tasks) > before or running.done())
+        assert len(scheduler.tasks) <= before + 1, "one task of Dask"
+        await running
+        first, counted, died, last = ended
+        assert isinstance(died, WorkerDied)
+        assert isinstance(first, TaskResult) and isinstance(last, TaskResult)
+        assert counted == first != last
+        await until(lambda: len(told) == 3)
+
+    with_cluster(test, monkeypatch)
+
+
+def test_those_whose_machine_died_are_tried_one_by_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """One of them may be what machines die of."""
+
+    async def test(cluster: Cluster, scheduler: Scheduler) -> None:
+        ended = list[Ended]()
+        (first,) = cluster.workers
+        running = asyncio.create_task(cluster.run(taking(short(hold(tmp_path), ended), short(ProcessId(), ended))))
+        await until((tmp_path / "started").exists)
+        async with machine(scheduler):
+            (tmp_path / "started").unlink()
+            scheduler.close_worker(first)
+            await until((tmp_path / "started").exists)
+            (tmp_path / "released").touch()
+            await running
+            assert [type(each) for each in ended] == [TaskResult] * 2
+
+    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
+        with_cluster(test, monkeypatch)

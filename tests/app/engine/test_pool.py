@@ -8,6 +8,7 @@ import logging
 import os
 import signal
 from collections.abc import Awaitable, Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import pytest
 
 from app.engine.pool import Engine
 from app.engine.task import outcome
+from app.engine.work import result_of
 from app.exceptions import Busy, InvalidRequest, ShuttingDown, TaskFailed, WorkerDied
 from app.settings import Settings
 from optimizer.exceptions import DeadlineExceeded, OutsideLimits
@@ -280,7 +282,7 @@ def test_is_not_ready_without_a_warm_worker(tmp_path: Path, caplog: pytest.LogCa
 
 def test_what_a_task_finds_comes_before_its_result(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
-        for tells in (bench.engine.run, bench.engine.spare.run):
+        for tells in (bench.engine.run, partial(result_of, bench.engine.spare.run)):
             told: list[Event] = []
             await tells(Count(1000), LONG, tell=told.append)
             assert told == [CandidatesFound(number) for number in range(1000)]

@@ -8,17 +8,19 @@ from typing import Any
 
 import pytest
 
+from app.engine.result import TaskResult
 from app.engine.spare import PATIENCE
+from app.engine.work import Ended, Work, result_of, taking
 from app.exceptions import Preempted, WorkerDied
-from optimizer.exceptions import DeadlineExceeded
-from tests.app.engine.simple_tasks import Die, Hold, ProcessId
+from optimizer.exceptions import DeadlineExceeded, OutsideLimits
+from tests.app.engine.simple_tasks import Die, Fail, Hold, ProcessId
 from tests.app.engine.test_pool import DEADLINE_GRACE, LONG, Bench, until, with_engine
 
 
 async def spare(bench: Bench, folder: Path, **options: Any) -> tuple[asyncio.Task[Any], Path]:
     """Work that can wait and runs in a worker; touch the path to let it end."""
     folder.mkdir()
-    running = asyncio.create_task(bench.engine.spare.run(Hold(folder), LONG, **options))
+    running = asyncio.create_task(result_of(bench.engine.spare.run, Hold(folder), LONG, **options))
     await until((folder / "started").exists)
     return running, folder / "released"
 
@@ -26,7 +28,7 @@ async def spare(bench: Bench, folder: Path, **options: Any) -> tuple[asyncio.Tas
 def test_it_waits_while_a_caller_waits(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         first, release = await bench.held()
-        later = asyncio.create_task(bench.engine.spare.run(ProcessId(), LONG))
+        later = asyncio.create_task(result_of(bench.engine.spare.run, ProcessId(), LONG))
         second = await bench.queued(ProcessId())
         order: list[str] = []
         later.add_done_callback(lambda _: order.append("later"))
@@ -96,7 +98,7 @@ def test_cancelling_kills_its_worker(tmp_path: Path) -> None:
 def test_its_deadline_counts_from_its_start(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         first, release = await bench.held()
-        later = asyncio.create_task(bench.engine.spare.run(ProcessId(), deadline=1.0))
+        later = asyncio.create_task(result_of(bench.engine.spare.run, ProcessId(), 1.0))
         await asyncio.sleep(0)
         bench.move_clock(LONG / 2)
         release.touch()
@@ -112,7 +114,66 @@ def test_its_deadline_counts_from_its_start(tmp_path: Path) -> None:
 def test_a_crash_is_told(tmp_path: Path) -> None:
     async def test(bench: Bench) -> None:
         with pytest.raises(WorkerDied):
-            await bench.engine.spare.run(Die(), LONG)
-        await bench.engine.spare.run(ProcessId(), LONG)
+            await result_of(bench.engine.spare.run, Die(), LONG)
+        await result_of(bench.engine.spare.run, ProcessId(), LONG)
+
+    with_engine(tmp_path, test)
+
+
+@pytest.mark.parametrize("is_short", [False, True])
+def test_one_after_another_on_one_worker(tmp_path: Path, is_short: bool) -> None:
+    """Errors of tasks end nothing but themselves; what kills the worker leaves the rest. Short ones are sent ahead."""
+
+    async def test(bench: Bench) -> None:
+        ended: list[Ended] = []
+        tasks = [ProcessId(), Fail(OutsideLimits("start", 1, 9.0, -1.0, 1.0)), ProcessId(), Die(), ProcessId()]
+        works = [Work(task, LONG, ended.append, expected=0.0, is_small=is_short) for task in tasks]
+        await bench.engine.spare.run(taking(*works))
+        first, limits, second, died = ended
+        assert isinstance(limits, OutsideLimits) and isinstance(died, WorkerDied)
+        assert isinstance(first, TaskResult) and first == second
+        await bench.engine.spare.run(taking(works[4]))
+        assert isinstance(ended[4], TaskResult) and ended[4] != first
+
+    with_engine(tmp_path, test)
+
+
+def test_it_takes_nothing_more_while_a_caller_waits(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        ended: list[Ended] = []
+        tmp_path.joinpath("held").mkdir()
+        take = taking(*(Work(task, LONG, ended.append) for task in (Hold(tmp_path / "held"), ProcessId())))
+        running = asyncio.create_task(bench.engine.spare.run(take))
+        await until((tmp_path / "held" / "started").exists)
+        caller = await bench.queued(ProcessId())
+        (tmp_path / "held" / "released").touch()
+        await running
+        assert len(ended) == 1, "the caller comes first"
+        assert (await caller) == ended[0]
+        await bench.engine.spare.run(take)
+        assert len(ended) == 2
+
+    with_engine(tmp_path, test)
+
+
+def test_each_has_its_own_deadline(tmp_path: Path) -> None:
+    async def test(bench: Bench) -> None:
+        ended: list[Ended] = []
+        folders = [tmp_path / name for name in ("first", "second")]
+        for folder in folders:
+            folder.mkdir()
+        works = [Work(Hold(folder), LONG, ended.append) for folder in folders]
+        running = asyncio.create_task(bench.engine.spare.run(taking(*works)))
+        await until((folders[0] / "started").exists)
+        bench.move_clock(LONG)
+        (folders[0] / "released").touch()
+        await until((folders[1] / "started").exists)
+        await until(lambda: len(ended) == 1)
+        bench.move_clock(LONG)
+        await asyncio.sleep(0.05)
+        assert not running.done(), "the grace is left"
+        bench.move_clock(DEADLINE_GRACE)
+        await running
+        assert isinstance(ended[1], DeadlineExceeded)
 
     with_engine(tmp_path, test)

@@ -13,8 +13,8 @@ from pathlib import Path
 
 from app.access.client import OPERATOR
 from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.exceptions import Preempted, WorkerDied
+from app.engine.work import Take
+from app.exceptions import ClusterUnavailable, Preempted, WorkerDied
 from app.jobs import dispatcher as module
 from app.jobs.dispatcher import LEASE, Dispatcher
 from app.jobs.holder import is_gone, new_holder
@@ -46,20 +46,25 @@ class Work:
         self.errors: list[Exception] = []
         self.tell: Tell = nobody
 
-    async def run(self, task: Task, deadline: float, stoppable: bool, tell: Tell) -> TaskResult:
-        assert isinstance(task, JobRequestTask)
-        index = int(task.request_id.rpartition(".")[2])
-        self.begun.append(index)
-        self.stoppable.append(stoppable)
-        self.tell = tell
-        try:
-            if self.errors:
-                raise self.errors.pop(0)
-            await self.free.wait()
-        except asyncio.CancelledError:
-            self.stopped.append(index)
-            raise
-        return answer(self.name)
+    async def run(self, take: Take) -> None:
+        while (work := take()) is not None:
+            assert isinstance(work.task, JobRequestTask)
+            index = int(work.task.request_id.rpartition(".")[2])
+            self.begun.append(index)
+            self.stoppable.append(work.stoppable)
+            self.tell = work.tell
+            try:
+                if self.errors:
+                    error = self.errors.pop(0)
+                    if isinstance(error, ClusterUnavailable):
+                        raise error
+                    work.ended(error)
+                    continue
+                await self.free.wait()
+            except asyncio.CancelledError:
+                self.stopped.append(index)
+                raise
+            work.ended(answer(self.name))
 
 
 class Service:

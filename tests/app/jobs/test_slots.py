@@ -12,9 +12,8 @@ from typing import Any
 
 import pytest
 
-from app.engine.result import TaskResult
-from app.engine.task import Task
-from app.exceptions import ClusterUnavailable
+from app.engine.work import Ended, Take, Work, taking
+from app.exceptions import ClusterUnavailable, TaskFailed
 from app.jobs.executor import ClusterExecutor, LocalExecutor
 from app.store import job_events, logs
 from app.store.store import Store
@@ -103,17 +102,16 @@ def test_nobody_listens_to_short_requests(tmp_path: Path) -> None:
     with_store(tmp_path, test)
 
 
-class Caught(Exception):
-    """Carries the task that a runner was given."""
-
-
 class Runner:
     """Stands for the cluster, and for the workers of this service."""
 
-    slots = 1
+    def __init__(self) -> None:
+        self.tasks: list[Any] = []
 
-    async def run(self, task: Task, *_: Any) -> TaskResult:
-        raise Caught(task)
+    async def run(self, take: Take) -> None:
+        while (work := take()) is not None:
+            self.tasks.append(work.task)
+            work.ended(TaskFailed())
 
     @property
     def spare(self) -> Runner:
@@ -130,9 +128,10 @@ def test_an_identification_gets_its_logs_wherever_it_is_computed(tmp_path: Path,
         body = zlib.compress(json.dumps({"logs": [log.id]}).encode())
         runner: Any = Runner()
         executor = LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
-        with pytest.raises(Caught) as caught:
-            await executor.run(JobRequestTask(IDENTIFY, body, "job.0"), 1.0, True, nobody)
-        (task,) = caught.value.args
-        assert task.logs == (({"robot": "ur5e"}, b"log"),)
+        ended: list[Ended] = []
+        others = [Work(JobRequestTask(kind, body, "job.0"), 1.0, ended.append) for kind in (IDENTIFY, "optimize")]
+        await executor.run(taking(*others))
+        assert [task.logs for task in runner.tasks] == [(), (({"robot": "ur5e"}, b"log"),)]
+        assert [type(each) for each in ended] == [TaskFailed, TaskFailed]
 
     with_store(tmp_path, test)

@@ -1,0 +1,118 @@
+"""Leased requests that wait to be worked on, and who takes them."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from app.engine.work import Ended, Work
+from app.jobs.progress import HEARD, Found
+from app.jobs.work import MOST_PREEMPTIONS, task_of
+from app.store.leases import Lease
+from optimizer.progress import nobody
+
+SMALL = 1 << 12
+"""Size of a small request [byte], compressed."""
+
+
+@dataclass(eq=False)
+class Held:
+    """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody wants it any more."""
+
+    lease: Lease
+    found: Found
+    taker: Taker | None = None
+    began: float = 0.0
+    dropped: bool = False
+
+    def drop(self) -> None:
+        """Stops the work on it."""
+        self.dropped = True
+        # who takes it says so first, and then looks whether it is dropped
+        if self.taker is not None:
+            self.taker.stop()
+
+
+class Heap:
+    """Leased requests, in the order in which they are to be worked on. Takers take from it in threads."""
+
+    def __init__(self) -> None:
+        self.ready: deque[Held] = deque()
+        self._filled = asyncio.Event()
+
+    def __len__(self) -> int:
+        return len(self.ready)
+
+    def put(self, *held: Held) -> None:
+        """Adds requests at the end."""
+        self.ready.extend(held)
+        self._filled.set()
+
+    def put_back(self, held: Iterable[Held]) -> None:
+        """Adds requests that were taken in vain at the begin."""
+        self.ready.extendleft(reversed(list(held)))
+        self._filled.set()
+
+    async def filled(self) -> None:
+        """Waits until there is a request."""
+        while not self.ready:
+            self._filled.clear()
+            await self._filled.wait()
+
+
+class Taker:
+    """Takes requests for one run of an executor. `ended` gets what becomes of each while it is `left`.
+
+    `expected` [s] is the time that a request of a kind may take.
+    """
+
+    def __init__(self, heap: Heap, ended: Callable[[Held, Ended], object], expected: Callable[[str], float]) -> None:
+        self.left: dict[Held, None] = {}
+        """What it took that has not ended, in order."""
+        self.working: asyncio.Task[None] | None = None
+        self._heap, self._ended, self._expected = heap, ended, expected
+        self._lock = threading.Lock()
+        self._is_open = True
+
+    def take(self) -> Work | None:
+        """The next request; None if there is none. May be called in any thread."""
+        with self._lock:
+            while self._is_open:
+                try:
+                    held = self._heap.ready.popleft()
+                except IndexError:
+                    return None
+                held.taker = self
+                self.left[held] = None
+                if not held.dropped:
+                    return self._work(held)
+        return None
+
+    def stop(self) -> None:
+        """Stops the run at once."""
+        if self.working is not None:
+            self.working.cancel()
+
+    def close(self) -> None:
+        """Takes nothing more."""
+        with self._lock:
+            self._is_open = False
+
+    def _work(self, held: Held) -> Work:
+        lease = held.lease
+        held.began = time.perf_counter()
+
+        def ended(how: Ended) -> None:
+            # a result that comes after the run was stopped is late: the request has gone elsewhere
+            if self._is_open and held in self.left:
+                del self.left[held]
+                self._ended(held, how)
+
+        tell = held.found.tell if lease.kind in HEARD else nobody
+        stoppable = lease.preempted < MOST_PREEMPTIONS
+        is_small = len(lease.body) <= SMALL
+        return Work(task_of(lease), lease.deadline, ended, stoppable, tell, self._expected(lease.kind), is_small)
