@@ -26,7 +26,7 @@ from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
 from models.registry import load_robot
 from models.robot import Robot
-from models.uncertainty.spread import P95
+from models.uncertainty.ranges import P95
 from optimizer.identification.base_fit import BaseFit, base_arm, fit_base
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.clusters import clusters_of

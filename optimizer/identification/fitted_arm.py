@@ -22,7 +22,7 @@ class FittedArm:
     """Figures (nq,) of an arm: those of the friction law, `rotor_inertia`, `torque_constant`; and its electrics.
 
     `couplings` has the terms of motors that several joints share, `bodies` (10 nq,) the change of the links' parameters
-    from the robot's own; None for its own links.
+    from the robot's own; None for its own links. `links` is a factor on their masses.
     """
 
     coulomb: Array
@@ -38,13 +38,15 @@ class FittedArm:
     knee: float
     couplings: tuple[tuple[Coupling, dict[str, float]], ...] = ()
     bodies: Array | None = None
+    links: float = 1.0
 
     def rigid_torque(self, rows: Rows) -> Array:
         """Torque (n, nq) [N·m] of rigid bodies."""
+        rigid = rows.rigid if self.links == 1 else rows.rigid + (self.links - 1) * rows.links
         if self.bodies is None:
-            return rows.rigid
+            return rigid
         assert rows.regressor is not None
-        return np.asarray(rows.rigid + rows.regressor @ self.bodies)
+        return np.asarray(rigid + rows.regressor @ self.bodies)
 
     def friction_torque(self, rows: Rows) -> Array:
         """Friction torque and offset (n, nq) [N·m]."""
@@ -72,10 +74,10 @@ class FittedArm:
 
     def motion(self, rows: Rows) -> Motion:
         """What the power follows from, with friction apart."""
-        return Motion(rows.v, self.link_torque(rows), self.friction_torque(rows))
+        return Motion(rows.v, self.link_torque(rows), self.links * rows.links, self.friction_torque(rows))
 
     def power(self, rows: Rows) -> tuple[Array, Array]:
-        """Power (n,) [W] on the bus, and its derivatives (n, 1 + 3 nq) by the electrics."""
+        """Power (n,) [W] on the bus, and its derivatives (n, 2 + 3 nq) by the electrics."""
         return power(self.electrics, self.motion(rows), self.torque_constant, self.regeneration)
 
 

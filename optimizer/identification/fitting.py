@@ -11,14 +11,20 @@ from optimizer.identification.clusters import Clusters, clusters_of
 from optimizer.identification.estimate import Estimate, Name, joined
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm, own_arm, with_torques
+from optimizer.identification.link_errors import LINK_MASS
 from optimizer.identification.options import Options
 from optimizer.identification.power_fit import fit_power, prior_of
-from optimizer.identification.power_model import Electrics
+from optimizer.identification.power_model import Electrics, packed_size
 from optimizer.identification.torque_fit import fit_torques
 from optimizer.identification.whole_fit import fit_whole
 
 # variances below it are rounding
 LEAST_ERROR = 1e-12
+LINKS = "link_mass_scale"
+"""The figure of the factor on the masses of all links."""
+# share of its standard deviation before the log, above which the log did not tell it
+WORTH = 0.7
+HARDLY = "The logs hardly tell it from the robot's own."
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +47,7 @@ def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
     """Fits what the rows have: torques, power or both."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
     estimates, without, tilted = list[Estimate](), [arm] * clusters.count, list[FittedArm]()
-    torque, drift = motor_torque(arm, rows), np.zeros((1 + 3 * robot.nq,) * 2)
+    torque, drift = motor_torque(arm, rows), np.zeros((packed_size(robot.nq),) * 2)
     with_torque, with_power = bool(np.isfinite(torque).any()), bool(np.isfinite(rows.power).any())
     if with_torque:
         found, arm, without, tilted = _fit_torque(robot, rows, torque, arm, clusters, options)
@@ -113,18 +119,19 @@ def _fit_power(
     estimate = _power_estimate(robot, fit.value, replicates, drift, friction_known)
     # of factors on the friction as it is scaled in the arm. What the held terms' errors add to the electrics is not
     # in it: the electrics make up for it in the energy
-    relative = np.ones(1 + 3 * robot.nq)
+    relative = np.ones(packed_size(robot.nq))
     relative[1 + 2 * robot.nq :] /= np.maximum(fit.value[1 + 2 * robot.nq :], 1e-3)
     return estimate, _with_electrics(arm, fit.value, friction_known), arms, np.outer(relative, relative) * fit.drift
 
 
 def _with_electrics(arm: FittedArm, values: Array, friction_known: bool) -> FittedArm:
     electrics = Electrics.unpacked(values)
+    factor, links = electrics.factor, electrics.links
+    electrics = replace(electrics, factor=np.ones_like(factor), links=1.0)
     if friction_known:
-        return replace(arm, electrics=replace(electrics, factor=np.ones_like(electrics.factor)))
-    factor = electrics.factor
+        return replace(arm, electrics=electrics)
     scaled = {term: factor * getattr(arm, term) for term in ("coulomb", "viscous", "load", "curved")}
-    return replace(arm, **scaled, electrics=replace(electrics, factor=np.ones_like(factor)))
+    return replace(arm, **scaled, links=arm.links * links, electrics=electrics)
 
 
 def _power_estimate(robot: Robot, value: Array, replicates: Array, drift: Array, friction_known: bool) -> Estimate:
@@ -132,13 +139,16 @@ def _power_estimate(robot: Robot, value: Array, replicates: Array, drift: Array,
     nq, own = robot.nq, own_arm(robot)
     names: list[Name] = [("idle_power", None)]
     names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]
-    turn = [np.eye(1 + 3 * nq)[: 1 + 2 * nq]]
+    turn = [np.eye(packed_size(nq))[: 1 + 2 * nq]]
     if not friction_known:
         for figure in ("coulomb", "viscous", "load", "curved"):
             for joint in np.flatnonzero(getattr(own, figure)).tolist():
                 names.append((figure, joint))
-                row = np.zeros((1, 1 + 3 * nq))
+                row = np.zeros((1, packed_size(nq)))
                 row[0, 1 + 2 * nq + joint] = getattr(own, figure)[joint]
                 turn.append(row)
+        names.append((LINKS, None))
+        turn.append(np.eye(packed_size(nq))[-1:])
     matrix = np.concatenate(turn)
-    return Estimate(tuple(names), matrix @ value, replicates @ matrix.T, ("",) * len(names), matrix @ drift @ matrix.T)
+    why = [HARDLY if name == LINKS and drift[-1, -1] > (WORTH * LINK_MASS) ** 2 else "" for name, _ in names]
+    return Estimate(tuple(names), matrix @ value, replicates @ matrix.T, tuple(why), matrix @ drift @ matrix.T)

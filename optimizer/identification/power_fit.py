@@ -3,6 +3,9 @@
 Idle power, copper, inverters and friction act alike on the power of slow moves, so a short log does not tell them
 apart. Each is therefore held to the robot's own figure as far as that can be trusted: a Gaussian prior with the range
 that the figure has before any log. What the log tells takes over as it gets longer (maximum a posteriori).
+
+The power that lifts the links comes back when they sink. Without torques, an error of their masses would make every
+move that lifts too dear, and every one that lowers too cheap: a factor on all masses is found with the rest.
 """
 
 from __future__ import annotations
@@ -13,19 +16,17 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from models.robot import Array, Mask, Robot
-from models.uncertainty.spread import P95
+from models.trust import trust_letters
+from models.uncertainty.ranges import P95, large_joints, lognormal, range_of
 from optimizer.identification.clusters import Clusters, shared_variance
 from optimizer.identification.grouped import Grouped, left_out
+from optimizer.identification.link_errors import LINK_MASS
 from optimizer.identification.power_model import Electrics, Motion, power
 from optimizer.identification.robust import bisquare_weights
 
-# P95 over the value of the robot's own figures before any log, from the spread over units and temperatures
-IDLE, COPPER, FRICTION_COMMON, FRICTION_JOINT = 1.28, 2.5, 1.22, 1.28
-# P95 [W/A] of the inverter's linear loss where the robot has no figure, and P5 is 0
-INVERTER = 0.3
 ITERATIONS, CONVERGED = 30, 1e-9
-WORTH = 0.7
-"""A posterior standard deviation above this share of the prior's: the log did not tell the figure."""
+# standard deviation of a figure that is taken as known, over its value
+KNOWN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +38,47 @@ class Prior:
 
 
 def prior_of(robot: Robot, friction_known: bool) -> Prior:
-    """From the robot's own figures; with `friction_known` the friction factor is 1."""
+    """From the ranges of the robot's own figures; with `friction_known`, friction and links are taken as they are."""
     drives, nq = robot.drives, robot.nq
     idle = robot.electronics.idle_power + float(drives.inverter_constant.sum())
-    inverters = np.where(drives.inverter_linear > 0, drives.inverter_linear, INVERTER / 2)
-    mean = np.concatenate([[idle], drives.copper, inverters, np.ones(nq)])
+    idle_mean, idle_sd = _held(idle, *_range(robot, "idle_power", "electronics", "idle_power"))
+    large, small = (_range(robot, each, "drives", "copper") for each in ("copper_large", "copper_small"))
+    joints = zip(drives.copper.tolist(), large_joints(robot).tolist(), strict=True)
+    copper_mean, copper_sd = np.transpose([_held(own, *(large if is_large else small)) for own, is_large in joints])
+    low, high = range_of("inverter_linear")
+    inverter_mean = np.where(drives.inverter_linear > 0, drives.inverter_linear, (low + high) / 2)
+    mean = np.concatenate([[idle_mean], copper_mean, inverter_mean, np.ones(nq + 1)])
     variance = np.zeros((len(mean), len(mean)))
-    variance[0, 0] = (np.log(IDLE) / P95 * idle) ** 2
+    variance[0, 0] = idle_sd**2
     copper, inverter, factor = (np.arange(1 + k * nq, 1 + (k + 1) * nq) for k in range(3))
     # all joints have motors of one maker: half of the variance is common to them
-    variance[np.ix_(copper, copper)] = _half_common(np.log(COPPER) / P95 * drives.copper)
-    variance[np.ix_(inverter, inverter)] = _half_common(np.full(nq, INVERTER / (2 * P95)))
-    common, own = (1e-6, 1e-6) if friction_known else (np.log(FRICTION_COMMON) / P95, np.log(FRICTION_JOINT) / P95)
+    variance[np.ix_(copper, copper)] = _half_common(copper_sd)
+    variance[np.ix_(inverter, inverter)] = _half_common(np.full(nq, (high - low) / (2 * P95)))
+    common, own, links = KNOWN, KNOWN, KNOWN
+    if not friction_known:
+        common, own = (_width(robot, each) for each in ("friction_common", "friction_joint"))
+        links = LINK_MASS
     variance[np.ix_(factor, factor)] = common**2 + own**2 * np.eye(nq)
+    variance[-1, -1] = links**2
     return Prior(mean, np.asarray(np.linalg.inv(variance)))
+
+
+def _range(robot: Robot, name: str, section: str, figure: str) -> tuple[float, float]:
+    """The range of a factor on a figure of the robot."""
+    return range_of(name, trust_letters(robot.figures.get(section, {}).get(figure)))
+
+
+def _held(own: float, low: float, high: float) -> tuple[float, float]:
+    """Mean and standard deviation of a figure that is `low` to `high` times the robot's own."""
+    middle, width = lognormal(low, high)
+    mean = own * float(np.exp(middle))
+    return mean, width * mean
+
+
+def _width(robot: Robot, name: str) -> float:
+    """Relative standard deviation of the friction."""
+    letters = trust_letters(robot.figures.get("friction_laws", {}).get(robot.friction.name))
+    return lognormal(*range_of(name, letters))[1]
 
 
 def _half_common(sd: Array) -> Array:
@@ -111,7 +139,7 @@ def _unmoved(motion: Motion) -> Mask:
     """The packed figures of joints that do not move: the robot's own are kept, apart from copper and inverter."""
     still = np.abs(motion.v).max(axis=0) < 1e-3
     none = np.zeros_like(still)
-    return np.concatenate([[False], none, none, still])
+    return np.concatenate([[False], none, none, still, [False]])
 
 
 def _nonnegative(precision: Array, target: Array, own: Array, held: Mask) -> Array:

@@ -10,12 +10,14 @@ import pytest
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
+from optimizer.identification.document import document_of
 from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
 from optimizer.identification.identify import Identification, fit
 from optimizer.identification.log import Log, Move
 from optimizer.identification.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
-from tests.identification_logs import Noise, Recording, Truth, recorded, truth_of
+from optimizer.problem.arm import Payload
+from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 
 ROBOT = load_robot("ur10e")
 WITHOUT_SPLIT = Options(held_out=0.0)
@@ -89,6 +91,34 @@ def test_power_alone_gives_idle_power_and_the_size_of_friction() -> None:
     assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
 
 
+@pytest.mark.parametrize("scale", [0.88, 1.0])
+def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
+    """The power of lifting tells it; the payload, which is known, is not scaled with them."""
+    none = np.zeros((3, 3))
+    real = replace(ROBOT, model=ROBOT.loaded_model(0.0, none[0], none, GRAVITY, np.full(6, scale)))
+    truth = truth_of(ROBOT, 3, Payload(mass=4.0, com=np.array([0.0, 0.0, 0.05])))
+    log = replace(recorded(real, truth, moves=14, seed=3).log(), effort=None, effort_meaning=None)
+    found = fit(ROBOT, [log])
+    links = next(each for each in found.parameters if each.figure == "link_mass_scale")
+    assert links.identified and links.previous == 1.0 and abs(links.value - scale) <= FAR * links.sd < 0.1
+    assert found.validation is not None
+    fitted, own = found.validation.fitted.power, found.validation.own.power
+    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+    document = document_of(found.figures(), "2026-01-01")
+    heavier = load_robot("ur10e", figures=document).model
+    for own, body in zip(list(ROBOT.model.inertias)[1:], list(heavier.inertias)[1:], strict=True):
+        np.testing.assert_allclose(body.mass, links.value * own.mass)
+        np.testing.assert_allclose(body.lever, own.lever, atol=1e-9)
+        np.testing.assert_allclose(body.inertia, links.value * own.inertia, rtol=1e-6, atol=1e-9)
+
+
+def test_power_without_lifting_does_not_tell_the_mass_of_the_links() -> None:
+    """Of an arm that turns about its upright axis and rests elsewhere; its rotor is far larger than its links."""
+    log = still_but(recorded(ROBOT, truth_of(ROBOT), moves=8), 5)
+    links = next(each for each in fit(ROBOT, [log], WITHOUT_SPLIT).parameters if each.figure == "link_mass_scale")
+    assert not links.identified and links.why and abs(links.value - 1) < 0.1
+
+
 def still(recording: Recording, joint: int) -> Log:
     """The log of the recording as if a joint had not moved: its torque is only that of holding."""
     log = recording.log()
@@ -107,6 +137,14 @@ def test_a_joint_that_does_not_move_keeps_the_robots_own_figures() -> None:
     figures = found.figures()
     for name in ("coulomb", "viscous", "curved", "speed"):
         assert figures.values[name][5] == getattr(ROBOT.friction, name)[5]
+
+
+def still_but(recording: Recording, joint: int) -> Log:
+    """The log of the power as if one joint alone had moved."""
+    log = recording.log()
+    alone = np.arange(ROBOT.nq) == joint
+    motion = {name: np.where(alone, getattr(log, name), 0.0) for name in ("q", "v", "a")}
+    return replace(log, **motion, effort=None, effort_meaning=None)  # type: ignore[arg-type]
 
 
 def at_rest(log: Log) -> Log:
