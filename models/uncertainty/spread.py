@@ -9,25 +9,19 @@ figures have the same draws everywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
-from importlib.resources import files
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
-import yaml
 from scipy.special import ndtr, ndtri
 
 from models.robot import Array, Robot
 from models.trust import trust_letters
 from models.uncertainty.document import Covariance, covariance_of
 from models.uncertainty.parameters import BASE_POWER, count, place, values
+from models.uncertainty.ranges import default_ranges, large_joints, lognormal, range_of
 
 DRAWS = 2048
 SEED = 18
-# quantile of the standard normal distribution at 95 %
-P95 = 1.6448536269514722
-# a joint is large if its torque limit is at least this share of the greatest one
-LARGE = 0.5
 # robots whose draws are kept: a megabyte each
 MOST_SPREADS = 16
 # share of the greatest variance that is rounding
@@ -52,14 +46,6 @@ class Spread:
     covariances: dict[str, Array]
     move_draws: Array
     move_sd: float
-
-
-@cache
-def default_ranges() -> dict[str, Any]:
-    """The ranges of figures that no log has identified, by name."""
-    text = (files("models.uncertainty") / "default_ranges.yaml").read_text(encoding="utf-8")
-    ranges: dict[str, Any] = yaml.safe_load(text)
-    return ranges
 
 
 @lru_cache(MOST_SPREADS)
@@ -123,14 +109,11 @@ class _Sources:
 
     def _factor(self, name: str, letters: set[str] = frozenset()) -> Array:  # type: ignore[assignment]
         """Draws (n,) of a range: of a factor, or of a value."""
-        entry = default_ranges()[name]
-        if "E" in letters:
-            entry = entry.get("engineering_default", entry)
-        low, high = entry["factor"] if "factor" in entry else entry["value"]
+        low, high = range_of(name, letters)
         normal = self._normal()
         if low == 0:
             return np.asarray(high / 0.95 * ndtr(normal))
-        middle, width = np.log([low, high]).mean(), np.log(high / low) / (2 * P95)
+        middle, width = lognormal(low, high)
         return np.asarray(np.exp(middle + width * normal))
 
     def _add(self, source: str, name: str, deviation: Array) -> None:
@@ -163,8 +146,7 @@ class _Sources:
 
     def _drives(self, identified: set[str]) -> None:
         nominal, nq = self._nominal, self.robot.nq
-        tau_max = self.robot.limits.tau_max
-        large = tau_max >= LARGE * tau_max.max()
+        large = large_joints(self.robot)
         for name in ("torque_constant", "rotor_inertia", "copper"):
             if name in identified:
                 continue

@@ -33,7 +33,8 @@ LONGEST, BLOCK, PAUSE = 7.5, 5.0, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows (n, nq) of all logs: q [rad], v [rad/s], a [rad/s²], `rigid` torques of bodies and load [N·m].
+    """Rows (n, nq) of all logs: q [rad], v [rad/s], a [rad/s²], `rigid` torques of links and load [N·m], and those of
+    the `links` alone.
 
     `effort` (n, nq) is the motor torque [N·m], or the motor current [A] if `current`; `power` (n,) [W] and
     `temperature` (n, nq) [°C]; all of them NaN where not logged. `log`, `move` (n,) are numbers from 0; moves count
@@ -46,6 +47,7 @@ class Rows:
     v: Array
     a: Array
     rigid: Array
+    links: Array
     effort: Array
     power: Array
     temperature: Array
@@ -120,11 +122,16 @@ def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) ->
     v[still], a[still] = 0.0, 0.0
     payload = log.payload
     model = robot.loaded_model(payload.mass, payload.com, payload.inertia, log.gravity)
+    rigid = rigid_torques(model, q, v, a)
+    links = rigid
+    if payload.mass > 0:
+        links = rigid_torques(robot.loaded_model(0.0, payload.com, payload.inertia * 0.0, log.gravity), q, v, a)
     return {
         "q": q,
         "v": v,
         "a": a,
-        "rigid": rigid_torques(model, q, v, a),
+        "rigid": rigid,
+        "links": links,
         "effort": mean(log.effort, joints),
         "power": mean(log.power, ()),
         "temperature": mean(log.temperature, joints),

@@ -12,7 +12,7 @@ from optimizer.identification.estimate import Name
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.friction_columns import column
 from optimizer.identification.options import Coupling
-from optimizer.identification.power_model import Electrics, Motion, power
+from optimizer.identification.power_model import Electrics, Motion, friction, power
 
 FRICTION_TERMS = ("coulomb", "viscous", "load", "curved", "offset")
 
@@ -22,7 +22,7 @@ class FittedArm:
     """Figures (nq,) of an arm: those of the friction law, `rotor_inertia`, `torque_constant`; and its electrics.
 
     `couplings` has the terms of motors that several joints share, `bodies` (10 nq,) the change of the links' parameters
-    from the robot's own; None for its own links.
+    from the robot's own; None for its own links. `links` is a factor on their masses.
     """
 
     coulomb: Array
@@ -38,29 +38,20 @@ class FittedArm:
     knee: float
     couplings: tuple[tuple[Coupling, dict[str, float]], ...] = ()
     bodies: Array | None = None
+    links: float = 1.0
 
     def rigid_torque(self, rows: Rows) -> Array:
         """Torque (n, nq) [N·m] of rigid bodies."""
+        rigid = rows.rigid if self.links == 1 else rows.rigid + (self.links - 1) * rows.links
         if self.bodies is None:
-            return rows.rigid
+            return rigid
         assert rows.regressor is not None
-        return np.asarray(rows.rigid + rows.regressor @ self.bodies)
+        return np.asarray(rigid + rows.regressor @ self.bodies)
 
     def friction_torque(self, rows: Rows) -> Array:
         """Friction torque and offset (n, nq) [N·m]."""
-        v, a, rigid = rows.v, rows.a, self.rigid_torque(rows)
-        total = np.zeros_like(v)
-        for joint in range(v.shape[1]):
-            for term in FRICTION_TERMS:
-                coefficient = float(getattr(self, term)[joint])
-                if coefficient:
-                    part = column(term, v[:, joint], a[:, joint], rigid[:, joint], self.knee, float(self.speed[joint]))
-                    total[:, joint] += coefficient * part
-        for coupling, terms in self.couplings:
-            at, by = v @ coupling.ratios, a @ coupling.ratios
-            motor = sum(value * column(term, at, by, at, self.knee) for term, value in terms.items())
-            total += np.outer(motor, coupling.ratios)
-        return total
+        motion = self.motion(rows)
+        return motion.other + friction(motion)
 
     def link_torque(self, rows: Rows) -> Array:
         """Torque (n, nq) [N·m] of rigid bodies and rotors."""
@@ -68,14 +59,34 @@ class FittedArm:
 
     def torque(self, rows: Rows) -> Array:
         """Motor torque (n, nq) [N·m]."""
-        return self.link_torque(rows) + self.friction_torque(rows)
+        motion = self.motion(rows)
+        return motion.rigid + motion.rotor + motion.other + friction(motion)
 
     def motion(self, rows: Rows) -> Motion:
-        """What the power follows from, with friction apart."""
-        return Motion(rows.v, self.link_torque(rows), self.friction_torque(rows))
+        """What the power follows from."""
+        v, a = rows.v, rows.a
+        step, other = v / np.hypot(v, self.knee), np.tile(self.offset, (len(v), 1))
+        for coupling, terms in self.couplings:
+            at, by = v @ coupling.ratios, a @ coupling.ratios
+            motor = sum(value * column(term, at, by, at, self.knee) for term, value in terms.items())
+            other += np.outer(motor, coupling.ratios)
+        dry = self.coulomb * step
+        if self.curved.any():
+            dry += self.curved * np.arcsinh(v / self.speed)
+        return Motion(
+            v=v,
+            step=step,
+            rigid=self.rigid_torque(rows),
+            bodies=self.links * rows.links,
+            dry=dry,
+            viscous=self.viscous * v,
+            rotor=self.rotor_inertia * a,
+            other=other,
+            load=self.load,
+        )
 
     def power(self, rows: Rows) -> tuple[Array, Array]:
-        """Power (n,) [W] on the bus, and its derivatives (n, 1 + 3 nq) by the electrics."""
+        """Power (n,) [W] on the bus, and its derivatives (n, 2 + 7 nq) by the electrics."""
         return power(self.electrics, self.motion(rows), self.torque_constant, self.regeneration)
 
 
@@ -92,7 +103,7 @@ def own_arm(robot: Robot, knee: float | None = None) -> FittedArm:
         offset=np.zeros(nq),
         rotor_inertia=drives.rotor_inertia,
         torque_constant=drives.torque_constant,
-        electrics=Electrics(idle, drives.copper, drives.inverter_linear, np.ones(nq)),
+        electrics=Electrics.plain(idle, drives.copper, drives.inverter_linear),
         regeneration=robot.electronics.regeneration,
         knee=law.knee if knee is None else knee,
     )

@@ -12,13 +12,18 @@ from optimizer.identification.estimate import Estimate, Name, joined
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm, own_arm, with_torques
 from optimizer.identification.options import Options
-from optimizer.identification.power_fit import fit_power, prior_of
-from optimizer.identification.power_model import Electrics
+from optimizer.identification.power_fit import Prior, fit_power, prior_of
+from optimizer.identification.power_model import Electrics, packed_size
 from optimizer.identification.torque_fit import fit_torques
 from optimizer.identification.whole_fit import fit_whole
 
 # variances below it are rounding
 LEAST_ERROR = 1e-12
+LINKS = "link_mass_scale"
+"""The figure of the factor on the masses of all links."""
+# share of a figure's standard deviation before the log: beyond it, the log did not tell the figure
+WORTH = 0.7
+HARDLY = "The logs hardly tell it from the robot's own."
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +46,7 @@ def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
     """Fits what the rows have: torques, power or both."""
     clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
     estimates, without, tilted = list[Estimate](), [arm] * clusters.count, list[FittedArm]()
-    torque, drift = motor_torque(arm, rows), np.zeros((1 + 3 * robot.nq,) * 2)
+    torque, drift = motor_torque(arm, rows), np.zeros((packed_size(robot.nq),) * 2)
     with_torque, with_power = bool(np.isfinite(torque).any()), bool(np.isfinite(rows.power).any())
     if with_torque:
         found, arm, without, tilted = _fit_torque(robot, rows, torque, arm, clusters, options)
@@ -110,35 +115,57 @@ def _fit_power(
         errors = np.array(moved[clusters.count :]).reshape(-1, len(fit.value))
         drift = drift + errors.T @ errors
     arms = [_with_electrics(each, values, friction_known) for each, values in zip(without, replicates, strict=True)]
-    estimate = _power_estimate(robot, fit.value, replicates, drift, friction_known)
-    # of factors on the friction as it is scaled in the arm. What the held terms' errors add to the electrics is not
-    # in it: the electrics make up for it in the energy
-    relative = np.ones(1 + 3 * robot.nq)
-    relative[1 + 2 * robot.nq :] /= np.maximum(fit.value[1 + 2 * robot.nq :], 1e-3)
+    estimate = _power_estimate(robot, prior, fit.value, replicates, drift, friction_known)
+    # of factors on friction and links as they are scaled in the arm. What the held terms' errors add to the electrics
+    # is not in it: the electrics make up for it in the energy
+    relative, factors = np.ones(packed_size(robot.nq)), [*range(1 + 2 * robot.nq, 1 + 5 * robot.nq), -1]
+    relative[factors] /= np.maximum(fit.value[factors], 1e-3)
     return estimate, _with_electrics(arm, fit.value, friction_known), arms, np.outer(relative, relative) * fit.drift
 
 
 def _with_electrics(arm: FittedArm, values: Array, friction_known: bool) -> FittedArm:
     electrics = Electrics.unpacked(values)
+    plain = Electrics.plain(electrics.idle, electrics.copper, electrics.inverter)
     if friction_known:
-        return replace(arm, electrics=replace(electrics, factor=np.ones_like(electrics.factor)))
-    factor = electrics.factor
-    scaled = {term: factor * getattr(arm, term) for term in ("coulomb", "viscous", "load", "curved")}
-    return replace(arm, **scaled, electrics=replace(electrics, factor=np.ones_like(factor)))
+        return replace(arm, electrics=plain)
+    return replace(
+        arm,
+        coulomb=electrics.dry * arm.coulomb,
+        curved=electrics.dry * arm.curved,
+        viscous=electrics.viscous * arm.viscous,
+        rotor_inertia=electrics.rotor * arm.rotor_inertia,
+        load=arm.load + electrics.load,
+        offset=arm.offset + electrics.offset,
+        links=arm.links * electrics.links,
+        electrics=plain,
+    )
 
 
-def _power_estimate(robot: Robot, value: Array, replicates: Array, drift: Array, friction_known: bool) -> Estimate:
-    """The packed figures as an estimate; the friction's factors, if they are fitted, as its coefficients."""
-    nq, own = robot.nq, own_arm(robot)
+def _power_estimate(
+    robot: Robot, prior: Prior, value: Array, replicates: Array, drift: Array, friction_known: bool
+) -> Estimate:
+    """The packed figures as an estimate; what is fitted of the friction, if anything, as its coefficients."""
+    nq, own, every = robot.nq, own_arm(robot), np.eye(packed_size(robot.nq))
     names: list[Name] = [("idle_power", None)]
     names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]
-    turn = [np.eye(1 + 3 * nq)[: 1 + 2 * nq]]
+    turn, known = [*every[: len(names)]], [0.0] * len(names)
     if not friction_known:
-        for figure in ("coulomb", "viscous", "load", "curved"):
+        for figure, part in (("coulomb", 2), ("curved", 2), ("viscous", 3), ("rotor_inertia", 4)):
             for joint in np.flatnonzero(getattr(own, figure)).tolist():
                 names.append((figure, joint))
-                row = np.zeros((1, 1 + 3 * nq))
-                row[0, 1 + 2 * nq + joint] = getattr(own, figure)[joint]
-                turn.append(row)
-    matrix = np.concatenate(turn)
-    return Estimate(tuple(names), matrix @ value, replicates @ matrix.T, ("",) * len(names), matrix @ drift @ matrix.T)
+                turn.append(getattr(own, figure)[joint] * every[1 + part * nq + joint])
+                known.append(0.0)
+        for joint in np.flatnonzero(own.load + prior.mean[1 + 5 * nq : 1 + 6 * nq]).tolist():
+            names.append(("load", joint))
+            turn.append(every[1 + 5 * nq + joint])
+            known.append(float(own.load[joint]))
+        names.append((LINKS, None))
+        turn.append(every[-1])
+        known.append(0.0)
+    matrix, constant = np.array(turn), np.array(known)
+    found = Estimate(
+        tuple(names), matrix @ value + constant, replicates @ matrix.T + constant, (), matrix @ drift @ matrix.T
+    )
+    before = matrix @ np.linalg.inv(prior.precision) @ matrix.T
+    untold = np.diag(found.covariance) > WORTH**2 * np.diag(before)
+    return replace(found, why=tuple(HARDLY if each else "" for each in untold.tolist()))

@@ -17,7 +17,7 @@ from scipy.optimize import lsq_linear
 from scipy.special import stdtrit
 
 from models.robot import Array, Mask
-from models.uncertainty.spread import P95
+from models.uncertainty.ranges import P95
 
 Numbers = npt.NDArray[np.int64]
 

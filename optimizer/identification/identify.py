@@ -15,7 +15,7 @@ from optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadU
 from optimizer.identification.estimate import Estimate, Name
 from optimizer.identification.fit_rows import Rows, rows_of
 from optimizer.identification.fitted_arm import own_arm
-from optimizer.identification.fitting import Fitted, fit_rows, motor_torque
+from optimizer.identification.fitting import LINKS, Fitted, fit_rows, motor_torque
 from optimizer.identification.grouped import lag_one
 from optimizer.identification.interval import Spread, sessions, spread_of
 from optimizer.identification.log import Log
@@ -84,6 +84,8 @@ class Identification:
             electrics = arm.electrics
             values |= {"idle_power": np.array(electrics.idle), "copper": electrics.copper}
             values["inverter_linear"] = electrics.inverter
+        if LINKS in fitted:
+            values |= inertials_of(self.robot, (arm.links - 1) * body_parameters(self.robot.model))
         if arm.bodies is not None:
             values |= inertials_of(self.robot, arm.bodies)
         # those that the logs tell only together with others count, too: their errors go with the others'
@@ -233,6 +235,8 @@ def _previous(robot: Robot, name: Name) -> float:
     if figure.startswith(LINK):
         assert joint is not None
         return float(body_parameters(robot.model).reshape(-1, BODY)[joint, PARTS.index(figure.removeprefix(LINK))])
+    if figure == LINKS:
+        return 1.0
     if figure == "idle_power":
         return float(robot.electronics.idle_power)
     if figure in ("copper", "inverter_linear", "torque_constant"):

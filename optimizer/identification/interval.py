@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from models.uncertainty.spread import P95
+from models.uncertainty.ranges import P95
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm
 from optimizer.identification.fitting import Fitted

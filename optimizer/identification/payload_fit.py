@@ -21,8 +21,9 @@ from optimizer.identification.estimate import Name
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.friction_columns import columns
 from optimizer.identification.grouped import Grouped, jackknife, left_out, solve
+from optimizer.identification.link_errors import link_deviations
 from optimizer.identification.log import Log
-from optimizer.identification.regressor import BODY, body_parameters, rigid_torques
+from optimizer.identification.regressor import BODY, rigid_torques
 from optimizer.identification.results import Parameter
 from optimizer.identification.torque_fit import LEAST_LOAD_SPREAD, MOST_RELATIVE_SD
 from optimizer.problem.arm import Payload
@@ -31,9 +32,7 @@ TERMS = ("coulomb", "viscous", "load", "curved", "offset", "rotor_inertia")
 NAMES: tuple[Name, ...] = tuple((f"payload_{part}", None) for part in ("mass", "com_x", "com_y", "com_z"))
 # the weights of joints and the payload's share of load friction follow from the fit before
 PASSES = 4
-# standard deviations of the links' errors: of mass over mass, of the centre of mass [m], of inertia over inertia
-LINK_MASS, LINK_COM, LINK_INERTIA = 0.1, 0.02, 0.3
-# those of a payload before any log: mass [kg], first moments [kg·m], inertia about the last joint [kg·m²]
+# standard deviations of a payload before any log: mass [kg], first moments [kg·m], inertia about the last joint [kg·m²]
 MASS, MOMENT, INERTIA = 100.0, 30.0, 0.1
 # a term of friction is anything up to so many times the joint's torque limit, per unit of its column
 FRICTION = 10.0
@@ -145,12 +144,7 @@ def _equations(
 
 def _precision(robot: Robot) -> Array:
     """Of links' errors, payload and friction before any log."""
-    own, deviations = body_parameters(robot.model).reshape(-1, BODY), list[Array]()
-    for body in own:
-        inertia = (body[4] + body[6] + body[9]) / 2 + LINK_COM**2 * body[0]
-        parts = [LINK_MASS * body[0]], [LINK_COM * body[0]] * 3, [LINK_INERTIA * inertia] * 6
-        deviations.append(np.maximum(np.concatenate(parts), 1e-6))
-    deviations.append(np.array([MASS, *[MOMENT] * 3, *[INERTIA] * 6]))
+    deviations = [link_deviations(robot), np.array([MASS, *[MOMENT] * 3, *[INERTIA] * 6])]
     deviations += [np.full(len(TERMS), FRICTION * limit) for limit in robot.limits.tau_max.tolist()]
     return np.asarray(np.concatenate(deviations) ** -2.0)
 

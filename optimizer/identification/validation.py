@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array, Robot
-from models.uncertainty.spread import P95
+from models.uncertainty.ranges import P95
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm, own_arm
 from optimizer.identification.fitting import Fitted, motor_torque

@@ -14,7 +14,8 @@ from models.own_arm.robots import own_robot
 from models.registry import load_robot
 from models.robot import Array, Robot
 from models.uncertainty.parameters import BASE_POWER, PER_JOINT, count, place, values
-from models.uncertainty.spread import DRAWS, default_ranges, spread_of
+from models.uncertainty.ranges import default_ranges
+from models.uncertainty.spread import DRAWS, spread_of
 
 UR5E = load_robot("ur5e")
 EXACT = FIGURES | {

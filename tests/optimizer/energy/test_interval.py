@@ -11,7 +11,8 @@ import pytest
 from models.registry import load_figures, load_robot
 from models.robot import Array, FrictionLaw, Robot
 from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, PER_JOINT, count, place, values
-from models.uncertainty.spread import DRAWS, Spread, default_ranges, spread_of
+from models.uncertainty.ranges import default_ranges
+from models.uncertainty.spread import DRAWS, Spread, spread_of
 from optimizer.energy.dwell import dwell_energy, holding_power
 from optimizer.energy.interval import Known, interval_of, saving_interval
 from optimizer.energy.losses import breakdown

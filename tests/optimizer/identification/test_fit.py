@@ -10,12 +10,14 @@ import pytest
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
+from optimizer.identification.document import document_of
 from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
 from optimizer.identification.identify import Identification, fit
 from optimizer.identification.log import Log, Move
 from optimizer.identification.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
-from tests.identification_logs import Noise, Recording, Truth, recorded, truth_of
+from optimizer.problem.arm import Payload
+from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 
 ROBOT = load_robot("ur10e")
 WITHOUT_SPLIT = Options(held_out=0.0)
@@ -87,6 +89,40 @@ def test_power_alone_gives_idle_power_and_the_size_of_friction() -> None:
     assert found.validation is not None
     fitted, own = found.validation.fitted.power, found.validation.own.power
     assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+
+
+@pytest.mark.parametrize("scale", [0.88, 1.0])
+def test_power_alone_tells_how_heavy_the_links_are(scale: float) -> None:
+    """The power of lifting tells it; the payload, which is known, is not scaled with them."""
+    none = np.zeros((3, 3))
+    real = replace(ROBOT, model=ROBOT.loaded_model(0.0, none[0], none, GRAVITY, np.full(6, scale)))
+    truth = truth_of(ROBOT, 3, Payload(mass=4.0, com=np.array([0.0, 0.0, 0.05])))
+    log = replace(recorded(real, truth, moves=14, seed=3).log(), effort=None, effort_meaning=None)
+    found = fit(ROBOT, [log])
+    links = next(each for each in found.parameters if each.figure == "link_mass_scale")
+    assert links.identified and links.previous == 1.0 and abs(links.value - scale) <= FAR * links.sd < 0.1
+    assert found.validation is not None
+    fitted, own = found.validation.fitted.power, found.validation.own.power
+    assert fitted is not None and own is not None and fitted.energy_mean < 0.5 * own.energy_mean
+    document = document_of(found.figures(), "2026-01-01")
+    heavier = load_robot("ur10e", figures=document).model
+    for own, body in zip(list(ROBOT.model.inertias)[1:], list(heavier.inertias)[1:], strict=True):
+        np.testing.assert_allclose(body.mass, links.value * own.mass)
+        np.testing.assert_allclose(body.lever, own.lever, atol=1e-9)
+        np.testing.assert_allclose(body.inertia, links.value * own.inertia, rtol=1e-6, atol=1e-9)
+
+
+def test_power_without_lifting_does_not_tell_how_heavy_the_links_are() -> None:
+    """Of an arm that turns about its upright axis alone."""
+    log = recorded(ROBOT, truth_of(ROBOT), moves=8).log()
+    first = np.arange(ROBOT.nq) == 0
+    motion = {name: np.where(first, getattr(log, name), 0.0) for name in ("q", "v", "a")}
+    speed, noise = np.abs(log.v[:, 0]), np.random.default_rng(0).normal(0.0, 0.5, len(log.v))
+    turned = replace(log, **motion, power=40 + 10 * speed + 9 * speed**2 + noise, effort=None, effort_meaning=None)
+    found = {(each.figure, each.joint): each for each in fit(ROBOT, [turned], WITHOUT_SPLIT).parameters}
+    assert found["idle_power", None].identified
+    assert not found["link_mass_scale", None].identified and found["link_mass_scale", None].why
+    assert not found["coulomb", 3].identified
 
 
 def still(recording: Recording, joint: int) -> Log:
