@@ -240,13 +240,15 @@ class Clearance:
     """Clearance of a motion [m], with the margins subtracted; negative if bodies overlap.
 
     `min_clearance` is proven for every instant. `sampled` is the least distance at sample points, of `pair` at `time`
-    [s]. The true least distance lies between the two.
+    [s]. The true least distance lies between the two. `points` [m] are the nearest points of the two bodies, in the
+    base frame, on their surfaces without margins; None where nobody asks for them.
     """
 
     min_clearance: float
     sampled: float
     pair: tuple[str, str]
     time: float
+    points: tuple[list[float], list[float]] | None = None
 
     @property
     def message(self) -> str:

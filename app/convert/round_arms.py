@@ -36,5 +36,6 @@ def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, 
         request,
         limits=given,
         payload=None if carried is None else carried.model_dump(mode="json", exclude_unset=True),
-        scene={"obstacles": [each.model_dump(mode="json", exclude_unset=True) for each in counted]},
+        scene=request.scene.model_dump(mode="json", exclude_unset=True)
+        | {"obstacles": [each.model_dump(mode="json", exclude_unset=True) for each in counted]},
     )

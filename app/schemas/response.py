@@ -222,6 +222,12 @@ class Clearance(Response):
     )
     pair: list[str] = described(BODIES, None, ["table", "tool"])
     time: float = described("Time of this sample, from the start of the motion.", "s", 0.62)
+    points: list[list[float]] | None = described(
+        "The nearest points of the two bodies at that time, in the base frame, without the margin. Null in answers of "
+        "an earlier version.",
+        "m",
+        [[-0.42, 0.21, 0.0], [-0.42, 0.21, 0.0192]],
+    )
 
 
 class Certificate(Response):

@@ -135,7 +135,8 @@ class _Proof:
             instants, checks = self.halved(instants, self.expanded(instants, checks[np.flatnonzero(is_open)]))
         # rounding may put a bound that is exact above the sample
         pair, t = self.closest
-        return Clearance(min(proven, self.least), self.least, self.model.names(pair), t)
+        points = self.model.nearest_points(self.instants(np.array([t])).frames, pair)
+        return Clearance(min(proven, self.least), self.least, self.model.names(pair), t, points)
 
     def initial_intervals(self) -> tuple[_Instants, _Checks]:
         """Intervals, each within a knot span, and the pairs that may be the closest there."""

@@ -39,7 +39,7 @@ class ConvexPairs:
         """Signed distance (k,) [m], normal (k, 3) from first to second, and a point (k, 3) [m] of the second core.
 
         `first`, `second` (k,) are indices of cores, whose poses in the base frame are T_first, T_second (k, 4, 4). The
-        point lies on the line through the witness points. If Coal does not converge, the distance is a lower bound.
+        point is the witness point. If Coal does not converge, the distance is a lower bound.
         """
         count = len(T_first)
         distance, normal, point = np.empty(count), np.empty((count, 3)), np.empty((count, 3))
@@ -52,7 +52,8 @@ class ConvexPairs:
                 result = coal.DistanceResult()
                 found = coal.distance(a, pose_a, b, pose_b, request, result)
                 if abs(found) < MOST_DISTANCE and abs(float(result.normal @ result.normal) - 1) < 1e-6:
-                    distance[k], normal[k], point[k] = found + skin_a + skin_b, result.normal, result.getNearestPoint2()
+                    distance[k], normal[k] = found + skin_a + skin_b, result.normal
+                    point[k] = result.getNearestPoint2() + skin_b * result.normal
                     break
             else:
                 distance[k], normal[k], point[k] = _lower_bound(self._cores[i], T_first[k], self._cores[j], T_second[k])

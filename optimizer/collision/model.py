@@ -142,6 +142,13 @@ class CollisionModel:
         found = [ClosestPair(self.names(int(k)), float(d[k])) for k, d in zip(closest, distance, strict=True)]
         return [found[k] for k in which.ravel()]
 
+    def nearest_points(self, frames: Array, pair: int) -> tuple[list[float], list[float]]:
+        """The nearest points [m] of a pair on the surfaces of its first and second body, without margins, at the frames
+        (1, nq + 1, 4, 4)."""
+        found = self.geometry.witness_points(frames, np.array([0]), np.array([pair]))
+        first, second = self.geometry.surface_points(np.array([pair]), found)[0].tolist()
+        return first, second
+
     def gradients(self, frames: Array, configuration: Indices, pair: Indices, found: WitnessPoints) -> Array:
         """Gradients (k, nq) [m/rad] of signed distances: n · (axis × (point - origin)) of every joint in between.
 

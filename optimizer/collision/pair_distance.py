@@ -73,7 +73,8 @@ class PairGeometry:
         self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
         self._half_sizes = np.array([np.zeros(3) if core.half_size is None else core.half_size for core in cores])
         self._T_link_core = np.array([body.T_link_core for body in bodies])
-        growth = np.array([body.core.radius + body.margin for body in bodies])
+        self._radii = np.array([core.radius for core in cores])
+        growth = self._radii + np.array([body.margin for body in bodies])
         self._growth = growth[pairs].sum(axis=1)
         self._half_space_first = np.array([core.is_half_space for core in cores], dtype=bool)[pairs][:, 0]
         segment = np.array([body.is_segment for body in bodies], dtype=bool)[pairs]
@@ -145,6 +146,16 @@ class PairGeometry:
             result.distance[chosen], result.normal[chosen], result.point[chosen] = found
         result.distance[:] -= self._growth[pair]
         return result
+
+    def surface_points(self, pair: Indices, found: WitnessPoints) -> Array:
+        """Nearest points (k, 2, 3) [m] of the first and the second body of pairs (k,), without margins."""
+        first, second = self.pairs[pair].T
+        gap = (found.distance + self._growth[pair])[:, None] * found.normal
+        # the witness point is on the second core, apart from these pairs
+        on_first = (self._kinds[pair] == PairKind.SEGMENT_BOX)[:, None]
+        cores = found.point - np.where(on_first, 0.0, gap), found.point + np.where(on_first, gap, 0.0)
+        outward = self._radii[first][:, None] * found.normal, -self._radii[second][:, None] * found.normal
+        return np.stack([core + out for core, out in zip(cores, outward, strict=True)], axis=1)
 
     def near_parts(
         self, frames: Array, configuration: Indices, pair: Indices, within: Array

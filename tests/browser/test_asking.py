@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from tests.app.live import ROOT, Server
 from tests.app.requests import EXAMPLES, NEAR, long_search, move
-from tests.browser.pages import FIRST, SHOWN, opened, show, state, until
+from tests.browser.pages import FIRST, MESHES, SHOWN, ask, opened, show, state, until
 from tests.browsers import BROWSER, MISSING
 
 ROUNDING = 1e-9  # s; sums of times in double precision
@@ -24,6 +24,15 @@ BEST = """() => {
     const { parts, chain } = studio.view;
     const flange = parts.ghosts.children.at(-1).children.at(-1).matrix.clone().transpose();
     return [flange.elements, chain.frames(studio.state.best.q_goal).at(-1)];
+}"""
+
+
+# how many shapes of payloads are drawn now
+CARRIED = """() => {
+    let count = 0;
+    for (const load of studio.view.arms[0].loads)
+        if (load.visible) load.traverse(({ isMesh }) => { count += Boolean(isMesh); });
+    return count;
 }"""
 
 
@@ -88,6 +97,15 @@ def test_a_goal_is_dragged_and_a_box_is_drawn(browser: Browser, service: Server)
         page.mouse.move(x, y)
         page.mouse.down()
         page.mouse.move(x - 8, y - 8, steps=3)
+        # at once, while the button is held: in words, and as a ghost where the hand would be
+        expect(page.locator("#drag-note")).to_contain_text("Reached by")
+        until(page, f"() => ({GHOSTS})() === 3")
+        drawn, chain = page.evaluate(BEST)
+        assert drawn == pytest.approx(chain)
+        page.mouse.move(x, y - 600, steps=3)
+        expect(page.locator("#drag-note")).to_contain_text("out of reach")
+        until(page, "() => studio.state.best === null")
+        page.mouse.move(x - 8, y - 8, steps=3)
         page.mouse.up()
         expect(page.locator("#drag-note")).to_contain_text("Reached by")
         moved = state(page, "request.goal.pose.position")
@@ -142,8 +160,27 @@ def test_a_round_is_played_as_one(page: Page) -> None:
     t, q = np.array(state(page, "answer.trajectory.t")), np.array(state(page, "answer.trajectory.q"))
     assert t[0] == 0 and t[-1] == pytest.approx(state(page, "round.duration")) and (np.diff(t) > -ROUNDING).all()
     assert np.abs(np.diff(q, axis=0)).max() < 0.1
-    page.locator("#timeline .leg").nth(2).click()
-    assert state(page, "time") == pytest.approx(legs[2]["t0"])
+    assert page.locator("#timeline tbody tr").count() == len(legs)
+    for k, leg in enumerate(legs):
+        page.locator("#timeline .leg").nth(k).click()
+        assert state(page, "time") == pytest.approx(leg["t0"])
+        assert page.evaluate(CARRIED) == (1 if leg["payload_mass"] else 0), "what it carries on this leg is drawn"
+    expect(page.locator(".label.stop", has_text="finished")).to_be_visible()
+
+
+def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
+    """The part that is grasped: at its stop and on the lines in and out of it."""
+    ask(page, json.loads((ROOT / "examples" / "cycle" / "out_of_a_tray.json").read_text()))
+    names = page.evaluate("() => studio.view.parts.obstacles.children.map(({ userData }) => userData.name)")
+    part = f"studio.view.parts.obstacles.children[{names.index('part')}]"
+    faint = []
+    for k, leg in enumerate(legs := state(page, "round.legs")):
+        page.locator("#timeline .leg").nth(k).click()
+        assert state(page, "time") == pytest.approx(leg["t0"])
+        page.evaluate("() => studio.view.render()")
+        faint.append(page.evaluate(f"() => {part}.userData.material.opacity < 0.5"))
+    assert faint == [leg["kind"] != "move" and leg["goal"]["stop"].startswith("pick") for leg in legs]
+    assert any(faint)
 
 
 def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
@@ -171,6 +208,7 @@ def test_a_page_stands_alone(browser: Browser, page: Page, tmp_path: Path) -> No
     energy = page.locator("#joules").inner_text()
     with opened(browser, f"file://{file}", offline=True) as alone:
         until(alone, SHOWN)
+        until(alone, MESHES)
         assert alone.locator("#joules").inner_text() == energy
         alone.locator("#limits button").first.click()
         assert np.isfinite(alone.evaluate("() => studio.tcp()")).all()

@@ -94,6 +94,31 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
     assert page.evaluate(PIXELS)[1] == before
 
 
+def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> None:
+    shells = "() => studio.view.parts.margins.children.filter(({ visible }) => visible).length"
+    x, y = page.evaluate("""() => {
+        const { view } = studio;
+        const top = view.parts.obstacles.children.find(({ userData }) => userData.name === "shelf top");
+        const at = top.children[0].getWorldPosition(view.camera.position.clone()).project(view.camera);
+        const box = view.renderer.domElement.getBoundingClientRect();
+        return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+    }""")
+    assert page.evaluate(shells) == 0
+    page.mouse.move(x, y)
+    expect(page.locator(".label.hover")).to_have_text("shelf top, margin 10.0 mm")
+    assert page.evaluate(shells) == 1
+    page.mouse.move(5, 5)
+    expect(page.locator(".label.hover")).to_have_count(0)
+    assert page.evaluate(shells) == 0
+
+
+def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
+    clearance = state(page, "answer.certificate.clearance")
+    drawn = page.evaluate("""() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]""")
+    assert np.array(drawn).reshape(2, 3) == pytest.approx(np.array(clearance["points"]), abs=DRAWN)
+    expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
+
+
 def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
     """Where the service has them; else the arm is drawn from its figures, and the page says nothing."""
     with_meshes = page.evaluate(PIXELS)
@@ -249,6 +274,7 @@ def test_behind_the_path_of_a_proxy(browser: Browser, service: Server) -> None:
     page = context.new_page()
     page.goto(f"{front}/studio")
     until(page, SHOWN)
+    until(page, MESHES)
     context.close()
 
 

@@ -61,10 +61,9 @@ export async function stream(path, body, event, signal) {
     const { value, done } = await reader.read();
     if (done) return;
     text += value.replaceAll("\r\n", "\n");
-    let end;
-    while ((end = text.indexOf("\n\n")) >= 0) {
-      const fields = text.slice(0, end).split("\n");
-      text = text.slice(end + 2);
+    const blocks = text.split("\n\n");
+    text = blocks.pop();
+    for (const fields of blocks.map((block) => block.split("\n"))) {
       const of = (name) => fields.filter((line) => line.startsWith(`${name}:`)).map((line) => line.slice(name.length + 1).replace(/^ /, ""));
       const data = of("data").join("\n");
       if (!data) continue;

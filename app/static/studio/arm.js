@@ -7,6 +7,7 @@ import { along, capsule, place, placedShape, roundedCylinder } from "./shapes.js
 
 const COLOURS = { tube: 0xe3e7ec, housing: 0xcfd5dc, cap: 0x2f7fb8, ring: 0x3a424c, foot: 0x555e69, tool: 0x2f3742, payload: 0xd8951f };
 const SIDES = 22; // of round bodies
+const WATER = 1000; // density [kg/m³]
 const geometries = new Map(); // of each robot, by name: several arms share them
 
 /** One geometry for each link, with the colours of its bodies, and one with the capsules of its collision checks. */
@@ -36,9 +37,14 @@ function bodyGeometry(kind, from, to, radius) {
   return along(from, to, (length) => roundedCylinder(radius, length, round, SIDES));
 }
 
-/** One arm in the scene. `tint`: a colour over its own ones. `opacity` below 1: a ghost, in the tint alone. */
+/** What is drawn of a payload: its shape; without one, the ball that as much water has. */
+const loadShape = ({ mass, com, shape }) =>
+  shape ?? { shape: "sphere", radius: Math.cbrt((3 * mass) / (4 * Math.PI * WATER)), pose: { position: com ?? [0, 0, 0] } };
+
+/** One arm in the scene. `tint`: a colour over its own ones. `opacity` below 1: a ghost, in the tint alone. `loads`: the
+ * payloads that it carries one after the other. */
 export class Arm {
-  constructor(chain, robot, request, { tint = 0xffffff, opacity = 1 } = {}) {
+  constructor(chain, robot, request, { tint = 0xffffff, opacity = 1, loads = [request.payload] } = {}) {
     this.chain = chain;
     this.object = new THREE.Group();
     const ghost = opacity < 1;
@@ -52,20 +58,26 @@ export class Arm {
       this.links[link].add(mesh);
       return mesh;
     };
-    // a ghost stands on the same base
-    this.drawn = drawn.map((geometry, link) => link > 0 || !ghost ? put(link, geometry, own) : null).filter(Boolean);
+    // ghosts and further arms stand on the same base
+    this.drawn = drawn.map((geometry, link) => link > 0 || tint === 0xffffff ? put(link, geometry, own) : null).filter(Boolean);
     this.seen = ghost ? [] : seen.map((geometry, link) => put(link, geometry, armMaterial(0x66aadd, 0.45, false)));
     for (const mesh of this.seen) mesh.castShadow = false;
     const tool = (request.tool?.capsules ?? []).map(({ start, end, radius }) => capsule(start, end, radius, 16));
     if (tool.length) put(drawn.length, merged(tool), of("tool"));
-    const load = request.payload?.shape;
-    if (load) {
-      const part = placedShape(load, of("payload"));
+    this.loads = loads.map((payload) => {
+      const part = payload?.mass ? placedShape(loadShape(payload), of("payload")) : new THREE.Group();
       part.traverse((each) => { each.castShadow = !ghost; });
       this.links.at(-1).add(part);
-    }
+      return part;
+    });
     this.object.add(...this.links);
     this.showCapsules(false);
+    this.carry(0);
+  }
+
+  /** Shows the load of this number alone. */
+  carry(number) {
+    this.loads.forEach((part, k) => { part.visible = k === number; });
   }
 
   /** Moves all links to joint positions q. */
@@ -81,8 +93,7 @@ export class Arm {
 }
 
 function armMaterial(color, opacity, vertexColors) {
-  const ghost = opacity < 1;
-  const offset = { polygonOffset: ghost, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
-  const common = { color, opacity, vertexColors, transparent: ghost, depthWrite: !ghost, ...offset };
-  return ghost ? new THREE.MeshLambertMaterial(common) : new THREE.MeshPhongMaterial({ ...common, shininess: 28, specular: 0x333333 });
+  if (opacity === 1) return new THREE.MeshPhongMaterial({ color, vertexColors, shininess: 28, specular: 0x333333 });
+  const behind = { depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
+  return new THREE.MeshLambertMaterial({ color, opacity, vertexColors, transparent: true, ...behind });
 }

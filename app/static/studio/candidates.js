@@ -29,7 +29,7 @@ function draw() {
   const table = el("table", {}, el("thead", {}, head), el("tbody", {}, rows.slice(0, MOST_ROWS).map(row)));
   const more = [];
   if (rows.length > MOST_ROWS) more.push(el("p", { class: "hint" }, `${MOST_ROWS} of ${rows.length} are listed.`));
-  if (answer.candidates.length < total && !embedded()) more.push(el("button", { type: "button", onclick: listAll }, `List all ${total} (computes again)`));
+  if (answer.candidates.length < total && !embedded()) more.push(el("button", { type: "button", onclick: () => optimise({ ...state.asked, candidates: "all" }).catch(problem) }, `List all ${total} (computes again)`));
   $("candidates").replaceChildren(rows.length ? el("div", { class: "scroll" }, table) : el("p", { class: "hint" }, "None with this status."), ...more);
 }
 
@@ -65,8 +65,4 @@ async function beside({ q_start, q_goal, goal }) {
   const others = arms.filter(({ name }) => name !== goal).slice(0, MOST - 1);
   set({ arms: [...others, { name: goal, answer, colour: colours[others.length] }], duration: Math.max(duration, answer.duration), time: 0, playing: false });
   play();
-}
-
-async function listAll() {
-  await optimise({ ...state.asked, candidates: "all" }).catch(problem);
 }

@@ -1,68 +1,31 @@
 // Where the links of an arm are. Matrices are 4 x 4, row by row, in arrays of 16; lengths in m, angles in rad.
+import { Euler, Matrix4, Quaternion, Vector3 } from "three";
+
+/** A three.js matrix, row by row. */
+const rows = (matrix) => matrix.transpose().toArray();
 
 /** The matrix of x, y, z, roll, pitch, yaw about fixed axes. */
-export function ofOrigin([x, y, z, roll, pitch, yaw]) {
-  const [cr, sr, cp, sp, cy, sy] = [roll, pitch, yaw].flatMap((angle) => [Math.cos(angle), Math.sin(angle)]);
-  return [
-    cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x,
-    sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y,
-    -sp, cp * sr, cp * cr, z,
-    0, 0, 0, 1,
-  ];
-}
+export const ofOrigin = ([x, y, z, ...angles]) => rows(new Matrix4().makeRotationFromEuler(new Euler(...angles, "ZYX")).setPosition(x, y, z));
 
 /** The matrix of a pose: a position, and a quaternion, roll-pitch-yaw or rotation vector. */
 export function ofPose(pose) {
-  const { position = [0, 0, 0], quaternion, rpy, rotvec } = pose ?? {};
+  const { position = [0, 0, 0], quaternion = [0, 0, 0, 1], rpy, rotvec } = pose ?? {};
   if (rpy) return ofOrigin([...position, ...rpy]);
-  let [x, y, z, w] = quaternion ?? [0, 0, 0, 1];
-  if (rotvec) {
-    const angle = Math.hypot(...rotvec);
-    const share = angle > 1e-12 ? Math.sin(angle / 2) / angle : 0.5;
-    [x, y, z, w] = [...rotvec.map((part) => part * share), Math.cos(angle / 2)];
-  }
-  const norm = Math.hypot(x, y, z, w) || 1;
-  [x, y, z, w] = [x / norm, y / norm, z / norm, w / norm];
-  return [
-    1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), position[0],
-    2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), position[1],
-    2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), position[2],
-    0, 0, 0, 1,
-  ];
+  const turn = new Quaternion(...quaternion).normalize();
+  if (rotvec) turn.setFromAxisAngle(new Vector3(...rotvec).normalize(), Math.hypot(...rotvec));
+  return rows(new Matrix4().compose(new Vector3(...position), turn, new Vector3(1, 1, 1)));
 }
 
 /** The unit quaternion [x, y, z, w] of a matrix's rotation. */
-export function quaternionOf(T) {
-  const [xx, xy, xz, , yx, yy, yz, , zx, zy, zz] = T;
-  const w = Math.sqrt(Math.max(0, 1 + xx + yy + zz)) / 2;
-  const x = Math.sign(zy - yz || 1) * Math.sqrt(Math.max(0, 1 + xx - yy - zz)) / 2;
-  const y = Math.sign(xz - zx || 1) * Math.sqrt(Math.max(0, 1 - xx + yy - zz)) / 2;
-  const z = Math.sign(yx - xy || 1) * Math.sqrt(Math.max(0, 1 - xx - yy + zz)) / 2;
-  const norm = Math.hypot(x, y, z, w) || 1;
-  return [x / norm, y / norm, z / norm, w / norm];
-}
+export const quaternionOf = (T) => new Quaternion().setFromRotationMatrix(new Matrix4().set(...T)).toArray();
 
-export function multiply(A, B) {
-  const C = new Array(16);
-  for (let i = 0; i < 4; i++)
-    for (let j = 0; j < 4; j++)
-      C[4 * i + j] = A[4 * i] * B[j] + A[4 * i + 1] * B[4 + j] + A[4 * i + 2] * B[8 + j] + A[4 * i + 3] * B[12 + j];
-  return C;
-}
+export const multiply = (A, B) => rows(new Matrix4().set(...A).multiply(new Matrix4().set(...B)));
 
 /** A point [x, y, z] moved by a matrix. */
 export const moved = (T, [x, y, z]) => [0, 4, 8].map((row) => T[row] * x + T[row + 1] * y + T[row + 2] * z + T[row + 3]);
 
 /** A direction [x, y, z] turned by a matrix. */
 export const turned = (T, [x, y, z]) => [0, 4, 8].map((row) => T[row] * x + T[row + 1] * y + T[row + 2] * z);
-
-/** The inverse of a rigid motion. */
-export function inverse(T) {
-  const R = [T[0], T[4], T[8], 0, T[1], T[5], T[9], 0, T[2], T[6], T[10], 0, 0, 0, 0, 1];
-  const [x, y, z] = turned(R, [T[3], T[7], T[11]]);
-  [R[3], R[7], R[11]] = [-x, -y, -z];
-  return R;
-}
 
 /** What is drawn of a request: the same with all obstacles in the base frame. ROS's `base_link` may stand elsewhere. */
 export function cellOf(request, robot) {
@@ -89,9 +52,7 @@ export class Chain {
   frames(q) {
     const frames = [IDENTITY];
     this.placements.forEach((placement, joint) => {
-      const [c, s] = [Math.cos(q[joint]), Math.sin(q[joint])];
-      const turn = [c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
-      frames.push(multiply(multiply(frames[joint], placement), turn));
+      frames.push(multiply(multiply(frames[joint], placement), rows(new Matrix4().makeRotationZ(q[joint]))));
     });
     frames.push(multiply(frames.at(-1), this.flange));
     return frames;
@@ -103,17 +64,10 @@ export class Chain {
   }
 }
 
-/** A row of samples at time t, linear between two of them; the last one after the end. */
+/** A row of samples at time t, linear between two of them; the first before the begin, the last after the end. */
 export function sampleAt(times, rows, t) {
-  if (t <= times[0]) return rows[0];
-  let [low, high] = [0, times.length - 1];
-  if (t >= times[high]) return rows[high];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (times[middle] <= t) low = middle;
-    else high = middle;
-  }
-  const share = (t - times[low]) / (times[high] - times[low]);
-  const [a, b] = [rows[low], rows[high]];
-  return Array.isArray(a) ? a.map((value, joint) => value + share * (b[joint] - value)) : a + share * (b - a);
+  const after = times.findIndex((time) => time > t);
+  const high = after < 0 ? times.length - 1 : Math.max(1, after);
+  const share = Math.max(0, Math.min(1, (t - times[high - 1]) / (times[high] - times[high - 1] || 1)));
+  return rows[high - 1].map((value, joint) => value + share * (rows[high][joint] - value));
 }

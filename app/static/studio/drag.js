@@ -5,12 +5,13 @@ import { post } from "./api.js";
 import { Chain, multiply, ofOrigin, ofPose, quaternionOf } from "./chain.js";
 import { $, el } from "./dom.js";
 import { robotOf, setRequest } from "./request.js";
-import { follow, state } from "./store.js";
+import { follow, set, state } from "./store.js";
 
 const HEIGHT = 0.2; // of a box that is drawn [m]
 const ROUND = 1e4; // a tenth of a millimetre
 
 let view, gizmo, handle, target;
+let asking, waiting; // whether a request to /ik is on its way; the pose that is asked about next
 
 export function createDrag(picture) {
   if (!picture) return;
@@ -21,9 +22,10 @@ export function createDrag(picture) {
   view.handle = handle;
   view.scene.add(handle, gizmo.getHelper());
   gizmo.addEventListener("change", () => view.draw());
+  gizmo.addEventListener("objectChange", () => isEnd(target) && reach(poseOfHandle()));
   gizmo.addEventListener("dragging-changed", ({ value }) => {
     view.controls.enabled = !value;
-    if (!value) release().catch((error) => tell(error.message));
+    if (!value) release();
   });
   $("drag").onchange = () => choose($("drag").value);
   $("turn").onchange = () => gizmo.setMode($("turn").checked ? "rotate" : "translate");
@@ -34,8 +36,9 @@ export function createDrag(picture) {
 const tell = (text) => { $("drag-note").textContent = text; };
 
 function offer() {
-  const obstacles = state.request?.scene?.obstacles ?? [];
-  const names = [["", "nothing"], ["start", "start"], ["goal", "goal"], ...obstacles.map(({ name }, k) => [`${k}`, name])];
+  const { scene, stops } = state.request ?? {};
+  const ends = stops ? stops.map((stop, k) => [`stop ${k}`, stopName(stop, k)]).filter((_, k) => stops[k].target) : [["goal", "goal"]];
+  const names = [["", "nothing"], ["start", "start"], ...ends, ...(scene?.obstacles ?? []).map(({ name }, k) => [`${k}`, name])];
   $("drag").replaceChildren(...names.map(([value, text]) => el("option", { value }, text)));
   $("drag").value = names.some(([value]) => value === target) ? target : "";
   if (!$("drag").value) gizmo.detach();
@@ -46,16 +49,33 @@ const linkFrame = (robot, frame) => ofOrigin((frame === "base_link" && robot.kin
 /** The pose of what is dragged, in the base frame. */
 function poseOf(chosen, robot) {
   const { request } = state;
-  if (chosen !== "start" && chosen !== "goal") return multiply(linkFrame(robot, request.scene.frame), ofPose(request.scene.obstacles[chosen].pose));
-  const given = request[chosen];
+  if (!isEnd(chosen)) return multiply(linkFrame(robot, request.scene.frame), ofPose(request.scene.obstacles[chosen].pose));
+  const [parent, key] = endIn(request, chosen);
+  const given = parent[key];
   if (given?.pose) return multiply(linkFrame(robot, given.pose.frame), ofPose(given.pose));
-  const q = given?.q ?? state.answer.branch[chosen].q;
-  return new Chain(robot).tcp(q, request.tcp);
+  return new Chain(robot).tcp(given?.q ?? answeredAt(chosen), request.tcp);
+}
+
+const stopName = ({ name }, k) => name ?? `${k + 1}`;
+
+/** Start and goal, and the stops of a round; any other number is that of an obstacle. */
+const isEnd = (name) => /[a-z]/.test(name);
+
+/** Where an end stands in a request: the object, and its field. */
+const endIn = (request, name) => (name.startsWith("stop ") ? [request.stops[name.slice(5)], "target"] : [request, name]);
+
+/** Joint positions at an end of the motion that is shown. */
+function answeredAt(name) {
+  const { answer, round, request } = state;
+  const [stop] = endIn(request, name);
+  const leg = round?.legs.find(({ goal }) => goal.stop === stopName(stop, Number(name.slice(5))));
+  return (leg?.goal ?? answer.branch[name] ?? answer.branch.start).q;
 }
 
 async function choose(chosen) {
   target = chosen;
   tell("");
+  if (state.best) set({ best: null });
   if (!chosen) return gizmo.detach(), view.draw();
   const robot = await robotOf(state.request.robot ?? "ur5e");
   const T = poseOf(chosen, robot);
@@ -65,21 +85,50 @@ async function choose(chosen) {
   view.draw();
 }
 
-/** Writes the new pose into the request, and asks whether it is reached. */
-async function release() {
-  const round = (value) => Math.round(value * ROUND) / ROUND;
-  const norm = handle.quaternion.normalize().toArray();
-  const pose = { position: handle.position.toArray().map(round), quaternion: norm };
-  const request = structuredClone(state.request);
-  if (target === "start" || target === "goal") {
-    request[target] = { pose };
-    setRequest(request);
-    const { tcp, tool, payload, robot = "ur5e", scene } = request;
-    const asked = JSON.parse(JSON.stringify({ robot, tcp, tool, scene, pose }));
+const poseOfHandle = () => ({
+  position: handle.position.toArray().map((value) => Math.round(value * ROUND) / ROUND),
+  quaternion: handle.quaternion.normalize().toArray(),
+});
+
+/** Says whether a pose is reached, and draws how. While an answer is awaited, only the last pose waits. */
+async function reach(pose) {
+  waiting = pose;
+  if (asking) return;
+  asking = true;
+  while (waiting) {
+    const { tcp, tool, payload, robot = "ur5e", scene } = state.request;
+    const asked = JSON.parse(JSON.stringify({ robot, tcp, tool, scene, pose: waiting }));
     if (payload?.shape) asked.payload = { shape: payload.shape, ...(payload.touches === undefined ? {} : { touches: payload.touches }) };
-    const { solutions } = await post("ik", asked);
-    const free = solutions.filter(({ collides }) => !collides).length;
-    tell(solutions.length ? `Reached by ${solutions.length} configurations, ${free} of them without a collision.` : "No configuration reaches it.");
+    waiting = null;
+    try {
+      tellReach((await post("ik", asked)).solutions, robot);
+    } catch (error) {
+      set({ best: null });
+      tell(error.message);
+    }
+  }
+  asking = false;
+}
+
+function tellReach(solutions, robot) {
+  const free = solutions.filter(({ collides }) => !collides);
+  const near = answeredAt(target);
+  const far = ({ q }) => Math.hypot(...q.map((x, j) => x - near[j]));
+  const [first] = (free.length ? free : solutions).toSorted((a, b) => far(a) - far(b));
+  set({ best: first ? { robot, q_goal: first.q } : null });
+  const collisions = free.length ? `${free.length} of them without a collision` : "all of them in a collision";
+  tell(first ? `Reached by ${solutions.length} configurations, ${collisions}.` : "No configuration reaches it.");
+}
+
+/** Writes the new pose into the request, and asks whether it is reached. */
+function release() {
+  const pose = poseOfHandle();
+  const request = structuredClone(state.request);
+  if (isEnd(target)) {
+    const [parent, key] = endIn(request, target);
+    parent[key] = { pose };
+    setRequest(request);
+    reach(pose);
   } else {
     if (request.scene.frame === "base_link") delete request.scene.frame, request.scene.obstacles = state.cell.scene.obstacles;
     request.scene.obstacles[target].pose = pose;
@@ -92,36 +141,34 @@ function drawBox() {
   tell("Drag over the floor to draw the ground of a box.");
   gizmo.detach();
   view.controls.enabled = false;
-  const canvas = view.renderer.domElement;
-  const material = new THREE.MeshLambertMaterial({ color: 0x3b7dd8, transparent: true, opacity: 0.5 });
-  const ghost = new THREE.Mesh(new THREE.BoxGeometry(1, 1, HEIGHT), material);
-  let first = null;
-  const box = (last) => {
-    const [x, y] = [0, 1].map((axis) => [Math.min(first[axis], last[axis]), Math.max(first[axis], last[axis])]);
-    const size = [x[1] - x[0], y[1] - y[0], HEIGHT].map((edge) => Math.max(0.01, Math.round(edge * 1000) / 1000));
-    return { size, position: [(x[0] + x[1]) / 2, (y[0] + y[1]) / 2, HEIGHT / 2].map((value) => Math.round(value * 1000) / 1000) };
-  };
-  const stretch = (event) => {
-    const last = onFloor(event);
-    if (!first || !last) return;
-    const { size, position } = box(last);
-    ghost.scale.set(size[0], size[1], 1);
-    ghost.position.set(...position);
+  const ghost = new THREE.Mesh(new THREE.BoxGeometry(1, 1, HEIGHT), new THREE.MeshLambertMaterial({ color: 0x3b7dd8, transparent: true, opacity: 0.5 }));
+  const over = new AbortController();
+  const on = (name, act) => view.renderer.domElement.addEventListener(name, act, { signal: over.signal });
+  let [first, box] = [null, null];
+  on("pointerdown", (event) => { first = onFloor(event); });
+  on("pointermove", (event) => {
+    const last = first && onFloor(event);
+    if (!last) return;
+    box = between(first, last);
+    ghost.scale.set(box.size[0], box.size[1], 1);
+    ghost.position.set(...box.position);
+    view.scene.add(ghost);
     view.draw();
-  };
-  const begin = (event) => {
-    first = onFloor(event);
-    if (first) view.scene.add(ghost);
-  };
-  const end = (event) => {
-    const last = onFloor(event);
-    for (const [name, listener] of [["pointerdown", begin], ["pointermove", stretch], ["pointerup", end]]) canvas.removeEventListener(name, listener);
+  });
+  on("pointerup", () => {
+    over.abort();
     view.scene.remove(ghost);
     view.controls.enabled = true;
     tell("");
-    if (first && last) addBox(box(last));
-  };
-  for (const [name, listener] of [["pointerdown", begin], ["pointermove", stretch], ["pointerup", end]]) canvas.addEventListener(name, listener);
+    if (box) addBox(box);
+  });
+}
+
+/** The box on the floor between two of its corners [x, y]. */
+function between(first, last) {
+  const round = (value) => Math.round(value * 1000) / 1000;
+  const size = first.map((value, axis) => Math.max(0.01, round(Math.abs(last[axis] - value))));
+  return { size: [...size, HEIGHT], position: [...first.map((value, axis) => round((value + last[axis]) / 2)), HEIGHT / 2] };
 }
 
 function addBox({ size, position }) {

@@ -17,6 +17,7 @@ const PARTS = {
 const LEAST = 5e-3; // parts below this share of the total are not listed
 const NAMES = {
   trapezoid: "trapezoid", quintic: "quintic", ruckig: "time-optimal (ruckig)", ruckig_slowed: "time-optimal, slowed", controller_default: "controller default",
+  move_by_move: "each move by itself", same_factor: "all moves slowed alike", fastest_then_wait: "fastest, then a wait", given_order: "in the given order",
 };
 
 export function createEnergy() {
@@ -29,8 +30,7 @@ export function createEnergy() {
 
 /** A stacked bar of an `ElectricalEnergy`, and the list of its parts. */
 export function breakdown(electrical) {
-  const parts = Object.keys(PARTS).map((key) => ({ key, value: electrical[key] ?? 0 }));
-  const drawn = parts.filter(({ value }) => Math.abs(value) > 1e-9);
+  const drawn = Object.keys(PARTS).map((key) => ({ key, value: electrical[key] ?? 0 })).filter(({ value }) => Math.abs(value) > 1e-9);
   const gains = drawn.filter(({ value }) => value > 0).reduce((sum, { value }) => sum + value, 0);
   const returned = drawn.filter(({ value }) => value < 0).reduce((sum, { value }) => sum - value, 0);
   const scale = 100 / (gains + returned || 1);
@@ -60,19 +60,24 @@ function waterfall(answer) {
   // rows that are of the same height keep their order: this motion above the bound
   rows.sort((a, b) => b.energy - a.energy);
   const most = Math.max(...rows.map(({ energy }) => energy), 1e-9);
-  return [el("ol", { class: "bars" }, rows.map((row) => bar(row, ours, most))),
+  return [el("ol", { class: "bars steps" }, rows.map((row, k) => bar(row, rows[k - 1]?.energy, ours, most))),
     el("p", { class: "hint" }, "Hatched: breaks a limit, so it is no alternative. No motion of any kind needs less than the proven bound.")];
 }
 
-function bar({ name, energy, duration, reason, ours: own, bound }, ours, most) {
+/** A row; from the one above (`before` [J]), a step leads down to it. */
+function bar({ name, energy, duration, reason, ours: own, bound }, before, ours, most) {
   const kind = own ? "own" : bound ? "bound" : reason ? "broken" : "other";
   const saving = energy ? (energy - ours) / Math.abs(energy) : 0;
-  const against = own || bound || reason ? null : el("em", {}, `${saving >= 0 ? "−" : "+"}${percent(Math.abs(saving))}`);
+  const against = own || bound || reason ? null : el("em", {}, `${saving >= 0 ? "−" : "+"}${percent(Math.abs(saving), 2)}`);
   const fill = el("span", { class: `fill ${kind}` });
-  fill.style.width = `${Math.max(0, (100 * energy) / most)}%`;
+  const share = (value) => Math.max(0, (100 * value) / most);
+  fill.style.width = `${share(energy)}%`;
+  const step = el("i", { class: "step" });
+  step.style.left = fill.style.width;
+  step.style.width = `${Math.max(0, share(before ?? energy) - share(energy))}%`;
   return el("li", { class: kind },
     el("span", { class: "name" }, name, duration ? el("small", {}, ` ${figure(duration)} s`) : null),
-    el("span", { class: "track" }, fill),
+    el("span", { class: "track" }, fill, step),
     el("span", { class: "value" }, figure(energy), against),
     reason ? el("small", { class: "reason" }, `breaks: ${reason}`) : null);
 }

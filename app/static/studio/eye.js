@@ -1,6 +1,6 @@
 // From where the picture is seen, and what fades because it stands in front of the arm.
 import * as THREE from "three";
-import { sampleAt } from "./chain.js";
+import { multiply, ofPose, sampleAt } from "./chain.js";
 import { state } from "./store.js";
 
 // from where the views look: the first one is chosen so that as little as possible hides the arm
@@ -13,18 +13,20 @@ export class Eye {
     this.ray = new THREE.Raycaster();
   }
 
-  /** What stands between the eye and the arm becomes faint. */
-  fade(frames) {
-    const obstacles = this.obstacles.children.filter(({ userData }) => userData.hides);
-    const hiding = new Set();
+  /** What stands between the eye and the arm becomes faint, and so does what does not count, by name. */
+  fade(frames, ignored) {
+    const hiding = new Set(this.obstacles.children.filter(({ userData }) => ignored.includes(userData.name)));
     if (state.show.fade)
-      for (const T of frames.slice(2)) for (const object of this.hiders(this.camera.position, T)) hiding.add(object);
-    for (const object of obstacles) {
+      for (const T of [...frames.slice(2), multiply(frames.at(-1), ofPose(state.cell.tcp))])
+        for (const object of this.hiders(this.camera.position, T)) hiding.add(object);
+    for (const object of this.obstacles.children) {
       const { material } = object.userData;
       const aim = hiding.has(object) ? FADED : 1;
       if (material.opacity === aim) continue;
       const step = state.playing ? 0.35 : 1;
       material.opacity += Math.abs(aim - material.opacity) < 0.02 ? aim - material.opacity : step * (aim - material.opacity);
+      // what is not faint is drawn from front to back, and nothing is blended: that costs a slow machine least
+      material.transparent = material.opacity < 1;
       material.depthWrite = material.opacity > 0.6;
     }
   }
@@ -37,7 +39,7 @@ export class Eye {
     for (let k = 0; k < 24; k++)
       for (const T of this.chain.frames(sampleAt(t, q, (t.at(-1) * k) / 23))) box.expandByPoint(new THREE.Vector3(T[3], T[7], T[11]));
     box.expandByScalar(0.1);
-    const arm = box.getSize(new THREE.Vector3()).length() / 2;
+    const arm = box.getBoundingSphere(new THREE.Sphere()).radius;
     for (const object of this.obstacles.children) {
       if (!object.userData.solid) continue;
       object.updateWorldMatrix(true, true);
@@ -45,14 +47,13 @@ export class Eye {
       if (part.getSize(new THREE.Vector3()).length() < 4 * arm && !part.isEmpty()) box.union(part);
     }
     this.bounds = box;
-    this.middle = box.getCenter(new THREE.Vector3());
-    this.reach = box.getSize(new THREE.Vector3()).length() / 2;
-    sun.position.copy(this.middle).add(new THREE.Vector3(1.1, -0.7, 2.4).multiplyScalar(this.reach));
-    sun.target.position.copy(this.middle);
-    const eye = sun.shadow.camera;
-    [eye.left, eye.right, eye.bottom, eye.top] = [-1, 1, -1, 1].map((side) => side * 1.25 * this.reach);
-    [eye.near, eye.far] = [0.1, 6 * this.reach];
-    eye.updateProjectionMatrix();
+    const { center, radius } = box.getBoundingSphere(new THREE.Sphere());
+    this.middle = center;
+    sun.position.copy(center).add(new THREE.Vector3(1.1, -0.7, 2.4).multiplyScalar(radius));
+    sun.target.position.copy(center);
+    const wide = 1.25 * radius;
+    Object.assign(sun.shadow.camera, { left: -wide, right: wide, bottom: -wide, top: wide, near: 0.1, far: 6 * radius });
+    sun.shadow.camera.updateProjectionMatrix();
   }
 
   /** One of the six views, by its number. */
@@ -83,7 +84,10 @@ export class Eye {
   /** The direction around the arm from which obstacles hide least of its motion, and which the motion faces. */
   clearest() {
     const { t, q } = this.trajectory;
-    const points = [0, 0.25, 0.5, 0.75, 1].flatMap((share) => this.chain.frames(sampleAt(t, q, share * t.at(-1))).slice(3));
+    const points = [0, 0.25, 0.5, 0.75, 1].flatMap((share) => {
+      const frames = this.chain.frames(sampleAt(t, q, share * t.at(-1)));
+      return [...frames.slice(3), multiply(frames.at(-1), ofPose(state.cell.tcp))];
+    });
     this.obstacles.updateMatrixWorld(true);
     const tcps = points.filter((_, k) => (k + 1) % (points.length / 5) === 0);
     const outward = Math.atan2(...[7, 3].map((row) => tcps.reduce((sum, T) => sum + T[row], 0)));
@@ -96,6 +100,16 @@ export class Eye {
       if (!best || hidden < best.hidden) best = { from, hidden };
     }
     return best.from;
+  }
+
+  /** The obstacle {object, at} at a point of the picture, both coordinates from -1 to 1; null if there is none. */
+  under(x, y) {
+    this.ray.setFromCamera(new THREE.Vector2(x, y), this.camera);
+    this.ray.far = Infinity;
+    const all = this.obstacles.children.filter(({ userData }) => userData.hides);
+    const [hit] = this.ray.intersectObjects(all, true);
+    if (!hit) return null;
+    return { object: all.find((each) => each.getObjectById(hit.object.id)), at: hit.point.toArray() };
   }
 
   /** The obstacles between an eye and the origin of a frame. */

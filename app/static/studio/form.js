@@ -1,4 +1,5 @@
 // A form made from the OpenAPI document: it shows the fields that the request sets, and offers the others.
+import { get } from "./api.js";
 import { $, el } from "./dom.js";
 import { openapi, problem, setRequest } from "./request.js";
 import { follow, state } from "./store.js";
@@ -13,21 +14,20 @@ const open = new Set(["start", "goal", "start.pose", "goal.pose"]);
 
 export function createForm() {
   follow("request", () => {
-    if (!own) draw().catch(problem);
+    if (!own) showForm().catch(problem);
   });
   // the first answer does not wait for the document
-  follow("answer", () => $("form").firstChild || draw().catch(problem));
-  for (const id of ["angles", "lengths"]) $(id).onchange = () => draw().catch(problem);
+  follow("answer", () => $("form").firstChild || showForm().catch(problem));
+  for (const id of ["angles", "lengths"]) $(id).onchange = () => showForm().catch(problem);
 }
 
-async function draw() {
+/** Draws the form, where it is shown. */
+export async function showForm() {
   if ($("pane-form").hidden || !state.answer) return;
   schemas ??= (await openapi()).components.schemas;
+  if (!$("robots").childElementCount) $("robots").replaceChildren(...(await get("robots")).robots.map(({ name }) => el("option", {}, name)));
   $("form").replaceChildren(fields(state.request.stops ? schemas.CycleRequest : schemas.OptimizeRequest, state.request, []));
 }
-
-/** Draws the form when it is shown. */
-export const showForm = () => draw();
 
 const resolve = (schema) => (schema.$ref ? { ...schemas[schema.$ref.split("/").at(-1)], ...schema, $ref: undefined } : schema);
 const words = (name) => name.replaceAll("_", " ");
@@ -122,7 +122,7 @@ function controlOf(schema, value, path, label) {
   }
   if (schema.type === "array") return list(schema, value, path);
   if (schema.type === "number" || schema.type === "integer") return { control: number(schema, value, path, label) };
-  const text = el("input", { type: "text", value: value ?? "", "aria-label": label });
+  const text = el("input", { type: "text", value: value ?? "", "aria-label": label, list: label === "robot" ? "robots" : null });
   text.onchange = () => write(path, text.value, false);
   return { control: text };
 }
@@ -165,7 +165,7 @@ function number(schema, value, path, label) {
   const unit = schema["x-unit"];
   const [sign, factor] = SHOWN[unit]?.[$(unit === "rad" ? "angles" : "lengths").value] ?? [unit === "1" ? "" : (unit ?? ""), 1];
   const bounds = { min: schema.minimum === undefined ? null : schema.minimum * factor, max: schema.maximum === undefined ? null : schema.maximum * factor };
-  const input = el("input", { type: "number", step: "any", ...bounds, value: +(value * factor).toFixed(6), "aria-label": `${label}${sign ? ` in ${sign}` : ""}` });
+  const input = el("input", { type: "number", step: "any", ...bounds, value: +(value * factor).toFixed(factor > 1 ? 3 : 6), "aria-label": `${label}${sign ? ` in ${sign}` : ""}` });
   input.onchange = () => {
     input.toggleAttribute("aria-invalid", !input.checkValidity());
     if (input.value !== "") write(path, input.valueAsNumber / factor, false);

@@ -25,8 +25,9 @@ async function ask() {
 }
 
 function draw() {
-  if (!front || !state.answer || state.asked !== front.asked) return;
   const box = $("front");
+  if (state.asked !== front?.asked) box.replaceChildren(el("p", { class: "hint" }, "How much a slower or faster motion would need."));
+  if (!front || !state.answer || state.asked !== front.asked) return;
   const { points } = front;
   const own = { duration: state.answer.duration, energy: state.answer.energy[state.answer.objective].total };
   const all = [...points, own];

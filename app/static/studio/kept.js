@@ -1,55 +1,48 @@
-// What the service keeps: answers seen in this browser, jobs and studies. A click opens an answer.
-import { get, send } from "./api.js";
+// What the service keeps: answers, jobs and studies. A click opens an answer.
+import { get } from "./api.js";
 import { $, el, figure } from "./dom.js";
 import { problem, setRequest, showAnswer } from "./request.js";
 import { showRound } from "./round.js";
-import { follow, state } from "./store.js";
+import { state } from "./store.js";
 
-const SEEN = "joulepath answers";
-const MOST_SEEN = 40;
-const MOST_LISTED = 50;
+const MOST = 50; // entries of each kind that are listed at a time
+const OPENED = ["optimize", "cycle"]; // endpoints whose answers are drawn
 
-export const createKept = () => follow("answer", remember);
+const when = (time) => new Date(time).toLocaleString(undefined, { dateStyle: "medium", timeStyle: "short" });
+const button = (text, act) => el("button", { type: "button", onclick: () => act().catch(problem) }, text);
 
-const seen = () => JSON.parse(localStorage.getItem(SEEN) ?? "[]");
-
-function remember() {
-  const { answer, round } = state;
-  if (!answer?.answer || round) return;
-  const entry = { path: answer.answer, text: `${figure(answer.energy.electrical.total)} J, ${figure(answer.duration)} s, ${answer.robot}`, at: new Date().toISOString() };
-  localStorage.setItem(SEEN, JSON.stringify([entry, ...seen().filter(({ path }) => path !== entry.path)].slice(0, MOST_SEEN)));
+function entry(text, detail, act) {
+  const words = [text, el("small", {}, detail)];
+  return el("li", {}, act ? el("button", { type: "button", class: "jump", onclick: () => act().catch(problem) }, words) : words);
 }
 
-/** Lists what is kept. Throws Problem. */
-export async function showKept() {
+const group = (title, entries) => [el("h2", {}, title), entries.length ? el("ul", { class: "kept" }, entries) : el("p", { class: "hint" }, "none")];
+
+/** Lists what is kept; `after`: the answers from there on. Throws Problem. */
+export async function showKept(after) {
   const box = $("pane-kept");
   if (box.hidden) return;
-  const [{ jobs }, { studies }] = await Promise.all([get("jobs"), get("studies")]);
-  const entry = (text, detail, act) => el("li", {}, el("button", { type: "button", class: "jump", onclick: () => act().catch(problem) }, text, el("small", {}, ` ${detail}`)));
-  const group = (title, entries) => [el("h2", {}, title), entries.length ? el("ul", { class: "kept" }, entries) : el("p", { class: "hint" }, "none")];
-  const when = (time) => new Date(time).toLocaleString();
+  const page = `answers?limit=${MOST}${after ? `&after=${after}` : ""}`;
+  const [{ answers, next }, { jobs }, { studies }] = await Promise.all([get(page), get(`jobs?limit=${MOST}`), get(`studies?limit=${MOST}`)]);
+  const opened = async (path, kind) => list((await get(path))[kind], box);
   box.replaceChildren(
-    ...group("Answers seen in this browser", seen().map(({ path, text, at }) => entry(text, when(at), () => openAnswer(path)))),
-    ...group("Jobs", jobs.slice(0, MOST_LISTED).map((job) => entry(`${job.name ?? job.id.slice(0, 8)}: ${job.state}`, when(job.created), async () => list(await results(job.id), box)))),
-    ...group("Studies", studies.slice(0, MOST_LISTED).map((study) => entry(study.name, when(study.created), async () => list((await get(`studies/${study.id}`)).history, box)))),
+    ...group("Answers", answers.map((each) => entry(words(each), when(each.created), OPENED.includes(each.kind) && (() => openAnswer(each.id))))),
+    ...(next ? [button("older", () => showKept(next))] : []),
+    ...group("Jobs", jobs.map(({ id, name, state: now, created }) => entry(`${name ?? id.slice(0, 8)}: ${now}`, when(created), () => opened(`jobs/${id}?limit=${MOST}`, "requests")))),
+    ...group("Studies", studies.map(({ id, name, created }) => entry(name, when(created), () => opened(`studies/${id}`, "history")))),
   );
 }
 
+const words = ({ kind, energy, duration, robot }) =>
+  `${kind === "optimize" ? "" : `${kind}: `}${energy === null ? "" : `${figure(energy)} J, ${figure(duration)} s, `}${robot ?? ""}`;
+
 /** The answers of a job or a study. */
 function list(entries, box) {
-  const back = el("button", { type: "button", onclick: () => showKept().catch(problem) }, "← all");
-  const rows = entries.slice(0, MOST_LISTED).map((each) => {
-    const answer = each.answer ?? null;
-    const title = `${each.number ?? each.index + 1}: ${each.kind}, ${each.energy === null ? (each.state ?? "no energy") : `${figure(each.energy)} J`}`;
-    return el("li", {}, typeof answer === "string" ? el("button", { type: "button", class: "jump", onclick: () => openAnswer(answer).catch(problem) }, title) : el("span", {}, `${title}: no kept answer`));
+  const rows = entries.slice(0, MOST).map(({ number, index, kind, energy, state: now, answer }) => {
+    const title = `${number ?? index + 1}: ${kind}, ${(energy ?? null) === null ? (now ?? "no energy") : `${figure(energy)} J`}`;
+    return entry(title, answer ? "" : "no kept answer", answer && OPENED.includes(kind) && (() => openAnswer(answer)));
   });
-  box.replaceChildren(back, el("ul", { class: "kept" }, rows));
-}
-
-/** The outcomes of a job: a line of JSON each. */
-async function results(id) {
-  const text = await (await send(`jobs/${id}/results`, {})).text();
-  return text.split("\n").filter(Boolean).slice(0, MOST_LISTED).map((line) => JSON.parse(line));
+  box.replaceChildren(button("← all", showKept), el("ul", { class: "kept" }, rows));
 }
 
 /** Shows a kept answer by its path or id, of a motion or of a round. Throws Problem. */

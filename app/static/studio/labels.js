@@ -16,14 +16,8 @@ export class Labels {
       this.layer.append(node);
       this.all.set(name, { node });
     }
-    const label = this.all.get(name);
-    label.at = new THREE.Vector3(...at);
+    const label = Object.assign(this.all.get(name), { at: new THREE.Vector3(...at) });
     if (label.node.textContent !== text) label.node.textContent = text;
-  }
-
-  show(name, on) {
-    const label = this.all.get(name);
-    if (label) label.off = !on;
   }
 
   drop(name) {
@@ -37,9 +31,9 @@ export class Labels {
   }
 
   place({ width, height }) {
-    for (const { node, at, off } of this.all.values()) {
+    for (const { node, at } of this.all.values()) {
       const point = at.clone().project(this.camera);
-      node.hidden = off || Math.max(Math.abs(point.x), Math.abs(point.y), point.z) > 1;
+      node.hidden = Math.max(Math.abs(point.x), Math.abs(point.y), point.z) > 1;
       if (node.hidden) continue;
       // the words stay inside, where their point is
       const half = node.offsetWidth / 2;

@@ -1,24 +1,21 @@
 // Puts the page together, and shows an example at once.
-import { get } from "./api.js";
 import { createCandidates } from "./candidates.js";
 import { $, figure, percent, tabs } from "./dom.js";
 import { createDrag } from "./drag.js";
 import { createEnergy } from "./energy.js";
 import { createForm, placeErrors, showForm } from "./form.js";
 import { createFront } from "./front.js";
-import { createKept, openAnswer, showKept } from "./kept.js";
+import { openAnswer, showKept } from "./kept.js";
 import { createLimits } from "./limits.js";
 import { createMeshes } from "./meshes.js";
 import { createPlayer, play } from "./player.js";
 import { createPlots } from "./plots.js";
-import { createRequest, keepRobot, optimise, problem, setRequest, showAnswer } from "./request.js";
+import { createRequest, keepRobot, optimise, problem, setFirst, setRequest, showAnswer } from "./request.js";
 import { createRound } from "./round.js";
 import { createShare, shared } from "./share.js";
 import { embedded } from "./standalone.js";
-import { follow, state } from "./store.js";
+import { follow, set, state } from "./store.js";
 import { createView, drawnTcp } from "./view.js";
-
-const FIRST = "studio/first.json";
 
 const view = createView();
 createPlayer(view);
@@ -29,7 +26,8 @@ createCandidates();
 createShare(view);
 createRound();
 const inside = embedded();
-if (!inside) for (const create of [createFront, createRequest, createKept, createForm, createDrag, createMeshes]) create(view);
+if (!inside) for (const create of [createFront, createRequest, createForm, createDrag]) create(view);
+createMeshes(view, inside);
 if (!inside) tabs(document.querySelector("#ask > .tabs"), () => Promise.all([showForm(), showKept()]).catch(problem));
 if (!inside) follow("problem", () => placeErrors(state.problem?.details?.errors ?? []));
 follow("answer", headline);
@@ -44,10 +42,12 @@ async function start() {
   if (inside) {
     keepRobot(inside.robot);
     await showAnswer(inside.answer, inside.request);
+    set({ round: inside.round });
+    view?.build();
   } else if (given.answer) {
     await openAnswer(given.answer);
   } else {
-    setRequest(given.request ?? (await get(FIRST)));
+    await (given.request ? setRequest(given.request) : setFirst());
     await optimise();
   }
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play();

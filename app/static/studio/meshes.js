@@ -2,27 +2,34 @@
 import { send } from "./api.js";
 import { drawBy } from "./arm.js";
 import { linkNames } from "./links.js";
-import { follow } from "./store.js";
+import { fromBase64, readMeshes } from "./shapes.js";
+import { follow, state } from "./store.js";
 
-const asked = new Set(); // names of robots
+const files = new Map(); // name of a robot: promise of its file
 
-/** Asks for the meshes of every robot that is shown, once, and draws the picture anew with them. */
-export function createMeshes(view) {
-  follow("robot", async ({ robot }) => {
-    if (!view || !robot.has_meshes || asked.has(robot.name)) return;
-    asked.add(robot.name);
-    try {
-      drawBy(robot, await meshesOf(robot));
-      view.build();
-    } catch {
-      asked.delete(robot.name); // the picture is there without them: the next answer asks again
-    }
-  });
+/** The file (glTF) of a robot's meshes, asked for once. Throws Problem. */
+export function meshFileOf({ name }) {
+  if (!files.has(name)) {
+    const asked = send(`robots/${encodeURIComponent(name)}/meshes.glb`, {}).then(async (file) => new Uint8Array(await file.arrayBuffer()));
+    // the picture is there without them: the next answer asks again
+    files.set(name, asked.catch((error) => { files.delete(name); throw error; }));
+  }
+  return files.get(name);
 }
 
-async function meshesOf(robot) {
-  const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
-  const file = await send(`robots/${encodeURIComponent(robot.name)}/meshes.glb`, {});
-  const { scene } = await new GLTFLoader().parseAsync(await file.arrayBuffer(), "");
-  return linkNames(robot).map((name) => scene.getObjectByName(name).geometry);
+/** Draws every robot that is shown by its meshes, as soon as they are there. `inside`: what a page that stands alone has
+ * inside of it; it asks for none. */
+export function createMeshes(view, inside) {
+  const drawn = new Set();
+  follow("robot", async ({ robot }) => {
+    if (!view || drawn.has(robot.name) || !(inside ? inside.meshes : robot.has_meshes)) return;
+    try {
+      const scene = await readMeshes("glb", inside ? fromBase64(inside.meshes) : await meshFileOf(robot));
+      drawn.add(robot.name);
+      drawBy(robot, linkNames(robot).map((name) => scene.getObjectByName(name).geometry));
+      if (state.answer) view.build();
+    } catch {
+      // drawn from its figures
+    }
+  });
 }

@@ -79,8 +79,7 @@ function keys(event, view) {
     Home: () => goTo(0),
     End: () => goTo(state.duration),
     r: () => view?.look(1),
-    R: () => view?.look(1),
-  }[event.key];
+  }[event.key.length > 1 ? event.key : event.key.toLowerCase()];
   if (VIEW_KEYS.includes(event.key)) view?.look(Number(event.key));
   else if (!act || (event.key === " " && onButton)) return;
   else act();

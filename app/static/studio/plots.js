@@ -42,11 +42,12 @@ function drawAll() {
   drawJoints();
 }
 
-const sizeOf = (box) => ({ width: Math.max(200, box.clientWidth), height: 150 });
+const sizeOf = (box) => ({ width: Math.max(200, box.clientWidth), height: rem(9.4) });
+const rem = (size) => size * parseFloat(getComputedStyle(document.documentElement).fontSize);
 
 function axis(extra = {}) {
   const grid = { stroke: style("--line"), width: 1 };
-  return { stroke: style("--ink-2"), grid, ticks: { ...grid, size: 4 }, font: "11px system-ui, sans-serif", ...extra };
+  return { stroke: style("--ink-2"), grid, ticks: { ...grid, size: 4 }, font: `${rem(0.69)}px system-ui, sans-serif`, ...extra };
 }
 
 function draw(id, series, data, extra = {}) {
@@ -55,7 +56,7 @@ function draw(id, series, data, extra = {}) {
   const options = {
     ...sizeOf(box),
     scales: { x: { time: false, range: [0, Math.max(state.duration, 1e-3)] }, ...extra.scales },
-    axes: [axis({ size: 24, values: (_, values) => values.map((t) => `${+t.toFixed(3)} s`) }), axis({ size: 46 })],
+    axes: [axis({ size: rem(1.5), values: (_, values) => values.map((t) => `${+t.toFixed(3)} s`) }), axis({ size: rem(2.9) })],
     legend: { show: false },
     cursor: { drag: { x: false, y: false }, points: { size: 6 } },
     padding: [8, 10, 0, 0],
@@ -171,7 +172,8 @@ function legend(joints) {
     plots["plot-joints"].setSeries(j + 1, { show: !hidden.has(j) });
   };
   box.append(el("div", { class: "joints" }, joints.map((name, j) => {
-    const button = el("button", { type: "button", class: `joint joint-${j + 1}`, "aria-pressed": String(!hidden.has(j)), title: "Show or hide" }, name.replace(/_joint$/, "").replaceAll("_", " "));
+    const button = el("button", { type: "button", class: "joint", "aria-pressed": String(!hidden.has(j)), title: "Show or hide" }, name.replace(/_joint$/, "").replaceAll("_", " "));
+    button.style.setProperty("--tint", `var(--joint-${j + 1})`);
     button.onclick = () => toggle(j, button);
     return button;
   })));

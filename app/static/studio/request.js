@@ -5,9 +5,10 @@ import { $, el, figure, svg } from "./dom.js";
 import { showRound } from "./round.js";
 import { follow, set, state } from "./store.js";
 
-const EXAMPLE = "From a bin to a shelf";
+const FIRST = "studio/first.json";
 const PATIENCE = 3; // times that a busy service is asked again
 const robots = new Map();
+let example = null; // the request that the list of examples names
 let running = null; // AbortController of the request that is on its way
 
 export function createRequest() {
@@ -17,11 +18,15 @@ export function createRequest() {
   follow("request", () => {
     const text = JSON.stringify(state.request, null, 1);
     if ($("json").value !== text) $("json").value = text;
+    if (state.request !== example) $("examples").selectedIndex = -1;
   });
-  $("examples").onchange = (event) => setRequest(structuredClone(event.target.selectedOptions[0].body));
-  $("examples").append(el("option", {}, EXAMPLE));
-  $("examples").onpointerdown = $("examples").onfocus = () => fillExamples().catch(problem);
+  $("examples").onchange = (event) => setRequest((example = structuredClone(event.target.selectedOptions[0].body)));
+  // the first answer does not wait for the document
+  follow("answer", () => state.answer && fillExamples().catch(problem));
 }
+
+/** Puts the example of the first visit into the editor. */
+export const setFirst = async () => setRequest((example = await get(FIRST)));
 
 /** Puts a request into the editor. */
 export const setRequest = (request) => set({ request });
@@ -32,13 +37,12 @@ let document_ = null;
 export const openapi = () => (document_ ??= get("openapi.json"));
 
 async function fillExamples() {
-  const select = $("examples");
-  if (select.options.length > 1) return;
-  const first = await get("studio/first.json");
-  const { paths } = await openapi();
+  if ($("examples").options.length) return;
+  const [first, { paths }] = await Promise.all([get(FIRST), openapi()]);
   const option = (name, body) => Object.assign(el("option", {}, name), { body });
   const of = (path, mark) => Object.values(paths[path].post.requestBody.content["application/json"].examples).map(({ summary, value }) => option(mark + summary, value));
-  select.replaceChildren(option(EXAMPLE, first), ...of("/optimize", ""), ...of("/cycle", "Round: "));
+  $("examples").replaceChildren(option("From a bin to a shelf", first), ...of("/optimize", ""), ...of("/cycle", "Round: "));
+  if (state.request !== example) $("examples").selectedIndex = -1;
 }
 
 function readJson() {
@@ -160,7 +164,7 @@ export async function showAnswer(answer, request) {
     arms: [{ name: "this motion", answer }],
   });
   const { warnings } = answer;
-  $("status").textContent = warnings.length ? warnings.join(" ") : "";
+  $("status").textContent = warnings.join(" ").replaceAll("`", "");
 }
 
 /** Shows what went wrong; null: nothing. */

@@ -8,7 +8,10 @@ import { follow, set, state } from "./store.js";
 
 const REST = 0.1; // time between the samples of a rest [s]
 
-export const createRound = () => follow("round", draw);
+export function createRound() {
+  follow("round", draw);
+  follow("time", mark);
+}
 
 /** Shows an answer of POST /cycle: its moves, which are kept answers, and its rests become one motion. Throws Problem. */
 export async function showRound(round, request) {
@@ -25,8 +28,10 @@ export async function showRound(round, request) {
     candidates: [], candidate_counts: {}, certificate: { ...first.certificate, ...round.certificate, clearance }, warnings: round.warnings,
     branch: { start: round.legs[0].start, goal: round.legs.at(-1).goal },
   };
-  const cell = cellOf({ ...first.arm, ...request, payload: null, robot: round.robot }, robot);
-  set({ asked: request, cell, robot, answer, chosen: [], time: 0, duration: round.duration, arms: [{ name: "round", answer }], round });
+  const asked = { ...first.arm, ...request };
+  const cell = cellOf({ ...asked, robot: round.robot }, robot);
+  const shown = { ...round, loads: loadsOf(round.legs, moves, asked) };
+  set({ asked: request, cell, robot, answer, chosen: [], time: 0, duration: round.duration, arms: [{ name: "round", answer }], round: shown });
 }
 
 /** The samples of all legs in a row. A rest holds its configuration, and draws its mean power. */
@@ -53,23 +58,44 @@ function resting({ duration, start, electrical }) {
 
 const legName = ({ kind, start, goal }) => (kind === "move" ? `${start.stop} → ${goal.stop}` : `${kind} at ${goal.stop}`);
 
+/** What the arm carries from each leg on, and the obstacles that do not count then: as the moves' answers say. */
+function loadsOf(legs, moves, { payload = null, scene }) {
+  const all = (scene?.obstacles ?? []).map(({ name }) => name);
+  return legs.map(({ t0 }, k) => {
+    // at a stop the arm carries what it carries on its next move
+    const arm = [...moves.slice(k), ...moves.slice(0, k).toReversed()].find(Boolean).arm ?? { payload };
+    const counted = new Set((arm.scene ?? { obstacles: [] }).obstacles.map(({ name }) => name));
+    return { t0, payload: arm.payload ?? null, ignored: arm.scene ? all.filter((name) => !counted.has(name)) : [] };
+  });
+}
+
+/** Number of the leg at a time of the round. */
+export const legAt = (legs, time) => Math.max(0, legs.findLastIndex(({ t0 }) => t0 <= time + 1e-9));
+
 function draw() {
   const { round } = state;
   $("round").hidden = !round;
   if (!round) return;
   const most = Math.max(...round.legs.map(({ electrical, duration }) => electrical / (duration || Infinity)));
   const legs = round.legs.map((leg) => {
-    const name = legName(leg);
-    const text = `${name}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
+    const text = `${legName(leg)}: ${figure(leg.duration)} s, ${figure(leg.electrical)} J, ${figure(leg.payload_mass)} kg`;
     const button = el("button", { type: "button", class: `leg ${leg.kind}`, title: text, "aria-label": text, onclick: () => goTo(leg.t0) }, el("span", {}, figure(leg.electrical)));
     button.style.flexGrow = leg.duration;
     button.style.setProperty("--height", `${(100 * leg.electrical) / (leg.duration || 1) / most}%`);
     return button;
   });
-  const rows = round.legs.filter(({ kind }) => kind === "move" || kind === "path").map((leg) => el("tr", {}, el("td", {}, legName(leg)),
-    [leg.duration, leg.electrical, leg.lower_bound].map((value) => el("td", { class: "number" }, figure(value)))));
-  const head = el("tr", {}, ["move", "time s", "energy J", "bound J"].map((name) => el("th", {}, name)));
+  const rows = round.legs.map((leg) => el("tr", { class: leg.answer ? null : "rest" }, el("td", {}, el("button", { type: "button", class: "jump", onclick: () => goTo(leg.t0) }, legName(leg))),
+    [leg.duration, leg.electrical, leg.lower_bound, leg.payload_mass].map((value) => el("td", { class: "number" }, figure(value)))));
+  const head = el("tr", {}, el("th", {}, "leg"), ["s", "J", "bound J", "kg"].map((name) => el("th", { class: "number" }, name)));
   $("timeline").replaceChildren(el("div", { class: "legs", role: "group", "aria-label": "Legs of the round" }, legs),
     el("p", { class: "hint" }, "As wide as the time, as high as the mean power; the figures are joules. Click to go there."),
-    el("table", {}, el("thead", {}, head), el("tbody", {}, rows)));
+    el("div", { class: "scroll" }, el("table", {}, el("thead", {}, head), el("tbody", {}, rows))));
+  mark();
+}
+
+/** Which leg the arm is on now. */
+function mark() {
+  if (!state.round) return;
+  const now = legAt(state.round.legs, state.time);
+  for (const list of $("timeline").querySelectorAll(".legs, tbody")) [...list.children].forEach((each, k) => each.toggleAttribute("data-now", k === now));
 }

@@ -6,12 +6,10 @@ import { ofPose } from "./chain.js";
 const SIDE = 8; // of what is drawn of a half space [m]
 const MOST_CELLS = 60000; // drawn of a point cloud or of voxels
 
-export const matrix = (T) => new THREE.Matrix4().set(...T);
-
 /** Gives an object a pose as a matrix. */
 export function place(object, T) {
   object.matrixAutoUpdate = false;
-  object.matrix.copy(matrix(T));
+  object.matrix.set(...T);
   object.matrixWorldNeedsUpdate = true;
   return object;
 }
@@ -52,13 +50,22 @@ export function shapeObject(shape, material, margin = 0) {
     case "sphere": return solid(new THREE.SphereGeometry(shape.radius + margin, 32, 20));
     case "cylinder": return solid(upright(new THREE.CylinderGeometry(shape.radius + margin, shape.radius + margin, shape.length + twice, 40)));
     case "capsule": return solid(upright(new THREE.CapsuleGeometry(shape.radius + margin, shape.length, 10, 28)));
-    case "mesh": return solid(new ConvexGeometry(shape.vertices.map((point) => new THREE.Vector3(...point))));
+    case "mesh": return solid(new ConvexGeometry(hull(shape.vertices, margin)));
     case "half_space": return halfSpace(material, margin);
     case "points": return cells(new THREE.IcosahedronGeometry(shape.radius + margin, 1), shape.points, material);
     case "voxels": return cells(new THREE.BoxGeometry(...[0, 0, 0].map(() => shape.size + twice)), voxelCentres(shape), material);
     case "mesh_file": return meshFile(shape, material);
     default: return new THREE.Group();
   }
+}
+
+/** The corners of a hull, `margin` [m] farther out. */
+function hull(vertices, margin) {
+  const corners = vertices.map((point) => new THREE.Vector3(...point));
+  if (!margin) return corners;
+  const ball = new THREE.IcosahedronGeometry(margin, 1).attributes.position;
+  const around = Array.from({ length: ball.count }, (_, k) => new THREE.Vector3().fromBufferAttribute(ball, k));
+  return corners.flatMap((corner) => around.map((offset) => corner.clone().add(offset)));
 }
 
 function halfSpace(material, margin) {
@@ -89,9 +96,19 @@ function voxelCentres({ size, cells: given, bits }) {
   return centres;
 }
 
-const fromBase64 = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+export const fromBase64 = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
-/** A group that fills itself: the reader of a format is loaded when it is needed. */
+// the reader of a format is loaded when it is needed
+const READERS = {
+  stl: async (bytes) => new THREE.Mesh(new (await import("three/addons/loaders/STLLoader.js")).STLLoader().parse(bytes.buffer)),
+  obj: async (bytes) => new (await import("three/addons/loaders/OBJLoader.js")).OBJLoader().parse(new TextDecoder().decode(bytes)),
+  glb: async (bytes) => (await new (await import("three/addons/loaders/GLTFLoader.js")).GLTFLoader().parseAsync(bytes.buffer, "")).scene,
+};
+
+/** The object in a file of a format: `stl`, `obj` or `glb`. */
+export const readMeshes = (format, bytes) => READERS[format](bytes);
+
+/** A group that fills itself. */
 function meshFile({ format, data, scale = 1 }, material) {
   const group = new THREE.Group();
   group.scale.setScalar(scale);
@@ -100,22 +117,7 @@ function meshFile({ format, data, scale = 1 }, material) {
     group.add(object);
     group.dispatchEvent({ type: "filled" });
   };
-  const bytes = fromBase64(data);
-  const readers = {
-    stl: async () => {
-      const { STLLoader } = await import("three/addons/loaders/STLLoader.js");
-      fill(new THREE.Mesh(new STLLoader().parse(bytes.buffer), material));
-    },
-    obj: async () => {
-      const { OBJLoader } = await import("three/addons/loaders/OBJLoader.js");
-      fill(new OBJLoader().parse(new TextDecoder().decode(bytes)));
-    },
-    glb: async () => {
-      const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
-      fill((await new GLTFLoader().parseAsync(bytes.buffer, "")).scene);
-    },
-  };
-  readers[format]().catch((error) => console.warn(`A mesh file cannot be drawn: ${error.message}`));
+  readMeshes(format, fromBase64(data)).then(fill).catch((error) => console.warn(`A mesh file cannot be drawn: ${error.message}`));
   return group;
 }
 

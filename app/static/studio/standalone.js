@@ -1,5 +1,6 @@
 // One answer as a single HTML file that needs no service: the page itself, with its scripts and the answer inside.
 import { send } from "./api.js";
+import { meshFileOf } from "./meshes.js";
 import { state } from "./store.js";
 
 const IMPORT = /(\bfrom\s*|\bimport\s*\(?\s*)(["'])([^"'\n]+)\2/g;
@@ -20,8 +21,9 @@ export async function standalone() {
   for (const node of page.querySelectorAll("link[rel=stylesheet], link[rel=modulepreload], head script, #ask, #share, noscript, header a.button")) node.remove();
   page.querySelector("#compute-front").closest("article").remove();
   page.body.classList.add("alone");
-  const { answer, robot } = state;
-  const data = { answer: { ...answer, answer: null }, request: state.cell, robot };
+  const { answer, robot, round } = state;
+  const file = robot.has_meshes ? await meshFileOf(robot).catch(() => null) : null;
+  const data = { answer: { ...answer, answer: null }, request: state.cell, robot, round, meshes: file && base64(file) };
   const main = nameOf(new URL("studio/main.js", location.href).href);
   // as text: elements would be held to the policy of this page
   const inside = [
@@ -52,7 +54,7 @@ async function gathered(first, map) {
       waiting.push(target);
       return `${before}${quote}${nameOf(target)}${quote}`;
     });
-    found.set(url, `data:text/javascript;base64,${base64(named)}`);
+    found.set(url, `data:text/javascript;base64,${base64(new TextEncoder().encode(named))}`);
   }
   return Object.fromEntries([...found].map(([url, data]) => [nameOf(url), data]));
 }
@@ -63,9 +65,4 @@ function resolved(name, from, map) {
   return key ? new URL(map[key] + name.slice(key.length), location.href).href : null;
 }
 
-function base64(source) {
-  const bytes = new TextEncoder().encode(source);
-  let letters = "";
-  for (let k = 0; k < bytes.length; k += 32768) letters += String.fromCharCode(...bytes.subarray(k, k + 32768));
-  return btoa(letters);
-}
+const base64 = (bytes) => btoa(bytes.reduce((text, byte) => text + String.fromCharCode(byte), ""));

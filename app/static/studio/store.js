@@ -27,6 +27,5 @@ export function follow(names, then) {
 /** Sets some of the state, then calls those who follow it. */
 export function set(changes) {
   Object.assign(state, changes);
-  const changed = Object.keys(changes);
-  for (const { names, then } of followers) if (changed.some((name) => names.has(name))) then(state);
+  for (const { names, then } of followers) if (Object.keys(changes).some((name) => names.has(name))) then(state);
 }

@@ -6,10 +6,10 @@ import { Chain, cellOf, multiply, ofPose, sampleAt } from "./chain.js";
 import { $, el, figure, style, svg } from "./dom.js";
 import { Eye } from "./eye.js";
 import { Labels } from "./labels.js";
-import { nearestPoints } from "./nearest.js";
 import { pathOfPower, rampStops } from "./path.js";
+import { legAt } from "./round.js";
 import { placedShape } from "./shapes.js";
-import { follow, set, state } from "./store.js";
+import { follow, state } from "./store.js";
 
 const START = 0x3b7dd8;
 const GOAL = 0xe07b39;
@@ -20,6 +20,7 @@ const SLOW = 0.055;
 const FAST = 0.022;
 // pixels along an edge of a pixel of the page, of a still picture: its edges are smooth by that alone
 const STILL = 2;
+const NEAR = 0.5; // of a round, for which the nearest pair is shown before and after its instant [s]
 const PAUSE = 400; // until then a picture does not count as still [ms]
 
 let view = null;
@@ -43,8 +44,8 @@ class View {
   constructor(box) {
     this.box = box;
     this.renderer = new THREE.WebGLRenderer({ antialias: false, alpha: true });
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    // softer shadows cost a machine without a graphics card a third of its frames
+    Object.assign(this.renderer.shadowMap, { enabled: true, type: THREE.BasicShadowMap });
     box.prepend(this.renderer.domElement);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.02, 60);
@@ -62,6 +63,8 @@ class View {
     this.pace = (SLOW + FAST) / 2;
     this.light();
     this.axes();
+    this.renderer.domElement.addEventListener("pointermove", (event) => event.buttons || this.hover(event));
+    for (const name of ["pointerdown", "pointerleave"]) this.renderer.domElement.addEventListener(name, () => this.hover(null));
     new ResizeObserver(() => this.resize()).observe(box);
     this.resize();
   }
@@ -71,7 +74,7 @@ class View {
     this.sun = new THREE.DirectionalLight(0xffffff, 2.1);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(1024, 1024);
-    this.sun.shadow.bias = -0.0012;
+    Object.assign(this.sun.shadow, { bias: -0.0003, normalBias: 0.004 });
     this.scene.add(this.sun, this.sun.target);
   }
 
@@ -86,25 +89,38 @@ class View {
 
   /** Everything anew: another answer, or other arms beside it. */
   build() {
-    const { answer, cell, robot, arms } = state;
+    const { answer, cell, robot, arms, round } = state;
     if (!answer) return;
     this.chain = new Chain(robot);
     for (const name of ["arms", "obstacles", "margins", "path"]) this.empty(this.parts[name]);
     this.arms = arms.map(({ answer: own, colour }, k) => {
-      const arm = new Arm(this.chain, robot, cell, k ? { tint: colour } : {});
+      const arm = new Arm(this.chain, robot, cell, { ...(k ? { tint: colour } : {}), loads: round?.loads.map(({ payload }) => payload) });
       this.parts.arms.add(arm.object);
       this.parts.path.add(pathOfPower(own.trajectory, (q) => this.chain.tcp(q, cell.tcp), k ? 0.006 : 0.009));
       return arm;
     });
     for (const obstacle of cell.scene.obstacles) this.obstacle(obstacle);
     this.drawnScene = cell.scene;
-    this.nearest = this.nearestOf(answer, cell, robot);
+    this.nearest = this.nearestOf(answer);
     this.eye.fit(state.answer.trajectory, this.chain, this.sun);
     this.explain();
+    this.nameStops(round);
     this.buildGhosts();
     if (this.shown !== answer.robot) this.look(1);
     this.shown = answer.robot;
     this.pose();
+  }
+
+  /** The stops of a round, by their names. */
+  nameStops(round) {
+    const places = new Map(); // several stops may be at one of them
+    for (const [name, q] of new Map(round?.legs.map(({ goal }) => [goal.stop, goal.q]))) {
+      const T = this.chain.tcp(q, state.cell.tcp);
+      const at = [T[3], T[7], T[11]].map((value) => value.toFixed(3)).join();
+      if (!name.includes("/")) places.set(at, [...(places.get(at) ?? []), name]);
+    }
+    [...places].forEach(([at, names], k) => this.labels.put(`stop ${k}`, names.join(", "), at.split(",").map(Number), "stop"));
+    this.labels.keep("stop", places.size);
   }
 
   /** What the colours of the path mean, and what the axes are. */
@@ -131,12 +147,12 @@ class View {
 
   obstacle(obstacle) {
     const colour = new THREE.Color(style(obstacle.shape === "half_space" ? "--floor" : "--obstacle"));
-    const material = new THREE.MeshLambertMaterial({ color: colour, transparent: true, opacity: 1, side: THREE.DoubleSide });
+    const material = new THREE.MeshLambertMaterial({ color: colour, side: THREE.DoubleSide });
     const object = placedShape(obstacle, material);
     const solid = obstacle.shape !== "half_space";
     // to look for thousands of parts between eye and arm would take longer than to draw them
     const hides = solid && !["points", "voxels", "mesh_file"].includes(obstacle.shape);
-    object.userData = { material, solid, hides };
+    object.userData = { material, solid, hides, name: obstacle.name };
     object.traverse((mesh) => {
       mesh.receiveShadow = true;
       mesh.castShadow = solid;
@@ -145,12 +161,33 @@ class View {
     this.parts.obstacles.add(object);
     const shell = new THREE.MeshBasicMaterial({ color: 0xd64545, transparent: true, opacity: 0.16, depthWrite: false, side: THREE.DoubleSide });
     const margin = obstacle.margin ?? DEFAULT_MARGIN;
-    if (margin > 0 && !["mesh", "mesh_file"].includes(obstacle.shape)) this.parts.margins.add(placedShape(obstacle, shell, margin));
+    object.userData.title = `${obstacle.name}, margin ${figure(margin * 1000)} mm`;
+    if (margin > 0 && obstacle.shape !== "mesh_file") {
+      const around = placedShape(obstacle, shell, margin);
+      around.userData.of = object;
+      this.parts.margins.add(around);
+    }
+  }
+
+  /** The obstacle under the pointer has its name, and its margin as a shell. */
+  hover(event) {
+    const { width, height } = this.size;
+    const found = event && this.eye.under((2 * event.offsetX) / width - 1, 1 - (2 * event.offsetY) / height);
+    const over = found && found.object.userData.title;
+    this.labels.drop("hover");
+    if (over) this.labels.put("hover", over, found.at, "hover");
+    if (over || this.over) this.showMargins(found?.object);
+    this.over = over;
+  }
+
+  showMargins(over = null) {
+    for (const shell of this.parts.margins.children) shell.visible = state.show.margins || shell.userData.of === over;
+    this.draw();
   }
 
   buildGhosts() {
     this.empty(this.parts.ghosts);
-    const { answer, cell, robot, chosen, best } = state;
+    const { answer, cell, robot, chosen, best, round } = state;
     if (!answer) return;
     const ghost = (q, tint, opacity) => {
       const arm = new Arm(this.chain, robot, cell, { tint, opacity });
@@ -158,21 +195,18 @@ class View {
       this.parts.ghosts.add(arm.object);
     };
     ghost(answer.trajectory.q[0], START, 0.2);
-    ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
+    // a round ends where it begins
+    if (!round) ghost(answer.trajectory.q.at(-1), GOAL, 0.2);
     chosen.forEach(({ q_goal }, k) => ghost(q_goal, new THREE.Color(style(`--joint-${k + 2}`)).getHex(), 0.42));
     if (best?.q_goal && best.robot === answer.robot) ghost(best.q_goal, new THREE.Color(style("--good")).getHex(), 0.42);
     this.draw();
   }
 
-  nearestOf(answer, cell, robot) {
-    const clearance = answer.certificate.clearance;
+  /** The line between the nearest points, and its words: that nothing but the distance of this instant is meant. */
+  nearestOf({ certificate: { clearance } }) {
     this.empty(this.parts.nearest);
-    this.labels.drop("nearest");
-    if (!clearance) return null;
-    const { t, q } = answer.trajectory;
-    const points = nearestPoints(cell, robot, this.chain.frames(sampleAt(t, q, clearance.time)), clearance.pair);
-    if (!points) return null;
-    const ends = [points.first, points.second].map((point) => new THREE.Vector3(...point));
+    if (!clearance?.points) return null;
+    const ends = clearance.points.map((point) => new THREE.Vector3(...point));
     const material = new THREE.MeshBasicMaterial({ color: 0xd62f6b, depthTest: false, transparent: true });
     for (const end of ends) {
       const dot = new THREE.Mesh(new THREE.SphereGeometry(0.008, 14, 10), material);
@@ -182,28 +216,35 @@ class View {
     }
     const line = new THREE.Line(new THREE.BufferGeometry().setFromPoints(ends), new THREE.LineBasicMaterial({ color: 0xd62f6b, depthTest: false }));
     this.parts.nearest.add(line);
-    const text = `${clearance.pair.join(" – ")}: ${figure((clearance.sampled + marginOf(cell, clearance.pair)) * 1000)} mm at ${figure(clearance.time)} s`;
-    return { text, at: points.first.map((value, axis) => (value + points.second[axis]) / 2) };
+    const text = `${clearance.pair.join(" – ")}: ${figure(ends[0].distanceTo(ends[1]) * 1000)} mm at ${figure(clearance.time)} s`;
+    return { text, at: ends[0].add(ends[1]).multiplyScalar(0.5).toArray() };
   }
 
   /** The arms at the present time, and what is switched on. */
   pose() {
     if (!this.arms) return;
-    const { show, time, arms } = state;
+    const { show, time, arms, round, answer } = state;
+    const leg = round ? legAt(round.loads, time) : 0;
+    this.ignored = round?.loads[leg].ignored ?? [];
     this.arms.forEach((arm, k) => {
       const { t, q } = arms[k].answer.trajectory;
       arm.pose(sampleAt(t, q, time));
       arm.showCapsules(show.capsules);
+      arm.carry(leg);
     });
-    for (const name of ["ghosts", "path", "nearest", "margins", "axes"]) this.parts[name].visible = show[name];
-    for (let axis = 0; axis < 3; axis++) this.labels.show(`axis ${axis}`, show.axes);
-    if (this.nearest) this.labels.put("nearest", this.nearest.text, this.nearest.at, "near");
-    this.labels.show("nearest", show.nearest);
+    for (const name of ["ghosts", "path", "axes"]) this.parts[name].visible = show[name];
+    $("labels").toggleAttribute("data-without-axes", !show.axes);
+    // in a round the arm is elsewhere most of the time
+    const near = this.nearest && show.nearest && (!round || Math.abs(time - answer.certificate.clearance.time) < NEAR);
+    this.parts.nearest.visible = Boolean(near);
+    if (near) this.labels.put("nearest", this.nearest.text, this.nearest.at, "near");
+    else this.labels.drop("nearest");
+    this.showMargins();
     this.labels.keep("arm", arms.length > 1 ? arms.length : 0);
     if (arms.length > 1)
       arms.forEach(({ name, answer }, k) => {
         const top = this.arms[k].frames.at(-1);
-        this.labels.put(`arm ${k}`, `${name}: ${figure(answer.energy.electrical.total)} J`, [top[3], top[7], top[11] + 0.08], "arm");
+        this.labels.put(`arm ${k}`, `${name}: ${figure(answer.energy.electrical.total)} J`, [top[3], top[7], top[11] + 0.08 + 0.07 * k], "arm");
       });
     this.draw();
   }
@@ -224,7 +265,7 @@ class View {
     if (fine) this.setFineness(STILL);
     else this.adapt(now);
     this.controls.update();
-    if (this.arms) this.eye.fade(this.arms[0].frames);
+    if (this.arms) this.eye.fade(this.arms[0].frames, this.ignored);
     this.renderer.render(this.scene, this.camera);
     this.labels.place(this.size);
     this.frames = (this.frames ?? 0) + 1;
@@ -279,15 +320,6 @@ class View {
     return new Promise((resolve) => this.renderer.domElement.toBlob(resolve));
   }
 }
-
-/** The margin [m] between two bodies by name: that of the obstacle, if one of them is one. */
-export function marginOf(cell, pair) {
-  const obstacle = cell.scene.obstacles.find(({ name }) => pair.includes(name));
-  return obstacle ? (obstacle.margin ?? DEFAULT_MARGIN) : 0;
-}
-
-/** Chooses what is drawn. */
-export const show = (name, on) => set({ show: { ...state.show, [name]: on } });
 
 /** Pose of the TCP as it is drawn now: a matrix, row by row. */
 export const drawnTcp = () => multiply(view.arms[0].links.at(-1).matrix.clone().transpose().toArray(), ofPose(state.cell.tcp));

@@ -171,6 +171,19 @@ def test_a_redundant_arm_warns_once_of_what_holds_for_the_whole_round(client: Te
     assert [each["name"] for each in answer["baselines"]] == ["move_by_move"]
 
 
+def test_the_moves_repeat_the_scene_in_its_frame(client: TestClient) -> None:
+    """What computes with a move's arm meets the obstacles where the round did."""
+    pose = {"position": [0.5, 0.0, 0.1], "quaternion": [0.0, 0.0, 0.0, 1.0]}
+    scene = {
+        "frame": "base_link",
+        "obstacles": [{"name": "box", "shape": "box", "size": [0.1, 0.1, 0.2], "pose": pose}],
+    }
+    body = {"start": {"q": HOME}, "stops": [{"target": down(0.4, -0.35, 0.3)}], "scene": scene, **PATIENT}
+    legs = client.post("/cycle", json=body | {"windings": False}).json()["legs"]
+    arms = [client.get(leg["answer"]).json()["answer"]["arm"] for leg in legs]
+    assert [arm["scene"]["frame"] for arm in arms] == ["base_link"] * len(legs)
+
+
 def test_a_round_in_a_given_time_waits_on_its_brakes(client: TestClient, answer: dict[str, Any]) -> None:
     time, hold = 2.5 * answer["duration"], {"hold": "brakes", "brake_delay": 0.2, "brake_power": 2.0}
     found = client.post("/cycle", json=a_round(time=time, hold=hold)).json()

@@ -10,15 +10,40 @@ import pytest
 from models.registry import load_robot
 from optimizer.collision.clearance_proof import GAP, RELATIVE_GAP, proven_clearance
 from optimizer.collision.model import CollisionModel
-from optimizer.problem.arm import Arm
-from optimizer.problem.scene import HalfSpace, Obstacle, Scene, Sphere
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.clouds import Points
+from optimizer.problem.scene import (
+    Attachment,
+    Box,
+    Capsule,
+    Cylinder,
+    HalfSpace,
+    Mesh,
+    Obstacle,
+    Scene,
+    Shape,
+    Sphere,
+)
 from optimizer.trajectories.spline import Spline
-from tests.optimizer.cells import at, cell, positions, wander
+from tests.optimizer.cells import LOADS, at, cell, positions, wander
 from tests.optimizer.moves import ROBOT
 from tests.selection import long_but
 
 ROUNDING = 1e-9  # m
 REPLAY = 1e-4  # s
+PEA = 1e-4  # m
+ON_SURFACE = 1e-6  # m; Coal's own tolerance
+AT = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
+STILL = Spline(5, np.array([0.0] * 6 + [1.0] * 6), np.array([AT] * 6))
+OBSTACLES: list[Shape] = [
+    HalfSpace(),
+    Sphere(0.1),
+    Box(np.array([0.3, 0.2, 0.1])),
+    Cylinder(0.1, 0.2),
+    Capsule(0.05, 0.2),
+    Mesh(np.random.default_rng(1).normal(size=(30, 3)) * 0.05),
+    Points(np.array([[0.0, 0, 0], [0.02, 0, 0.01], [0.0, 0.03, 0]]), 0.01),
+]
 
 
 def replayed(model: CollisionModel, spline: Spline, within: float) -> float:
@@ -56,6 +81,29 @@ def test_named_pair_has_that_distance_at_that_time(seed: int) -> None:
     (contact,) = model.closest_pairs(positions(spline, np.array([proof.time])))
     assert contact.pair == proof.pair
     assert contact.distance == pytest.approx(proof.sampled, abs=1e-8)
+
+
+@pytest.mark.parametrize("carried", [None, *LOADS], ids=lambda shape: type(shape).__name__)
+@pytest.mark.parametrize("shape", OBSTACLES, ids=lambda shape: type(shape).__name__)
+def test_the_nearest_points_are_on_the_two_bodies(shape: Shape, carried: Shape | None) -> None:
+    """A pea at the point of the first body is as far from the second body as the first is; one at the other touches."""
+    hand = replace(ROBOT, capsules=ROBOT.capsules[-1:])
+    load = None if carried is None else Attachment(carried, at([0.0, 0, 0.2], [0.1, 0.2, 0.3]))
+    payload = Payload(1.0, shape=load)
+    below = at([0.3, 0.2, -0.3] if isinstance(shape, HalfSpace) else [0.1, -0.3, 0.4], [0.3, 0.1, 0.2])
+    scene = Scene([Obstacle("thing", shape, below, margin=0.02)])
+    proof = proven_clearance(CollisionModel(Arm(robot=hand, payload=payload, scene=scene)), STILL)
+    assert proof is not None and proof.points is not None and proof.pair[0] == "thing"
+    gap = proof.sampled + 0.02
+    first, second = (np.array(point) for point in proof.points)
+    assert gap > 0.01 and np.linalg.norm(second - first) == pytest.approx(gap, abs=ON_SURFACE)
+    for point, expected in ((first, gap), (second, 0.0)):
+        pea = Scene([Obstacle("pea", Sphere(PEA), at(point), margin=0.0)])
+        model = CollisionModel(Arm(robot=hand, payload=payload, scene=pea))
+        distances = model.signed_distances(positions(STILL, np.zeros(1)))[0][0]
+        pairs = [model.names(k) for k in range(len(distances))]
+        distance = min(d for d, pair in zip(distances, pairs, strict=True) if pair == ("pea", proof.pair[1]))
+        assert distance + PEA == pytest.approx(expected, abs=ON_SURFACE)
 
 
 def test_a_touch_between_samples_is_found() -> None:
@@ -102,10 +150,8 @@ def test_margin_is_taken_off() -> None:
 
 
 def test_standing_still() -> None:
-    q = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
-    spline = Spline(5, np.array([0.0] * 6 + [1.0] * 6), np.array([q] * 6))
     model = CollisionModel(Arm(robot=ROBOT))
-    proof, (contact,) = proven_clearance(model, spline), model.closest_pairs([q])
+    proof, (contact,) = proven_clearance(model, STILL), model.closest_pairs([AT])
     assert proof is not None
     assert proof.min_clearance == pytest.approx(contact.distance, abs=ROUNDING)
 
