@@ -134,6 +134,11 @@ class PathConstraints:
         """A name for every ratio."""
         return tuple(name for limit in self.limits for name in limit.names)
 
+    @cached_property
+    def limit_speeds(self) -> bool:
+        """Whether a ratio hangs on v; else all of them hang on q alone."""
+        return any(isinstance(limit, PointSpeedConstraint) for limit in self.limits)
+
     def ratios(self, q: Array, v: Array) -> Array:
         """Ratios (n, c) at q [rad] and v [rad/s] (n, nq)."""
         frames = link_frames(self.placements, q)

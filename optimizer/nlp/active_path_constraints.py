@@ -92,14 +92,18 @@ class PathConstraintRows:
         k = np.flatnonzero(weights.any(axis=1))
         if self.constraints is None or not len(k):
             return np.zeros((self.n, self.n))
-        nq, v = self.nq, values.v[k]
+        nq, v, w = self.nq, values.v[k], weights[k]
         y = np.hstack([values.q[k], v])
-        stepped = np.concatenate([y[None], y + DIFFERENCE * np.eye(2 * nq)[:, None]]).reshape(-1, 2 * nq)
-        wanted = np.tile(weights[k] != 0, (2 * nq + 1, 1))
-        ratios = self.constraints.linearised(stepped[:, :nq], stepped[:, nq:], wanted)
-        w = np.tile(weights[k], (2 * nq + 1, 1))[..., None]
-        slopes = np.hstack([(w * ratios.by_q).sum(axis=1), (w * ratios.by_v).sum(axis=1)]).reshape(-1, len(k), 2 * nq)
-        bent = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
+        # what hangs on positions alone needs no steps in speed
+        steps = DIFFERENCE * np.eye(2 * nq if self.constraints.limit_speeds else nq, 2 * nq)
+        stepped = np.concatenate([y[None], y + steps[:, None]]).reshape(-1, 2 * nq)
+        ratios = self.constraints.linearised(stepped[:, :nq], stepped[:, nq:], np.tile(w != 0, (len(steps) + 1, 1)))
+        # of hundreds of pairs of bodies, few have a weight
+        c = np.flatnonzero(w.any(axis=0))
+        by_state = (each[:, c].reshape(len(steps) + 1, len(k), len(c), nq) for each in (ratios.by_q, ratios.by_v))
+        slopes = np.concatenate([np.einsum("kc,skcj->skj", w[:, c], each) for each in by_state], axis=2)
+        bent = np.zeros((len(k), 2 * nq, 2 * nq))
+        bent[:, : len(steps)] = (slopes[1:] - slopes[0]).transpose(1, 0, 2) / DIFFERENCE
         Y = np.concatenate(self._state_gradients(v, T, k), axis=1)
         hessian: Array = Y.reshape(-1, self.n).T @ (bent @ Y).reshape(-1, self.n)
         # second derivatives of v = s' / T by (s, T)
