@@ -173,7 +173,8 @@ class _Replay:
         if not np.isfinite(T).all():
             return dict.fromkeys(("path_position", "path_rotation"), np.nan)
         position, rotation = course.deviation(T)
-        between = 2 * float(np.linalg.norm(np.diff(T[:, :3], n=2, axis=0), axis=(1, 2)).max(initial=0.0)) / 8
+        moving = T[:, :3] if path.about is None else T[:, :3] @ np.column_stack([[*path.about, 0], [0, 0, 0, 1]])
+        between = 2 * float(np.linalg.norm(np.diff(moving, n=2, axis=0), axis=(1, 2)).max(initial=0.0)) / 8
         return {
             "path_position": float(position.max() + between) / path.position_tolerance,
             "path_rotation": float(rotation.max() + between) / path.rotation_tolerance,

@@ -85,6 +85,22 @@ class PreparedProblem(Plant):
             self._joint_paths[key] = joint_path(self.arm, self.course, trace) if trace.obstacle is None else None
         return self._joint_paths[key]
 
+    @cached_property
+    def _chosen(self) -> set[bytes]:
+        return set()
+
+    def is_chosen(self, q_start: Array) -> bool:
+        """Whether other turnings of the tool have been looked for from q_start (nq,) [rad] on."""
+        return q_start.tobytes() in self._chosen
+
+    def choose(self, q_start: Array, trace: Trace | None = None, path: Spline | None = None) -> None:
+        """Note that turnings have been looked for from q_start (nq,) [rad] on; the joints follow that of a trace, by
+        `path`, from now on."""
+        key = q_start.tobytes()
+        self._chosen.add(key)
+        if trace is not None:
+            self.traces[key], self._joint_paths[key] = trace, path
+
     def broken_on_the_way(self, q: Array, v: Array) -> list[str]:
         """What samples q [rad], v [rad/s] (k, nq) of a motion break, in words: path constraints, a margin."""
         broken = []

@@ -57,6 +57,7 @@ def to_tool_path(path: Path | StopPath, via: Sequence[BasePose], robot: Robot) -
         blend=path.blend,
         position_tolerance=path.tolerance.position,
         rotation_tolerance=path.tolerance.rotation,
+        about=path.tolerance.about,
         least_speed=path.bounds.min,
         ramp=path.bounds.ramp,
     )

@@ -70,6 +70,14 @@ class PathTolerance(Request):
     rotation: float = described(
         "Largest angle of the tool.", "rad", 2e-3, default=ROTATION_TOLERANCE, ge=LEAST_TOLERANCE, le=0.5
     )
+    about: Axis | None = described(
+        "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must to follow the path, "
+        "and as needs least energy. `rotation` is for the direction of this axis then. At both ends of the path the "
+        "tool has its full orientation. Null: the orientation is that of the path.",
+        None,
+        [0.0, 0.0, 1.0],
+        default=None,
+    )
 
 
 class _OnPath(Request):

@@ -45,11 +45,11 @@ class Chain:
 
 
 def pose_error(T_reached: Array, T: Array) -> Array:
-    """Twist (n, 6) [m, rad] in base axes that carries poses T_reached (n, 4, 4) to T (4, 4): to first order in the
-    translation, exactly in the rotation but for half turns."""
+    """Twist (n, 6) [m, rad] in base axes that carries poses T_reached (n, 4, 4) to T (4, 4) or (n, 4, 4): to first
+    order in the translation, exactly in the rotation but for half turns."""
     error = np.empty((len(T_reached), 6))
-    error[:, :3] = T[:3, 3] - T_reached[:, :3, 3]
-    E = T[:3, :3] @ T_reached[:, :3, :3].transpose(0, 2, 1)
+    error[:, :3] = T[..., :3, 3] - T_reached[:, :3, 3]
+    E = T[..., :3, :3] @ T_reached[:, :3, :3].transpose(0, 2, 1)
     axis = np.stack([E[:, 2, 1] - E[:, 1, 2], E[:, 0, 2] - E[:, 2, 0], E[:, 1, 0] - E[:, 0, 1]], axis=1) / 2
     sine = np.sqrt((axis * axis).sum(axis=1))
     cosine = (E[:, 0, 0] + E[:, 1, 1] + E[:, 2, 2] - 1) / 2

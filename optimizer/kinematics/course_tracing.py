@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from models.robot import Array, Robot
 from optimizer.deadline import checkpoint
@@ -19,6 +20,7 @@ from optimizer.kinematics import newton
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.tcp import flange_pose, tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_through
 from optimizer.problem.arm import Arm
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline
@@ -35,30 +37,62 @@ JUMP = 0.25
 # at least; and the share of the tolerances that the fit may take
 FIRST_SPANS, MOST_SPANS, SAMPLES_IN_SPAN, SHARE = 2, 500, 2, 0.5
 
+# values by which a turning is given: the first that leads to the end of the course counts
+KNOTS = (10, 18, 34)
+
 Obstacle = Literal["unreachable", "singular"]
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """Configurations q (m, nq) [rad] at the fractions `at` (m,) of a course, and why they end before its end, if so."""
+    """Configurations q (m, nq) [rad] at the fractions `at` (m,) of a course, and why they end before its end, if so.
+
+    The tool is turned on the way by `turning`, if it is. With other turnings the course is followed to `farthest`.
+    """
 
     q: Array
     at: Array
     obstacle: Obstacle | None = None
+    turning: CubicSpline | None = None
+    farthest: float = 0.0
 
     @property
     def followed(self) -> float:
         """The share of the course that was followed."""
-        return float(self.at[-1])
+        return max(float(self.at[-1]), self.farthest)
 
 
 @lru_cache(maxsize=16)
-def _chain_of(robot: Robot) -> Chain:
+def chain_of(robot: Robot) -> Chain:
+    """The chain of a robot."""
     return Chain.of(robot.model)
 
 
 def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
     """The course followed from each configuration q_start (n, nq) [rad] of its first pose.
+
+    Where the tool may turn about an axis, it does so where the course cannot be followed without.
+    """
+    found = _traces(arm, course, q_start)
+    if course.path.about is None or course.turning is not None:
+        return found
+    return [each if each.obstacle is None else _with_turning(arm, course, each) for each in found]
+
+
+def _with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
+    """The trace of a turning with which the course is followed to its end; if there is none, how far it is followed."""
+    sheet = TurningSheet.of(arm, chain_of(arm.robot), course, stopped.q[0])
+    chosen = sheet.least(shortest)
+    for knots in KNOTS if chosen is not None else ():
+        turning = turning_through(sheet.at, sheet.angles[chosen], knots)
+        (trace,) = _traces(arm, replace(course, turning=turning), stopped.q[:1])
+        if trace.obstacle is None:
+            return replace(trace, turning=turning)
+    return replace(stopped, farthest=sheet.reached if chosen is None else 0.0)
+
+
+def _traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
+    """The course with its turning, if any, followed from each start.
 
     Where joints move far from point to point, it is followed once more with more points.
     """
@@ -72,7 +106,7 @@ def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
 
 
 def _traced(arm: Arm, course: ToolCourse, q_start: Array, at: Array) -> list[Trace]:
-    poses, chain = course.poses(at), _chain_of(arm.robot)
+    poses, chain = course.poses(at), chain_of(arm.robot)
     q = np.full((len(q_start), len(at), q_start.shape[1]), np.nan)
     q[:, 0] = q_start
     last, obstacle = np.zeros(len(q_start), dtype=int), list[Obstacle | None]([None] * len(q_start))
@@ -100,6 +134,7 @@ def joint_path(arm: Arm, course: ToolCourse, trace: Trace) -> Spline | None:
 
     The spline has more knots where it is off the course: near corners and singularities.
     """
+    course = replace(course, turning=trace.turning)
     breaks = course.grid(FIRST_SPANS)
     while len(breaks) <= MOST_SPANS:
         checkpoint()
@@ -123,14 +158,14 @@ def _denser(arm: Arm, course: ToolCourse, trace: Trace, breaks: Array) -> Trace 
     few = np.flatnonzero(np.histogram(trace.at, breaks)[0] < SAMPLES_IN_SPAN)
     inside = (np.arange(SAMPLES_IN_SPAN) + 0.5) / SAMPLES_IN_SPAN
     at = (breaks[few, None] + inside * np.diff(breaks)[few, None]).ravel()
-    chain, found = _chain_of(arm.robot), np.empty((len(at), trace.q.shape[1]))
+    chain, found = chain_of(arm.robot), np.empty((len(at), trace.q.shape[1]))
     guesses = np.stack([np.interp(at, trace.at, q) for q in trace.q.T], axis=1)
     for k, pose in enumerate(course.poses(at)):
         (found[k],), (missed,) = newton.solved(chain, guesses[k][None], flange_pose(pose, arm.T_flange_tcp))
         if missed > REACHED or np.abs(found[k] - guesses[k]).max() > JUMP:
             return None
     order = np.argsort(np.concatenate([trace.at, at]), kind="stable")
-    return Trace(np.concatenate([trace.q, found])[order], np.concatenate([trace.at, at])[order])
+    return replace(trace, q=np.concatenate([trace.q, found])[order], at=np.concatenate([trace.at, at])[order])
 
 
 def path_ratios(arm: Arm, course: ToolCourse, q: Array) -> dict[str, float]:

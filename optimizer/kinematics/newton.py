@@ -1,4 +1,4 @@
-"""Newton's method for n configurations of one pose at once, damped after Levenberg and Marquardt.
+"""Newton's method for n configurations at once, of one pose or of one each, damped after Levenberg and Marquardt.
 
 The damping is the squared error, and more where a step fails: so the method converges on curves of solutions, too, to
 a point nearby, and at a fold of two branches (Yamashita and Fukushima, "On the rate of convergence of the
@@ -23,7 +23,8 @@ _LONGEST_STEP = 0.5
 def solved(
     chain: Chain, q: Array, T: Array, steps: int = 60, hopeless: float = np.inf, least_damping: float = 0.0
 ) -> tuple[Array, Array]:
-    """Configurations (n, nq) [rad] from starts q (n, nq), and by how much each misses the flange pose T (4, 4) (n,).
+    """Configurations (n, nq) [rad] from starts q (n, nq), and by how much each misses (n,) the flange pose T (4, 4),
+    or one of its own (n, 4, 4).
 
     A start ends once a step no longer helps: at the last digit, or at a local minimum of the error. With `hopeless`, a
     start whose error is larger after a third of the steps ends there. With `least_damping`, nothing moves along
@@ -45,7 +46,7 @@ def solved(
         move *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.abs(move).max(axis=1), 1e-300))[:, None]
         tried = q[going] + move
         T_tried, jacobian_tried = chain.flange_and_jacobian(tried)
-        error_tried = pose_error(T_tried, T)
+        error_tried = pose_error(T_tried, T if T.ndim == 2 else T[going])
         missed_tried = miss(error_tried)
         better = (error_tried**2).sum(axis=1) < squared
         taken = going[better]

@@ -33,6 +33,8 @@ class ToolCourse:
     shape: Shape
     # ways [m] along the shape, and the fractions of this course at them; None where these are those of the way
     by_distance: tuple[Array, Array] | None = None
+    # the angle [rad] by which the tool is turned about the path's free axis at a fraction of the way; None: by none
+    turning: CubicSpline | None = None
 
     @classmethod
     def of(cls, path: ToolPath, T_start: Array, T_goal: Array) -> ToolCourse:
@@ -71,13 +73,24 @@ class ToolCourse:
     def poses(self, fraction: Array) -> Array:
         """T_base_tcp (k, 4, 4) at fractions (k,) of the way."""
         fraction = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0)
-        if self.by_distance is None:
-            return self.shape.poses(fraction * self.length)
-        way, at = self.by_distance
-        return self.shape.poses(np.clip(CubicSpline(at, way)(fraction), 0.0, self.length))
+        way = fraction * self.length
+        if self.by_distance is not None:
+            ways, at = self.by_distance
+            way = np.clip(CubicSpline(at, ways)(fraction), 0.0, self.length)
+        T = self.shape.poses(way)
+        return T if self.turning is None else self.turned(T, self.turning(fraction))
+
+    def turned(self, T: Array, angle: Array) -> Array:
+        """Poses T (k, 4, 4), turned about the path's free axis by angles (k,) [rad]."""
+        assert self.path.about is not None
+        T = T.copy()
+        T[:, :3, :3] @= Rotation.from_rotvec(angle[:, None] * np.array(self.path.about)).as_matrix()
+        return T
 
     def deviation(self, T: Array) -> tuple[Array, Array]:
         """How far poses T (k, 4, 4) of a motion and the course are from each other: at most so many metres and radians.
+
+        Where the tool may turn about an axis, the radians are those between the directions of this axis.
 
         Each pose is compared with one of the course, in the order of both. A piece of the course of length s, whose
         ends are c apart, is at most (s² - c²)^½ / 2 from the straight line between them, if both are gone through
@@ -85,9 +98,9 @@ class ToolCourse:
         Infinite for all poses (k,) if the motion does not end where the course does.
         """
         at = self.grid(COMPARED, STEP)
-        known = _embedded(self.poses(at))
-        best, left_out, rest = self._matched(at, known, _embedded(T))
-        position, rotation = _apart(T, self.poses(best))
+        known = self._embedded(self.poses(at))
+        best, left_out, rest = self._matched(at, known, self._embedded(T))
+        position, rotation = self._apart(T, self.poses(best))
         position, rotation = position + left_out, rotation + left_out / TURNING
         if rest > self.path.position_tolerance + TURNING * self.path.rotation_tolerance:
             return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
@@ -95,7 +108,7 @@ class ToolCourse:
 
     def ratios(self, T: Array, wanted: Array) -> Array:
         """How far poses T (k, 4, 4) are from poses that are `wanted` (k, 4, 4), over the path's tolerances."""
-        position, rotation = _apart(T, wanted)
+        position, rotation = self._apart(T, wanted)
         return np.maximum(position / self.path.position_tolerance, rotation / self.path.rotation_tolerance)
 
     def grid(self, count: int, step: float = np.inf) -> Array:
@@ -113,7 +126,7 @@ class ToolCourse:
         """Fractions (k,) of the way that are compared with a motion; what is left out before each (k,) [m], and after
         the last [m].
 
-        `known` (m, 12) are the poses at fractions `at` (m,), `asked` (k, 12) those of the motion. Of the points that
+        `known` (m, d) are the poses at fractions `at` (m,), `asked` (k, d) those of the motion. Of the points that
         are not too far ahead, the one is taken that is least off, with what it leaves out.
         """
         chords = np.diff(known, axis=0)
@@ -139,13 +152,18 @@ class ToolCourse:
             best[k], left_out[k] = at[here] + share[nearest] * (at[here + 1] - at[here]), skipped[nearest]
         return best, left_out, float(gone[-1] - length)
 
+    def _apart(self, T: Array, others: Array) -> tuple[Array, Array]:
+        """Distances (k,) [m] and angles (k,) [rad] between poses (k, 4, 4)."""
+        position = np.linalg.norm(T[:, :3, 3] - others[:, :3, 3], axis=1)
+        if self.path.about is None:
+            turned = Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(others[:, :3, :3]).inv()
+            return position, np.asarray(turned.magnitude())
+        own, other = (each[:, :3, :3] @ np.array(self.path.about) for each in (T, others))
+        return position, np.arctan2(np.linalg.norm(np.cross(own, other), axis=1), (own * other).sum(axis=1))
 
-def _apart(T: Array, others: Array) -> tuple[Array, Array]:
-    """Distances (k,) [m] and angles (k,) [rad] between poses (k, 4, 4)."""
-    turned = Rotation.from_matrix(T[:, :3, :3]) * Rotation.from_matrix(others[:, :3, :3]).inv()
-    return np.linalg.norm(T[:, :3, 3] - others[:, :3, 3], axis=1), np.asarray(turned.magnitude())
-
-
-def _embedded(T: Array) -> Array:
-    """Poses as points (k, 12), whose distances are those of the positions [m], and TURNING times those of rotations."""
-    return np.hstack([T[:, :3, 3], TURNING / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9)])
+    def _embedded(self, T: Array) -> Array:
+        """Poses as points (k, d), whose distances are those of the positions [m], and TURNING times those of rotations,
+        or of the directions of an axis about which the tool may turn."""
+        if self.path.about is not None:
+            return np.hstack([T[:, :3, 3], TURNING * T[:, :3, :3] @ np.array(self.path.about)])
+        return np.hstack([T[:, :3, 3], TURNING / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9)])

@@ -15,6 +15,7 @@ from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
+from optimizer.methods.tool_turning import turned_paths
 from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.spline import Spline, sample
@@ -72,12 +73,38 @@ class ToolPathMotion(Method):
         if all(result.spline is None for result in results):
             # what the first space cannot express, a finer one may: a motion that is nearly the fastest one
             results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
-        found = min(results, key=lambda result: self.prepared.cost_of(result.spline))
-        if found.spline is not None:
-            hit = self.prepared.surroundings.worst_violation(found.spline)
-            if hit is not None:
-                found = SolveResult(SolveStatus.FAILED, f"along the path, {hit.message}", collision=hit)
+        found = self._clear(min(results, key=lambda result: self.prepared.cost_of(result.spline)))
+        if found.spline is None and self._may_turn():
+            results += self._turned(self._paced(path), self._scaling(1), np.inf)
+            found = min([found, *results], key=lambda result: self.prepared.cost_of(result.spline))
         return with_effort(found, results)
+
+    def _clear(self, found: SolveResult) -> SolveResult:
+        """The result; without a motion if that collides."""
+        hit = None if found.spline is None else self.prepared.surroundings.worst_violation(found.spline)
+        if hit is None:
+            return found
+        return SolveResult(SolveStatus.FAILED, f"along the path, {hit.message}", collision=hit)
+
+    def _may_turn(self) -> bool:
+        """Whether the tool may turn about an axis, and its turning has not been looked for before."""
+        path = self.prepared.problem.tool_path
+        return path is not None and path.about is not None and not self.prepared.is_chosen(self.q_start)
+
+    def _turned(self, law: tuple[Array, Array], scaling: Basis, least: float) -> list[SolveResult]:
+        """Motions with other turnings of the tool, which are looked for with a law of times [s] and fractions (k,).
+
+        The path of the best one is kept if it needs less than `least` [J]; and no other is looked for again.
+        """
+        results = list[SolveResult]()
+        self.prepared.choose(self.q_start)
+        for trace, path in turned_paths(self.prepared, self.q_start, self.q_goal, *law):
+            results.append(self._clear(self._kept(path, self.interval, scaling, law)))
+            cost = self.prepared.cost_of(results[-1].spline)
+            if cost < least:
+                least = cost
+                self.prepared.choose(self.q_start, trace, path)
+        return results
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
@@ -86,15 +113,23 @@ class ToolPathMotion(Method):
 
     def solve_from(self, q: Array, t: Array, fine: bool) -> SolveResult:
         """The time scaling of least cost in a finer space, from samples q (k, nq) [rad] at t (k,) [s] of a motion along
-        the path."""
+        the path; and with other turnings of the tool, if it may turn."""
         path, scaling = self.prepared.joint_path(self.q_start), self._scaling(FINER_SCALING)
-        if fine or path is None or scaling.n > MOST_SPANS + DEGREE:
+        if fine or path is None:
             return SolveResult(SolveStatus.FAILED, NOT_FINER)
+        results, law = [SolveResult(SolveStatus.FAILED, NOT_FINER)], _on_path(path, q, t)
         try:
             with watch(self.deadline):
-                return self._kept(path, self.interval, scaling, (q, t))
+                if scaling.n > MOST_SPANS + DEGREE:
+                    scaling = self._scaling(1)
+                else:
+                    results.append(self._kept(path, self.interval, scaling, law))
+                if self._may_turn():
+                    least = min(self.prepared.cost_of(result.spline) for result in results)
+                    results += self._turned(law, scaling, least)
         except DeadlinePassed:
-            return SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED)
+            results.append(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED))
+        return with_effort(min(results, key=lambda result: self.prepared.cost_of(result.spline)), results)
 
     def _scaling(self, finer: int) -> Basis:
         """The space of the time scaling, so many times finer than the first one."""
@@ -127,11 +162,14 @@ class ToolPathMotion(Method):
         path: Spline,
         interval: DurationInterval,
         scaling: Basis,
-        guess: tuple[Array, Array] | None = None,
+        law: tuple[Array, Array] | None = None,
     ) -> SolveResult:
-        """The time scaling of least cost from a guess, in a space of motions that is fine enough for the tolerance."""
+        """The time scaling of least cost, in a space of motions that is fine enough for the tolerance.
+
+        `law` is a guess: times (k,) [s], and the fractions (k,) of the path there.
+        """
         results, x = list[SolveResult](), None
-        t, s = self._paced(path) if guess is None else _on_path(path, *guess)
+        t, s = law or self._paced(path)
         spans = min(len(np.unique(path.knots)) + MORE_SPANS, FIRST_SPANS)
         for finer in FINER:
             retiming = PathRetiming(self.prepared, path, interval, self._space(spans * finer), scaling)

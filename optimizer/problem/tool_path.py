@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from optimizer.exceptions import InvalidProblem
+from optimizer.problem.arrays import unit_vector
 from optimizer.problem.pose import Pose
 
 PathShape = Literal["lines", "curve", "arc"]
@@ -36,7 +37,9 @@ class ToolPath:
     turns evenly about one axis; within `blend` [m] of path before and after a pose of `via`, a smooth curve leads past
     it. A curve goes through every pose, with continuous acceleration. An arc is part of the circle through the start,
     the one pose of `via` and the goal. The motion may be off by at most `position_tolerance` [m] and
-    `rotation_tolerance` [rad]. The TCP is no slower than `least_speed` [m/s], but within `ramp` [m] of either end.
+    `rotation_tolerance` [rad]. With `about`, an axis (3,) of the TCP, the tool may turn about it between the ends as it
+    likes: the tolerance is for the direction of the axis then. The TCP is no slower than `least_speed` [m/s], but
+    within `ramp` [m] of either end.
 
     Raises InvalidProblem, with the field named.
     """
@@ -46,6 +49,7 @@ class ToolPath:
     blend: float = 0.0
     position_tolerance: float = POSITION_TOLERANCE
     rotation_tolerance: float = ROTATION_TOLERANCE
+    about: Sequence[float] | None = None
     least_speed: float | None = None
     ramp: float = RAMP
 
@@ -58,6 +62,8 @@ class ToolPath:
             raise InvalidProblem("path.via", f"A path of this shape has at most {most} poses between start and goal.")
         if self.shape == "arc" and not self.via:
             raise InvalidProblem("path.via", "An arc needs one pose between start and goal, which it goes through.")
+        if self.about is not None:
+            object.__setattr__(self, "about", tuple(unit_vector(self.about, "path.tolerance.about").tolist()))
         for name in ("position_tolerance", "rotation_tolerance"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= LEAST_TOLERANCE):

@@ -66,6 +66,7 @@ def test_a_line_that_no_configuration_follows_says_how_far_each_gets(client: Tes
     assert len(problem["attempts"]) == 8 and all(0 < each["followed"] < 1 for each in problem["attempts"])
 
 
+AROUND = {"about": [0.0, 0.0, 1.0]}
 POINTS = [
     {"position": [0.45, -0.25, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
     {"position": [0.45, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
@@ -76,7 +77,12 @@ POINTS = [
 def with_path(**fields: Any) -> dict[str, Any]:
     """One stop with a path, lines to it and from it, and a dwell."""
     speed = {"min": 0.1, "max": 0.3}
-    stop = {"name": "glue", "path": {"points": POINTS, "blend": 0.03, "speed": speed} | fields, "dwell": 0.2, **LINES}
+    stop = {
+        "name": "glue",
+        "path": {"points": POINTS, "blend": 0.03, "speed": speed, "tolerance": AROUND} | fields,
+        "dwell": 0.2,
+        **LINES,
+    }
     return a_round(stops=[stop])
 
 
@@ -119,6 +125,7 @@ def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
         ({"speed": {"min": 0.3, "max": 0.3}}, ["path", "speed"]),
         ({"speed": {"min": 0.3, "ramp": 0.4}}, ["path", "speed", "ramp"]),
         ({"tolerance": {"position": 0.0}}, ["path", "tolerance", "position"]),
+        ({"tolerance": {"about": [0.0, 0.0, 0.0]}}, ["path", "tolerance", "about"]),
     ],
     ids=[
         "one",
@@ -132,6 +139,7 @@ def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
         "no range",
         "all ramps",
         "tolerance",
+        "axis",
     ],
 )
 def test_a_wrong_path_names_its_field(client: TestClient, fields: dict[str, Any], where: list[str]) -> None:

@@ -1,0 +1,160 @@
+"""The turning of a tool about the free axis of its path: the one of least cost for a time law, and then a better one.
+
+First dynamic programming over the sheet of configurations, in which a step costs what the arm draws at an even speed.
+Then the values of a smooth turning are optimised for the cost of the whole motion with this time law (L-BFGS).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize
+
+from models.robot import Array, Mask
+from optimizer.deadline import checkpoint
+from optimizer.energy.bus_flow import drawn_at
+from optimizer.energy.limited_torque import limited_torque
+from optimizer.energy.losses import power_flow
+from optimizer.kinematics import newton
+from optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, within
+from optimizer.kinematics.tcp import flange_pose
+from optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.trajectories.quadrature import simpson_weights
+from optimizer.trajectories.spline import Spline
+
+# values of a smooth turning between and at the ends, and instants at which its cost is measured (an odd number)
+KNOTS, INSTANTS = 10, 81
+# points of the sheet along the way, and more of them for each bend
+FIRST_STEPS, BEND_STEPS = 17, 6
+# step [rad] of a difference quotient, iterations, and the share by which the cost must fall in each
+STEP, ITERATIONS, PROGRESS = 1e-5, 25, 1e-4
+# value of an excess of a limit, as a multiple of the first cost: what exceeds one by a tenth costs a tenth more
+EXCESS = 10.0
+# rad: where a turning leads, and where it is to lead
+SAME = 1e-6
+
+
+def turned_paths(
+    prepared: PreparedProblem, q_start: Array, q_goal: Array, t: Array, s: Array
+) -> Iterator[tuple[Trace, Spline]]:
+    """Traces and joint paths of turnings from q_start to q_goal (nq,) [rad] that should need less; the better one last.
+
+    `s` (k,) are the fractions of the course at times t (k,) [s] of a motion.
+    """
+    law = _TimeLaw(prepared, q_start, s, t)
+    known = prepared.traces[q_start.tobytes()].turning or turning_of(np.zeros(KNOTS - 2))
+    coarse = law.coarse()
+    for turning in (coarse, law.refined(coarse or known)):
+        if turning is None:
+            continue
+        assert prepared.course is not None
+        course, limits = replace(prepared.course, turning=turning), prepared.arm.active_limits
+        (trace,) = traces(prepared.arm, course, q_start[None])
+        trace = replace(trace, turning=turning)
+        leads_there = trace.obstacle is None and np.abs(trace.q[-1] - q_goal).max() < SAME
+        if not leads_there or not within(trace, limits.q_min, limits.q_max):
+            continue
+        path = joint_path(prepared.arm, course, trace)
+        if path is not None:
+            yield trace, path
+
+
+class _TimeLaw:
+    """A course that is gone through in a time law: fractions s (k,) of it at times t (k,) [s]."""
+
+    def __init__(self, prepared: PreparedProblem, q_start: Array, s: Array, t: Array) -> None:
+        assert prepared.course is not None
+        self.prepared, self.course, self.q_start = prepared, prepared.course, q_start
+        self.chain = chain_of(prepared.arm.robot)
+        self.s, self.t = s, t
+        self.times = np.linspace(0.0, t[-1], INSTANTS)
+        self.at = np.interp(self.times, t, s)
+        self.weights = simpson_weights(self.times)
+        self.poses = self.course.poses(self.at)
+
+    def coarse(self) -> CubicSpline | None:
+        """The turning of least cost by dynamic programming; None if there is none but the one without a turn."""
+        most = min(float(self.prepared.arm.active_limits.v_max.max() * self.t[-1] / 2), np.pi)
+        steps = FIRST_STEPS + BEND_STEPS * self.course.shape.bends
+        sheet = TurningSheet.of(self.prepared.arm, self.chain, self.course, self.q_start, steps, most)
+        sheet = sheet.without(self._excluded)
+        lengths = np.diff(np.interp(sheet.at, self.s, self.t))
+
+        def cost(first: Array, second: Array, k: npt.NDArray[np.intp]) -> Array:
+            v = (second - first) / np.maximum(lengths[k], 1e-9)[:, None]
+            return lengths[k] * self._drawn((first + second) / 2, v, np.zeros_like(v))
+
+        chosen = sheet.least(cost)
+        if chosen is None or (chosen == chosen[0]).all():
+            return None
+        return turning_through(sheet.at, sheet.angles[chosen], KNOTS)
+
+    def refined(self, turning: CubicSpline) -> CubicSpline:
+        """The turning near another one that needs the least with this time law."""
+        inner = turning(turning.x)[1:-1]
+        q = self._configurations(inner[None], self._first(turning))[0]
+        if not np.isfinite(q).all():
+            return turning
+        first = max(abs(float(self._costs(q[None])[0])), 1e-9)
+        best = [q]
+
+        def cost(x: Array) -> tuple[float, Array]:
+            checkpoint()
+            tried = self._configurations(np.vstack([x, x + STEP * np.eye(len(x))]), best[0])
+            if not np.isfinite(tried).all():
+                return 1e3, np.zeros(len(x))
+            values = self._costs(tried) / first
+            best[0] = tried[0]
+            return float(values[0]), (values[1:] - values[0]) / STEP
+
+        found = minimize(cost, inner, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "ftol": PROGRESS})
+        return turning_of(np.asarray(found.x, dtype=float))
+
+    def _first(self, turning: CubicSpline) -> Array:
+        """Configurations (INSTANTS, nq) [rad] of a turning, followed from the start."""
+        (trace,) = traces(self.prepared.arm, replace(self.course, turning=turning), self.q_start[None])
+        return np.stack([np.interp(self.at, trace.at, q) for q in trace.q.T], axis=1)
+
+    def _configurations(self, inner: Array, near: Array) -> Array:
+        """Configurations (n, INSTANTS, nq) [rad] of turnings by their values (n, k), near others; NaN where none is."""
+        count, nq = len(inner), near.shape[1]
+        angles = np.concatenate([turning_of(each)(self.at) for each in inner])
+        T = flange_pose(self.course.turned(np.tile(self.poses, (count, 1, 1)), angles), self.prepared.arm.T_flange_tcp)
+        q, missed = newton.solved(self.chain, np.tile(near, (count, 1)), T, steps=20)
+        q[missed > REACHED] = np.nan
+        return q.reshape(count, INSTANTS, nq)
+
+    def _costs(self, q: Array) -> Array:
+        """Cost (n,) [J] of motions q (n, INSTANTS, nq) [rad] with this time law."""
+        spline = CubicSpline(self.times, q, axis=1, bc_type="clamped")
+        v, a = (spline(self.times, d).reshape(-1, q.shape[2]) for d in (1, 2))
+        drawn = self._drawn(q.reshape(v.shape), v, a, soft=True)
+        return np.asarray(drawn.reshape(len(q), INSTANTS) @ self.weights)
+
+    def _drawn(self, q: Array, v: Array, a: Array, soft: bool = False) -> Array:
+        """Cost (n,) [W] at states (n, nq); what exceeds a limit costs more if `soft`, else infinitely much."""
+        arm, limits, tau = self.prepared.arm, self.prepared.arm.active_limits, self.prepared.torques(q, v, a)
+        if self.prepared.problem.objective == "mechanical":
+            cost = np.abs(tau * v).sum(axis=1)
+        else:
+            joints = power_flow(tau, v, a, arm.drives, arm.friction_law).joints
+            cost = drawn_at(arm.bus, arm.regeneration, arm.base_power, joints, np.zeros(len(q)))
+        ratios = [np.abs(v) / limits.v_max, np.abs(limited_torque(arm, tau, v, a)) / limits.tau_max]
+        if soft:
+            ratios += [np.abs(a) / limits.a_max]
+        over = np.maximum(np.hstack(ratios).max(axis=1) - 1, 0.0)
+        return np.asarray(cost + EXCESS * np.abs(cost) * over) if soft else np.where(over > 0, np.inf, cost)
+
+    def _excluded(self, q: Array) -> Mask:
+        """Which configurations (n, nq) are outside of the joints' range, or collide."""
+        limits, arm = self.prepared.arm.active_limits, self.prepared.arm
+        outside = ((q < limits.q_min) | (q > limits.q_max)).any(axis=1)
+        if not arm.collisions:
+            return np.asarray(outside)
+        hits = [each.distance < 0 for each in self.prepared.surroundings.model.closest_pairs(q, within=0.0)]
+        return np.asarray(outside | np.array(hits))
