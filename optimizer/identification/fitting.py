@@ -19,7 +19,7 @@ from optimizer.identification.whole_fit import fit_whole
 
 # variances below it are rounding
 LEAST_ERROR = 1e-12
-LINKS = "link_mass_scale"
+LINK_MASS_SCALE = "link_mass_scale"
 """The figure of the factor on the masses of all links."""
 # share of a figure's standard deviation before the log: beyond it, the log did not tell the figure
 WORTH = 0.7
@@ -159,7 +159,7 @@ def _power_estimate(
             names.append(("load", joint))
             turn.append(every[1 + 5 * nq + joint])
             known.append(float(own.load[joint]))
-        names.append((LINKS, None))
+        names.append((LINK_MASS_SCALE, None))
         turn.append(every[-1])
         known.append(0.0)
     matrix, constant = np.array(turn), np.array(known)

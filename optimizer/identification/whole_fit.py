@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Array, Robot
+from models.uncertainty.parameters import LINKS
+from optimizer.energy.link_regressor import BODY, body_parameters
 from optimizer.identification.block import COUPLED
 from optimizer.identification.clusters import Clusters, shared_variance
 from optimizer.identification.consistent import solve_consistent
@@ -19,15 +21,14 @@ from optimizer.identification.fit_rows import Rows
 from optimizer.identification.grouped import Grouped, jackknife, left_out
 from optimizer.identification.options import Options
 from optimizer.identification.pseudo_inertia import nearness
-from optimizer.identification.regressor import BODY, body_parameters
 from optimizer.identification.robust import bisquare_weights
 from optimizer.identification.torque_fit import LEAST_LOAD_SPREAD, LOAD_SDS
 from optimizer.identification.whole_arm import WholeArm, whole_arm
 
 # of the load friction's torque, and of the weights: each begins where the one before ends
 PASSES, WEIGHINGS = 2, 2
-PARTS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 LINK = "inertials."
+LINK_NAMES = frozenset(LINK + part for part in LINKS)
 # standard deviations of the prior of terms that the robot has no figure of: load friction [1], offset over the torque
 # limit, and any other term [SI]; of one that it has, over its value
 LOAD_SD, OFFSET_SD, OTHER_SD, RELATIVE_SD = 0.1, 0.05, 10.0, 1.0
@@ -64,7 +65,7 @@ def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, optio
     hessian = grouped.gram.sum(axis=0) + precision
     spread = np.linalg.solve(hessian, precision)
     order = np.r_[len(own) : len(value), : len(own)]
-    links = [(LINK + part, joint) for joint in range(robot.nq) for part in PARTS]
+    links = [(LINK + part, joint) for joint in range(robot.nq) for part in LINKS]
     names = (*terms, *links)
     return WholeFit(
         Estimate(
