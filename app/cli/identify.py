@@ -15,6 +15,31 @@ _GZIP = b"\x1f\x8b"
 # a stand-in for the ids of stored logs: the command's are files
 _FILE_ID = "file"
 
+OTHERS = click.option(
+    "--validate",
+    "others",
+    multiple=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a third of the motions.",
+)
+FIT = click.option(
+    "--fit",
+    multiple=True,
+    type=click.Choice(["friction", "rotor", "torque_constant", "power", "payload"]),
+    default=("friction", "rotor"),
+    show_default=True,
+    help="What is found. May be repeated. Power is added where the logs have it; payload is that of the last log.",
+)
+TERMS = click.option(
+    "--term",
+    "terms",
+    multiple=True,
+    type=click.Choice(["coulomb", "viscous", "load", "offset", "curved"]),
+    default=("coulomb", "viscous", "load", "offset"),
+    show_default=True,
+    help="A term of the friction law. May be repeated.",
+)
+
 
 @click.command(
     epilog="""\b
@@ -26,30 +51,9 @@ Examples:
 @click.argument("logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @OUTPUT
 @click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
-@click.option(
-    "--validate",
-    "others",
-    multiple=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="A log that validates the figures, and that no fit sees. May be repeated. Default: a third of the motions.",
-)
-@click.option(
-    "--fit",
-    multiple=True,
-    type=click.Choice(["friction", "rotor", "torque_constant", "power", "payload"]),
-    default=("friction", "rotor"),
-    show_default=True,
-    help="What is found. May be repeated. Power is added where the logs have it; payload is that of the last log.",
-)
-@click.option(
-    "--term",
-    "terms",
-    multiple=True,
-    type=click.Choice(["coulomb", "viscous", "load", "offset", "curved"]),
-    default=("coulomb", "viscous", "load", "offset"),
-    show_default=True,
-    help="A term of the friction law. May be repeated.",
-)
+@OTHERS
+@FIT
+@TERMS
 @click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
 @click.option("--estimator", type=click.Choice(["wls", "irls", "ols"]), default="wls", help="irls: against outliers.")
 @click.option("--payload", type=click.FloatRange(0), help="Mass at the flange [kg]. Default: what the logs say.")

@@ -6,7 +6,7 @@ them. The rows are weighted by the inverse variance of their joint, and by how m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,18 +35,10 @@ LOAD_SD, OFFSET_SD, OTHER_SD, RELATIVE_SD = 0.1, 0.05, 10.0, 1.0
 NOT_LOADED = "It is below {:g} standard deviations, or the rigid torque hardly varies."
 
 
-@dataclass(frozen=True, eq=False)
-class WholeFit:
-    """The estimate of friction, rotors and couplings, then of the links. `change` (10 nq,) of the links' parameters
-    from the robot's own, and (G, 10 nq) without each cluster."""
+def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> Estimate:
+    """Friction, rotors and couplings, then the links' 10 nq parameters, from motor torques (n, nq) [N·m].
 
-    estimate: Estimate
-    change: Array
-    changes: Array
-
-
-def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> WholeFit:
-    """From motor torques (n, nq) [N·m]. `rows` have the regressor."""
+    `rows` have the regressor."""
     own, bodies = body_parameters(robot.model), rows.regressor
     assert bodies is not None
     change, held = np.zeros_like(own), frozenset[int]()
@@ -67,16 +59,12 @@ def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, optio
     order = np.r_[len(own) : len(value), : len(own)]
     links = [(LINK + part, joint) for joint in range(robot.nq) for part in LINKS]
     names = (*terms, *links)
-    return WholeFit(
-        Estimate(
-            names=names,
-            value=value[order],
-            replicates=replicates[:, order],
-            why=tuple(NOT_LOADED.format(LOAD_SDS) if k - len(own) in held else "" for k in order),
-            drift=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
-        ),
-        change,
-        replicates[:, : len(own)] - own,
+    return Estimate(
+        names=names,
+        value=value[order],
+        replicates=replicates[:, order],
+        why=tuple(NOT_LOADED.format(LOAD_SDS) if k - len(own) in held else "" for k in order),
+        drift=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
     )
 
 
