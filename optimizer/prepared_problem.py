@@ -137,9 +137,10 @@ class PreparedProblem(Plant):
         if cycle is None:
             return moving
         still = np.zeros((1, self.arm.robot.nq))
-        held = self.torques(spline.control_points[-1:], still, still)[0]
+        q_end = spline.control_points[-1]
+        held = self.torques(q_end[None], still, still)[0]
         times = waits(cycle, spline.duration)
-        return moving + waiting_sensitivity(self.arm, held, *times, cycle, arm_spread(self.arm))
+        return moving + waiting_sensitivity(self.arm, q_end, held, *times, cycle, arm_spread(self.arm))
 
     @cached_property
     def objective_parameters(self) -> Array:

@@ -15,23 +15,45 @@ _GZIP = b"\x1f\x8b"
 # a stand-in for the ids of stored logs: the command's are files
 _FILE_ID = "file"
 
-
-@click.command(
-    epilog="""\b
-Examples:
-  joulepath identify monday.csv --robot ur10e
-  joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json"""
-)
-@click.argument("logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@OUTPUT
-@click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
-@click.option(
+OTHERS = click.option(
     "--validate",
     "others",
     multiple=True,
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="A log that validates the figures, and that no fit sees. May be repeated. Default: a third of the motions.",
 )
+FIT = click.option(
+    "--fit",
+    multiple=True,
+    type=click.Choice(["friction", "rotor", "torque_constant", "power", "payload"]),
+    default=("friction", "rotor"),
+    show_default=True,
+    help="What is found. May be repeated. Power is added where the logs have it; payload is that of the last log.",
+)
+TERMS = click.option(
+    "--term",
+    "terms",
+    multiple=True,
+    type=click.Choice(["coulomb", "viscous", "load", "offset", "curved"]),
+    default=("coulomb", "viscous", "load", "offset"),
+    show_default=True,
+    help="A term of the friction law. May be repeated.",
+)
+
+
+@click.command(
+    epilog="""\b
+Examples:
+  joulepath identify monday.csv --robot ur10e
+  joulepath identify cold.csv warm.csv --validate friday.csv --refit --output figures.json
+  joulepath identify empty.csv loaded.csv --fit payload"""
+)
+@click.argument("logs", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@OUTPUT
+@click.option("--robot", default="ur5e", show_default=True, help="Name of the robot.")
+@OTHERS
+@FIT
+@TERMS
 @click.option("--refit", is_flag=True, help="Find the links' inertials, too.")
 @click.option("--estimator", type=click.Choice(["wls", "irls", "ols"]), default="wls", help="irls: against outliers.")
 @click.option("--payload", type=click.FloatRange(0), help="Mass at the flange [kg]. Default: what the logs say.")
@@ -43,6 +65,8 @@ def identify(
     output: Path | None,
     robot: str,
     others: tuple[Path, ...],
+    fit: tuple[str, ...],
+    terms: tuple[str, ...],
     refit: bool,
     estimator: str,
     payload: float | None,
@@ -50,7 +74,7 @@ def identify(
     units: str,
     effort: str,
 ) -> None:
-    """Finds friction, rotor inertia and power of one arm from its LOGS, with their standard deviations.
+    """Finds the figures of one arm from its LOGS, with their standard deviations.
 
     LOGS are CSV files of RTDE, of ROS `JointState` or of the service's own form, plain or packed with gzip. The answer
     is the `result` of `GET /identifications/{id}`; its `document` can be sent to `PUT /figures`.
@@ -65,8 +89,8 @@ def identify(
     read = tuple(
         (_settings_of(LogSettings, settings | {"name": file.stem[:80]}, request_id), _packed(file)) for file in files
     )
-    body: dict[str, Any] = {"logs": [_FILE_ID] * len(logs), "estimator": estimator}
-    body |= {"inertials": "refit"} if refit else {}
+    body: dict[str, Any] = {"logs": [_FILE_ID] * len(logs), "estimator": estimator, "fit": list(fit)}
+    body |= {"friction": {"terms": list(terms)}, "inertials": "refit" if refit else "keep"}
     body |= {"validate": [_FILE_ID] * len(others)} if others else {}
     asked = validated(IdentifyRequest, _json(body), request_id)
     with terminal.progress(f"Identifying from {len(logs)} logs"):
@@ -104,6 +128,9 @@ def summary_of(result: dict[str, Any]) -> dict[str, str]:
     told = [each for each in result["parameters"] if each["identified"]]
     lines = {"identified": f"{len(told)} of {len(result['parameters'])} figures"}
     lines["validated on"] = f"{result['validation']['moves']} moves that no fit has seen"
+    if result["payload"] is not None:
+        carried = result["payload"]
+        lines["payload"] = carried["why"] or f"{carried['mass']:.3g} kg, standard deviation {carried['mass_sd']:.2g} kg"
     if fitted["torque"] is not None:
         lines["torque"] = f"{_percent(fitted['torque'])} error, {_percent(own['torque'])} with the robot's own figures"
     if fitted["power"] is not None:

@@ -14,7 +14,7 @@ from app.schemas.examples.values import CREATED
 Section = dict[str, Any]
 NAMES = (
     "Paths of the parameters, with the index of the joint where a figure has one value each: "
-    "`friction_laws.LAW.coulomb.0`, `drives.copper.2`, `electronics.idle_power`."
+    "`friction_laws.LAW.coulomb.0`, `drives.copper.2`, `electronics.idle_power`, `inertials.mx.1`."
 )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from models.arrays import read_only
 from models.robot import Array
-from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION
+from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS
 
 TOP = ("covariance", "session_sd", "move_sd")
 # parts of a friction law, of which `load` may be left out, and figures of the other sections, with their least and
@@ -62,7 +62,8 @@ class InvalidFigures(ValueError):
 @dataclass(frozen=True)
 class Covariance:
     """Covariance `matrix` (n, n) of the identified parameters; see the module. A name is the path of a figure, with the
-    index of the joint where it has one value each: `friction_laws.identified.coulomb.0`, `electronics.idle_power`."""
+    index of the joint where it has one value each: `friction_laws.identified.coulomb.0`, `electronics.idle_power`. Links
+    have the parameters that their torques are linear in: `inertials.mx.1`."""
 
     names: tuple[str, ...]
     matrix: Array
@@ -240,7 +241,8 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
             raise InvalidFigures(
                 f"covariance.names.{k}",
                 "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, drives.copper.2 or "
-                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power.",
+                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or inertials.m.1 with one "
+                f"of {', '.join(LINKS)}.",
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())
@@ -261,4 +263,4 @@ def _is_parameter(name: Any, figures: dict[str, Any], nq: int) -> bool:
         return False
     if len(path) == 3 and path[0] == "friction_laws":
         return path[2] in FRICTION and path[2] in figures["friction_laws"].get(path[1], {})
-    return len(path) == 2 and path[0] == "drives" and path[1] in DRIVES
+    return len(path) == 2 and path[1] in {"drives": DRIVES, "inertials": LINKS}.get(path[0], ())

@@ -13,19 +13,31 @@ BASE_POWER = "base_power"
 FRICTION = ("coulomb", "curved", "speed", "viscous", "load")
 DRIVES = ("torque_constant", "rotor_inertia", "copper", "inverter_constant", "inverter_linear", "inverter_quadratic")
 PER_JOINT = FRICTION + DRIVES
+# of each link: mass [kg], first moments [kg·m] and inertia [kg·m²] in the frame of its joint, in Pinocchio's order. They
+# stand behind the others, link by link, and only where a document has errors of them
+LINKS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
-def count(nq: int) -> int:
-    """Length of the vector for nq joints."""
-    return 1 + nq * len(PER_JOINT)
+def count(nq: int, links: bool = False) -> int:
+    """Length of the vector for nq joints, with those of `links` or without."""
+    return 1 + nq * (len(PER_JOINT) + links * len(LINKS))
 
 
 def place(name: str, nq: int) -> slice:
-    """Where a figure stands in the vector."""
+    """Where the values of a figure stand in the vector."""
     if name == BASE_POWER:
         return slice(0, 1)
+    if name in LINKS:
+        k = count(nq) + LINKS.index(name)
+        return slice(k, k + nq * len(LINKS), len(LINKS))
     k = 1 + nq * PER_JOINT.index(name)
     return slice(k, k + nq)
+
+
+def index(name: str, joint: int, nq: int) -> int:
+    """Where the value of a joint stands in the vector."""
+    where = place(name, nq)
+    return int(where.start + joint * (where.step or 1))
 
 
 def values(law: FrictionLaw, drives: Drives, base_power: float) -> Array:

@@ -9,7 +9,7 @@ figures have the same draws everywhere.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -17,7 +17,7 @@ from scipy.special import ndtr, ndtri
 from models.robot import Array, Robot
 from models.trust import trust_letters
 from models.uncertainty.document import Covariance, covariance_of
-from models.uncertainty.parameters import BASE_POWER, count, place, values
+from models.uncertainty.parameters import BASE_POWER, LINKS, count, index, place, values
 from models.uncertainty.ranges import default_ranges, large_joints, lognormal, range_of
 
 DRAWS = 2048
@@ -26,13 +26,13 @@ SEED = 18
 MOST_SPREADS = 16
 # share of the greatest variance that is rounding
 ROUNDING = 1e-6
-FRICTION, LOAD, SESSION = "friction", "load", "session"
+FRICTION, LOAD, SESSION, INERTIALS = "friction", "load", "session", "inertials"
 _DRY = ("coulomb", "curved", "viscous")
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Errors of the figures of `parameters.values`.
+    """Errors of the figures of `parameters.values`, and of the links' if the robot's document has such errors.
 
     `mean` (p,) are the means of the deviations from the robot's own figures, `draws` (n, p) are about these means.
     `covariances` (p, p) are those of each source, by name: a figure to measure, or `session`. `root` (p, r) makes their
@@ -64,27 +64,39 @@ class _Sources:
     deviations: dict[str, Array] = field(default_factory=dict)
     _columns: int = 0
 
+    @cached_property
+    def _known(self) -> Covariance | None:
+        return covariance_of(self.robot.figures)
+
+    @cached_property
+    def _size(self) -> int:
+        """Length p of the vector."""
+        links = self._known is not None and not set(LINKS).isdisjoint(name for name, _ in self._known.places(self.law))
+        return count(self.robot.nq, links)
+
     def spread(self) -> Spread:
-        known = covariance_of(self.robot.figures)
+        known = self._known
         # that of another law says nothing of this one's figures
         identified = set() if known is None else {name for name, _ in known.places(self.law)}
         self._electronics(identified)
         self._friction(identified)
         self._drives(identified)
         covariances = {name: np.cov(each.T) for name, each in self.deviations.items()}
-        draws = sum(self.deviations.values(), np.zeros((DRAWS, count(self.robot.nq))))
+        draws = sum(self.deviations.values(), np.zeros((DRAWS, self._size)))
         move_sd = 0.0
         if known is not None and identified:
             own, covariance = self._identified(known)
             draws, move_sd = draws + own, known.move_sd
+            masks = dict[str, Array]()
             for name in sorted({figure for figure, _ in known.places(self.law)}):
-                mask = np.zeros(len(covariance))
-                mask[place(name, self.robot.nq)] = 1.0
+                source = INERTIALS if name in LINKS else name
+                masks.setdefault(source, np.zeros(len(covariance)))[place(name, self.robot.nq)] = 1.0
+            for source, mask in masks.items():
                 # what is shared with other figures counts half for each
-                covariances[name] = covariance * (mask[:, None] + mask) / 2
+                covariances[source] = covariance * (mask[:, None] + mask) / 2
             session = self._session(known.session_sd, identified)
             draws, covariances[SESSION] = draws + session, np.cov(session.T)
-        certain = np.ones(count(self.robot.nq))
+        certain = np.ones(self._size)
         for name in self.given:
             certain[place(name, self.robot.nq)] = 0.0
         covariances = {name: each * np.outer(certain, certain) for name, each in covariances.items()}
@@ -119,7 +131,7 @@ class _Sources:
     def _add(self, source: str, name: str, deviation: Array) -> None:
         """A deviation (n,) or (n, nq) of the figure `name`."""
         nq = self.robot.nq
-        known = self.deviations.setdefault(source, np.zeros((DRAWS, count(nq))))
+        known = self.deviations.setdefault(source, np.zeros((DRAWS, self._size)))
         known[:, place(name, nq)] += deviation.reshape(DRAWS, -1)
 
     def _letters(self, section: str, name: str) -> set[str]:
@@ -161,8 +173,8 @@ class _Sources:
         """Draws (n, p) of the figures of the document's covariance, and this (p, p)."""
         nq = self.robot.nq
         chosen = [k for k, name in enumerate(known.names) if known.place_of(name, self.law) is not None]
-        at = [place(name, nq).start + joint for name, joint in known.places(self.law)]
-        covariance = np.zeros((count(nq), count(nq)))
+        at = [index(name, joint, nq) for name, joint in known.places(self.law)]
+        covariance = np.zeros((self._size, self._size))
         covariance[np.ix_(at, at)] = known.matrix[np.ix_(chosen, chosen)]
         root = _root(covariance)
         normal = np.empty((DRAWS, root.shape[1]))
@@ -172,7 +184,7 @@ class _Sources:
 
     def _session(self, session_sd: float, identified: set[str]) -> Array:
         """Draws (n, p) of the friction of another day: one factor for all joints."""
-        nq, result = self.robot.nq, np.zeros((DRAWS, count(self.robot.nq)))
+        nq, result = self.robot.nq, np.zeros((DRAWS, self._size))
         factor = session_sd * self._normal()
         for name in (*_DRY, "load"):
             if identified & {*_DRY, "load"}:

@@ -141,7 +141,7 @@ class Plant:
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a spline motion hangs on the arm's figures."""
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        return energy_sensitivity(weights, v, a, self.torques(q, v, a), self.arm, arm_spread(self.arm))
+        return energy_sensitivity(weights, q, v, a, self.torques(q, v, a), self.arm, arm_spread(self.arm))
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples of a spline motion every `period` [s]; the last one lies on the end."""

@@ -4,10 +4,11 @@ A joint takes P = u v + inverter(i) + copper i² with u = tau + friction and i =
 
     ∂P/∂u = v + (2 copper i + linear sign(i) + 2 quadratic i) / torque_constant.
 
-Friction's coefficients change u by their own terms, the rotor's inertia by a. P is taken as linear in the figures. The
-bus is not: a watt is worth 1 while the bus draws, and what the supply or the energy storage takes of it while there is
-a surplus. Where errors of the figures decide which it is, the expected worth counts (statistical linearisation): with a
-power P of mean m and standard deviation σ,
+Friction's coefficients change u by their own terms, the rotor's inertia by a, and the links' parameters by the
+regressor of the rigid bodies' torques. P is taken as linear in the figures. The bus is not: a watt is worth 1 while the
+bus draws, and what the supply or the energy storage takes of it while there is a surplus. Where errors of the figures
+decide which it is, the expected worth counts (statistical linearisation): with a power P of mean m and standard
+deviation σ,
 
     E max(P, 0) = m Φ(m / σ) + σ φ(m / σ),      dE/dm = Φ(m / σ).
 
@@ -20,9 +21,10 @@ import numpy as np
 from scipy.special import ndtr
 
 from models.robot import Array
-from models.uncertainty.parameters import PER_JOINT
+from models.uncertainty.parameters import PER_JOINT, count
 from models.uncertainty.spread import Spread
 from optimizer.energy.bus_flow import exchange
+from optimizer.energy.link_regressor import BODY, rigid_regressor
 from optimizer.energy.losses import friction_torque
 from optimizer.problem.arm import Arm
 from optimizer.problem.cycle import Cycle
@@ -34,38 +36,42 @@ _STORED = 1e-9
 _CERTAIN = 1e-9
 
 
-def energy_sensitivity(weights: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread) -> Sensitivity:
-    """That of a motion to the errors of `spread`; the other arguments as in `losses.breakdown`."""
-    rates, joints = _power_rates(v, a, tau, arm)
-    count, size, nq = rates.shape
-    base = np.full(size, arm.base_power)
-    # by figure and joint, as PER_JOINT orders them
-    root, mean = spread.root[1:].reshape(count, nq, -1), spread.mean[1:].reshape(count, nq)
+def energy_sensitivity(
+    weights: Array, q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread
+) -> Sensitivity:
+    """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in `losses.breakdown`."""
+    rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread)
+    figures, size, nq = rates.shape
+    base, behind = np.full(size, arm.base_power), count(nq)
     if arm.bus.mode == "isolated":
-        means = joints + np.einsum("ckj,cj->kj", rates, mean)
+        # by figure and joint, as PER_JOINT orders them
+        root, mean = spread.root[1:behind].reshape(figures, nq, -1), spread.mean[1:behind].reshape(figures, nq)
+        means = joints + np.einsum("ckj,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
         factors = (rates.transpose(2, 1, 0) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
-        worth, expected = _expected(means, factors, np.zeros(nq))
+        worth, expected = _expected(means, factors + by_link @ spread.root[behind:], np.zeros(nq))
         drawn, plain = base + spread.mean[0] + expected.sum(axis=1), base + np.maximum(joints, 0.0).sum(axis=1)
-        electronics, gradient = np.ones(size), np.einsum("kj,ckj->cj", weights[:, None] * worth, rates)
+        electronics, watts = np.ones(size), weights[:, None] * worth
+        gradient = np.append(np.einsum("kj,ckj->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link))
     else:
         net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
-        flat = rates.transpose(1, 0, 2).reshape(size, -1)
-        means = net + spread.mean[0] + flat @ mean.ravel()
+        flat = np.hstack([rates.transpose(1, 0, 2).reshape(size, -1), by_link.sum(axis=1)])
+        means = net + spread.mean[0] + flat @ spread.mean[1:]
         electronics, drawn = _expected(means, flat @ spread.root[1:] + spread.root[0], taken)
         plain = np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
         gradient = (weights * electronics) @ flat
     shift = float(weights @ (drawn - plain))
-    return Sensitivity(np.concatenate([[float(weights @ electronics)], gradient.ravel()]), shift)
+    return Sensitivity(np.append(float(weights @ electronics), gradient), shift)
 
 
 def waiting_sensitivity(
-    arm: Arm, tau: Array, motors: float, brakes: float, cycle: Cycle, spread: Spread
+    arm: Arm, q: Array, tau: Array, motors: float, brakes: float, cycle: Cycle, spread: Spread
 ) -> Sensitivity:
-    """That of standing still: for so long [s] while motors hold torques tau (nq,) [N·m], then by brakes."""
+    """That of standing still at q (nq,) [rad]: for so long [s] while motors hold torques tau (nq,) [N·m], then by
+    brakes."""
     still = np.zeros((1, len(tau)))
-    rates, _ = _power_rates(still, still, tau[None], arm)
+    rates, by_link, _ = _power_rates(q[None], still, still, tau[None], arm, spread)
     electronics = motors + (brakes if cycle.brake_power is None else 0.0)
-    gradient = np.concatenate([[electronics], motors * rates[:, 0].ravel()])
+    gradient = np.concatenate([[electronics], motors * rates[:, 0].ravel(), motors * by_link[0].sum(axis=0)])
     return Sensitivity(gradient, float(gradient @ spread.mean))
 
 
@@ -88,8 +94,9 @@ def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
     return np.where((flows.charged > 0) & (flows.surplus <= _STORED * flows.charged), arm.bus.efficiency, taken)
 
 
-def _power_rates(v: Array, a: Array, tau: Array, arm: Arm) -> tuple[Array, Array]:
-    """Derivatives (c, k, nq) of each joint's power by the figures in PER_JOINT, and the power (k, nq) itself [W]."""
+def _power_rates(q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread) -> tuple[Array, Array, Array]:
+    """Derivatives (c, k, nq) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
+    all links, of which p = 0 have errors where the links are known, and the power (k, nq) itself [W]."""
     drives, law = arm.drives, arm.friction_law
     u = tau + friction_torque(law, drives, tau, v, a)
     i = u / drives.torque_constant
@@ -98,12 +105,14 @@ def _power_rates(v: Array, a: Array, tau: Array, arm: Arm) -> tuple[Array, Array
     joints = u * v + quadratic * square + linear * size + drives.inverter_constant
     by_torque = v + (2 * quadratic * i + linear * np.sign(i)) / drives.torque_constant
     step = by_torque * v / np.sqrt(v * v + law.knee * law.knee)
+    tau_rigid = tau - drives.rotor_inertia * a
+    by_rigid = by_torque if law.load is None else by_torque + law.load * step * np.sign(tau_rigid)
     rates = {
         "coulomb": step,
         "curved": by_torque * np.arcsinh(v / law.speed),
         "speed": -by_torque * law.curved * v / (law.speed * np.hypot(v, law.speed)),
         "viscous": by_torque * v,
-        "load": step * np.abs(tau - drives.rotor_inertia * a),
+        "load": step * np.abs(tau_rigid),
         "torque_constant": -(2 * quadratic * square + linear * size) / drives.torque_constant,
         "rotor_inertia": by_torque * a,
         "copper": square,
@@ -111,4 +120,14 @@ def _power_rates(v: Array, a: Array, tau: Array, arm: Arm) -> tuple[Array, Array
         "inverter_linear": size,
         "inverter_quadratic": square,
     }
-    return np.stack([rates[name] for name in PER_JOINT]), joints
+    return np.stack([rates[name] for name in PER_JOINT]), by_rigid[:, :, None] * _of_links(q, v, a, arm, spread), joints
+
+
+def _of_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:
+    """Derivatives (k, nq, p) of the rigid bodies' torques by the links' parameters that have errors."""
+    nq = q.shape[1]
+    if len(spread.mean) == count(nq):
+        return np.zeros((*q.shape, 0))
+    model = arm.robot.model.copy()
+    model.gravity.linear = arm.gravity
+    return rigid_regressor(model, q, v, a) * np.repeat(np.broadcast_to(arm.link_mass_scale, nq), BODY)

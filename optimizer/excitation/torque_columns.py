@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
+from optimizer.energy.link_regressor import body_parameters
 from optimizer.energy.torque_regressor import torque_regressor
 from optimizer.excitation.excitation_problem import Part
 from optimizer.identification.base_parameters import base_parameters
-from optimizer.identification.regressor import body_parameters
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
 

@@ -14,7 +14,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm
-from optimizer.identification.fitting import LINKS, Fitted
+from optimizer.identification.fitting import LINK_MASS_SCALE, Fitted
 from optimizer.identification.results import Advice
 
 _DO = {
@@ -25,7 +25,7 @@ _DO = {
     "rotor_inertia": "Log moves in which this joint speeds up as fast as it may.",
     "idle_power": "Log some seconds of rest, and the power of the arm's bus.",
     "copper": "Log the arm at rest stretched out and folded, with its power: the current that holds it differs.",
-    LINKS: "Log moves that lift the arm and lower it, with its power; or its currents or torques.",
+    LINK_MASS_SCALE: "Log moves that lift the arm and lower it, with its power; or its currents or torques.",
     "inverter_linear": "Log the arm at rest in poses of different load, with its power.",
 }
 STEP = 1e-4
@@ -57,7 +57,7 @@ def _energy(arm: FittedArm, rows: Rows) -> float:
 
 def _changed(arm: FittedArm, name: str, joint: int | None, by: float) -> FittedArm:
     electrics, changed = arm.electrics, dict[str, Any]()
-    if name == LINKS:
+    if name == LINK_MASS_SCALE:
         return replace(arm, links=arm.links + by)
     if joint is None:
         return replace(arm, electrics=replace(electrics, idle=electrics.idle + by))

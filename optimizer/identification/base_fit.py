@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array, Robot
+from optimizer.energy.link_regressor import BODY
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.clusters import Clusters
 from optimizer.identification.estimate import Name
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.grouped import Grouped, jackknife, left_out, solve
 from optimizer.identification.options import Options
-from optimizer.identification.regressor import BODY
 from optimizer.identification.robust import weights_of
 from optimizer.identification.whole_arm import WholeArm, whole_arm
 

@@ -14,7 +14,7 @@ import pinocchio as pin
 from scipy.linalg import qr, solve_triangular
 
 from models.robot import Array
-from optimizer.identification.regressor import rigid_regressor
+from optimizer.energy.link_regressor import rigid_regressor
 
 # of the largest diagonal entry of R; between independent and dependent columns lie many orders of magnitude
 TOLERANCE = 1e-8

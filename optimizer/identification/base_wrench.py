@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
+from optimizer.energy.link_regressor import BODY
 from optimizer.identification.base_parameters import independent_columns
 from optimizer.identification.grouped import Grouped, jackknife, left_out, solve
-from optimizer.identification.regressor import BODY
 
 STATES = 60
 

@@ -11,8 +11,8 @@ import numpy as np
 from scipy import sparse
 
 from models.robot import Array
+from optimizer.energy.link_regressor import BODY
 from optimizer.identification.pseudo_inertia import BASIS
-from optimizer.identification.regressor import BODY
 
 # of the mass: a body's least eigenvalue, in m² for its extent, so that no body has none
 LEAST = 1e-9

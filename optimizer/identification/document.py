@@ -8,6 +8,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.identification.results import IdentifiedFigures
+from optimizer.identification.whole_fit import LINK_NAMES
 
 LAW = "identified"
 """Name of the friction law."""
@@ -15,6 +16,7 @@ _LAW_UNITS = {"coulomb": "N·m", "curved": "N·m", "speed": "rad/s", "viscous": 
 _DRIVES = {"torque_constant": "N·m/A", "rotor_inertia": "kg·m²", "copper": "W/A²", "inverter_linear": "W/A"}
 _INERTIALS = {"mass": "kg", "center_of_mass": "m", "inertia": "kg·m²"}
 TRUST = "B"
+MASS = "inertials.m"
 
 
 def document_of(figures: IdentifiedFigures, date: str) -> dict[str, Any]:
@@ -55,7 +57,7 @@ def _deviations(figures: IdentifiedFigures, name: str, value: Array) -> Array | 
     """Standard deviations in the shape of a figure, 0 for joints that keep the robot's own; None if no one is known."""
     found, known = np.zeros(value.shape), False
     for (figure, joint), sd in zip(figures.parameters, figures.sd.tolist(), strict=True):
-        if figure == name:
+        if figure == (MASS if name == "mass" else name):
             known = True
             found[() if joint is None else joint] = sd
     return found if known else None
@@ -68,6 +70,8 @@ def _path(name: str, joint: int | None = None) -> str | None:
         return f"friction_laws.{LAW}.{name}{end}"
     if name in _DRIVES:
         return f"drives.{name}{end}"
+    if name in LINK_NAMES:
+        return f"{name}{end}"
     return "electronics.idle_power" if name == "idle_power" else None
 
 

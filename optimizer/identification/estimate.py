@@ -33,12 +33,17 @@ class Estimate:
         return jackknife(self.replicates) + self.drift
 
 
-def joined(estimates: list[Estimate]) -> Estimate:
-    """Several estimates from the same clusters as one."""
+def joined(estimates: list[Estimate], shared: Array | None = None) -> Estimate:
+    """Several estimates from the same clusters as one. `shared` is the drift between the first and the second."""
+    estimates = [each for each in estimates if each.names]
+    if not estimates:
+        return Estimate((), np.zeros(0), np.zeros((0, 0)), (), np.zeros((0, 0)))
     sizes = np.cumsum([0, *(len(each.names) for each in estimates)])
     drift = np.zeros((sizes[-1], sizes[-1]))
     for each, start, end in zip(estimates, sizes[:-1], sizes[1:], strict=True):
         drift[start:end, start:end] = each.drift
+    if shared is not None:
+        drift[: sizes[1], sizes[1] :], drift[sizes[1] :, : sizes[1]] = shared, shared.T
     return Estimate(
         names=tuple(name for each in estimates for name in each.names),
         value=np.concatenate([each.value for each in estimates]),

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array, Mask, Robot
+from optimizer.energy.link_regressor import rigid_regressor, rigid_torques
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.log import Log, Move
-from optimizer.identification.regressor import rigid_regressor, rigid_torques
 from optimizer.identification.same_motion import groups_of_motions
 
 Numbers = npt.NDArray[np.int64]

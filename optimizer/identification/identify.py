@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.robot import Mask, Robot
+from models.robot import Array, Mask, Robot
+from models.uncertainty.parameters import LINKS
+from optimizer.energy.link_regressor import BODY, body_parameters
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.advice import advice_of
 from optimizer.identification.block import own_value
@@ -15,14 +17,13 @@ from optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadU
 from optimizer.identification.estimate import Estimate, Name
 from optimizer.identification.fit_rows import Rows, rows_of
 from optimizer.identification.fitted_arm import own_arm
-from optimizer.identification.fitting import LINKS, Fitted, fit_rows, motor_torque
+from optimizer.identification.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
 from optimizer.identification.grouped import lag_one
 from optimizer.identification.interval import Spread, sessions, spread_of
 from optimizer.identification.log import Log
 from optimizer.identification.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
 from optimizer.identification.payload_fit import Carried, joints_without_gravity, loaded, payload_of
-from optimizer.identification.regressor import BODY, body_parameters
 from optimizer.identification.results import (
     Advice,
     IdentifiedFigures,
@@ -38,7 +39,7 @@ from optimizer.identification.structure import inertials_of, physical_of, struct
 from optimizer.identification.temperature import temperatures_of
 from optimizer.identification.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
 from optimizer.identification.validation import Fold, validate
-from optimizer.identification.whole_fit import LINK, PARTS
+from optimizer.identification.whole_fit import LINK, LINK_NAMES
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Payload
 
@@ -75,7 +76,7 @@ class Identification:
     def figures(self) -> IdentifiedFigures:
         """The figures, complete over all joints, with their covariance."""
         arm, estimate = self.fitted.arm, self.fitted.estimate
-        covariance, fitted = estimate.covariance, {figure for figure, _ in estimate.names}
+        fitted = {figure for figure, _ in estimate.names}
         names = [name for name in (*LAW, "rotor_inertia", "torque_constant") if name in fitted]
         if fitted & set(LAW):
             names += [name for name in (*LAW, "speed") if name not in names]
@@ -84,23 +85,35 @@ class Identification:
             electrics = arm.electrics
             values |= {"idle_power": np.array(electrics.idle), "copper": electrics.copper}
             values["inverter_linear"] = electrics.inverter
-        if LINKS in fitted:
+        if LINK_MASS_SCALE in fitted:
             values |= inertials_of(self.robot, (arm.links - 1) * body_parameters(self.robot.model))
         if arm.bodies is not None:
             values |= inertials_of(self.robot, arm.bodies)
         # those that the logs tell only together with others count, too: their errors go with the others'
-        known = np.array([figure in values or figure.startswith(LINK) for figure, _ in estimate.names])
-        told = np.flatnonzero(known & (np.diag(covariance) > 0)).tolist()
+        turn = {name: row for name, row in self._parameters_of_figures() if name[0] in values or name[0] in LINK_NAMES}
+        matrix = np.array([*turn.values()])
+        covariance = matrix @ estimate.covariance @ matrix.T
+        told = np.flatnonzero(np.diag(covariance) > 0)
         return IdentifiedFigures(
             robot=self.robot.name,
             values=values,
-            parameters=tuple(estimate.names[k] for k in told),
+            parameters=tuple([*turn][k] for k in told.tolist()),
             sd=np.sqrt(np.diag(covariance)[told]),
             covariance=covariance[np.ix_(told, told)],
             session_sd=self.spread.session,
             move_sd=self.spread.move,
             logs=self.logs,
         )
+
+    def _parameters_of_figures(self) -> Iterator[tuple[Name, Array]]:
+        """The parameters of the figures that the estimate (p,) stands for, and rows (p,) that make them of it."""
+        names = self.fitted.estimate.names
+        for name, row in zip(names, np.eye(len(names)), strict=True):
+            if name[0] == LINK_MASS_SCALE:
+                for joint, body in enumerate(body_parameters(self.robot.model).reshape(-1, BODY).tolist()):
+                    yield from (((LINK + part, joint), own * row) for part, own in zip(LINKS, body, strict=True))
+            else:
+                yield name, row
 
 
 LAW = ("coulomb", "viscous", "load", "curved")
@@ -234,8 +247,8 @@ def _previous(robot: Robot, name: Name) -> float:
     figure, joint = name
     if figure.startswith(LINK):
         assert joint is not None
-        return float(body_parameters(robot.model).reshape(-1, BODY)[joint, PARTS.index(figure.removeprefix(LINK))])
-    if figure == LINKS:
+        return float(body_parameters(robot.model).reshape(-1, BODY)[joint, LINKS.index(figure.removeprefix(LINK))])
+    if figure == LINK_MASS_SCALE:
         return 1.0
     if figure == "idle_power":
         return float(robot.electronics.idle_power)

@@ -56,8 +56,13 @@ def without_friction(arm: FittedArm) -> FittedArm:
 def figures_variance(fitted: Fitted, rows: Rows) -> float:
     """Variance [J²] of the energy by the errors of the figures: those of the fit, and of the robot's own beneath it."""
     without = np.array([[_energy(arm, rows)] for arm in fitted.without])
-    gradient = rows.weight @ fitted.arm.power(rows)[1]
-    return float(jackknife(without)[0, 0] + gradient @ fitted.drift @ gradient)
+    power, slope = fitted.arm.power(rows)
+    gradient = rows.weight @ slope
+    # what the electrics make of an error of held friction, they make up for in the energy; links load other motions
+    # otherwise
+    tilted = fitted.tilted if fitted.arm.bodies is not None else ()
+    by_links = sum((_energy(arm, rows) - float(rows.weight @ power)) ** 2 for arm in tilted)
+    return float(jackknife(without)[0, 0] + gradient @ fitted.drift @ gradient + by_links)
 
 
 def spread_of(fitted: Fitted, rows: Rows) -> Spread:

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from models.robot import Array, Robot
+from optimizer.energy.link_regressor import BODY, rigid_torques
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.block import moving
 from optimizer.identification.clusters import Clusters, clusters_of, shared_variance
@@ -23,7 +24,6 @@ from optimizer.identification.friction_columns import columns
 from optimizer.identification.grouped import Grouped, jackknife, left_out, solve
 from optimizer.identification.link_errors import link_deviations
 from optimizer.identification.log import Log
-from optimizer.identification.regressor import BODY, rigid_torques
 from optimizer.identification.results import Parameter
 from optimizer.identification.torque_fit import LEAST_LOAD_SPREAD, MOST_RELATIVE_SD
 from optimizer.problem.arm import Payload

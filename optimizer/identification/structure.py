@@ -6,12 +6,12 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array, Robot
+from optimizer.energy.link_regressor import BODY, body_parameters
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.fitted_arm import FittedArm
 from optimizer.identification.options import Options
 from optimizer.identification.pseudo_inertia import pseudo_inertias
-from optimizer.identification.regressor import BODY, body_parameters
 from optimizer.identification.results import Physical, Structure
 
 # of the largest singular value of the scaled columns: below it, a combination of base parameters is not excited

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array, Robot
+from optimizer.energy.link_regressor import body_parameters
 from optimizer.identification.block import Block, block_of, moving
 from optimizer.identification.clusters import Clusters
 from optimizer.identification.fit_rows import Rows
 from optimizer.identification.options import Options
-from optimizer.identification.regressor import body_parameters
 
 
 @dataclass(frozen=True, eq=False)

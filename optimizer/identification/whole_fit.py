@@ -6,11 +6,13 @@ them. The rows are weighted by the inverse variance of their joint, and by how m
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from models.robot import Array, Robot
+from models.uncertainty.parameters import LINKS
+from optimizer.energy.link_regressor import BODY, body_parameters
 from optimizer.identification.block import COUPLED
 from optimizer.identification.clusters import Clusters, shared_variance
 from optimizer.identification.consistent import solve_consistent
@@ -19,33 +21,24 @@ from optimizer.identification.fit_rows import Rows
 from optimizer.identification.grouped import Grouped, jackknife, left_out
 from optimizer.identification.options import Options
 from optimizer.identification.pseudo_inertia import nearness
-from optimizer.identification.regressor import BODY, body_parameters
 from optimizer.identification.robust import bisquare_weights
 from optimizer.identification.torque_fit import LEAST_LOAD_SPREAD, LOAD_SDS
 from optimizer.identification.whole_arm import WholeArm, whole_arm
 
 # of the load friction's torque, and of the weights: each begins where the one before ends
 PASSES, WEIGHINGS = 2, 2
-PARTS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 LINK = "inertials."
+LINK_NAMES = frozenset(LINK + part for part in LINKS)
 # standard deviations of the prior of terms that the robot has no figure of: load friction [1], offset over the torque
 # limit, and any other term [SI]; of one that it has, over its value
 LOAD_SD, OFFSET_SD, OTHER_SD, RELATIVE_SD = 0.1, 0.05, 10.0, 1.0
 NOT_LOADED = "It is below {:g} standard deviations, or the rigid torque hardly varies."
 
 
-@dataclass(frozen=True, eq=False)
-class WholeFit:
-    """The estimate of friction, rotors and couplings, then of the links. `change` (10 nq,) of the links' parameters
-    from the robot's own, and (G, 10 nq) without each cluster."""
+def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> Estimate:
+    """Friction, rotors and couplings, then the links' 10 nq parameters, from motor torques (n, nq) [N·m].
 
-    estimate: Estimate
-    change: Array
-    changes: Array
-
-
-def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, options: Options) -> WholeFit:
-    """From motor torques (n, nq) [N·m]. `rows` have the regressor."""
+    `rows` have the regressor."""
     own, bodies = body_parameters(robot.model), rows.regressor
     assert bodies is not None
     change, held = np.zeros_like(own), frozenset[int]()
@@ -64,18 +57,14 @@ def fit_whole(robot: Robot, rows: Rows, torque: Array, clusters: Clusters, optio
     hessian = grouped.gram.sum(axis=0) + precision
     spread = np.linalg.solve(hessian, precision)
     order = np.r_[len(own) : len(value), : len(own)]
-    links = [(LINK + part, joint) for joint in range(robot.nq) for part in PARTS]
+    links = [(LINK + part, joint) for joint in range(robot.nq) for part in LINKS]
     names = (*terms, *links)
-    return WholeFit(
-        Estimate(
-            names=names,
-            value=value[order],
-            replicates=replicates[:, order],
-            why=tuple(NOT_LOADED.format(LOAD_SDS) if k - len(own) in held else "" for k in order),
-            drift=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
-        ),
-        change,
-        replicates[:, : len(own)] - own,
+    return Estimate(
+        names=names,
+        value=value[order],
+        replicates=replicates[:, order],
+        why=tuple(NOT_LOADED.format(LOAD_SDS) if k - len(own) in held else "" for k in order),
+        drift=(spread @ np.linalg.inv(hessian))[np.ix_(order, order)],
     )
 
 

@@ -15,7 +15,6 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from models.uncertainty.parameters import count
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, checkpoint, watch
 from optimizer.energy.bus_flow import charges
 from optimizer.energy.interval import arm_spread, with_interval
@@ -126,7 +125,8 @@ class _Evaluator:
         self._segment_count = motion.segments if isinstance(motion, Waypoints) else 1
         self._intervals: dict[int, IntervalEnergy] = {}
         self._speed_jumps = 0
-        self._spread, self._sensitivity = arm_spread(arm), Sensitivity(np.zeros(count(arm.robot.nq)), 0.0)
+        self._spread = arm_spread(arm)
+        self._sensitivity = Sensitivity(np.zeros_like(self._spread.mean), 0.0)
         self._charge = arm.bus.initial
         self._last: PiecewiseMotion | None = None
 
@@ -144,7 +144,7 @@ class _Evaluator:
             self._sampler.update(block, lambda t: np.interp(t, known, charge))
         self._add_energies(block, nodes, steps, charge)
         charged = self._charged(float(charge[0]))
-        parts = nodes.weights, nodes.v, nodes.a, nodes.tau
+        parts = nodes.weights, nodes.q, nodes.v, nodes.a, nodes.tau
         self._sensitivity += energy_sensitivity(*parts, charged, self._spread)
         self._last = block
 

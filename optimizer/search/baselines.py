@@ -76,12 +76,12 @@ def compared(
     """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,). See `baselines`."""
     energy = motion_energy(problem, motion, tau, potential)
     spread = arm_spread(problem.arm)
-    sensitivity = energy_sensitivity(motion.weights, motion.v, motion.a, tau, problem.arm, spread)
+    sensitivity = energy_sensitivity(motion.weights, motion.q, motion.v, motion.a, tau, problem.arm, spread)
     if problem.cycle is not None:
         hold = float(holding_power(problem.arm, held))
         energy = energy.with_dwell(dwell_energy(problem.cycle, problem.arm, hold, motion.duration))
         times = waits(problem.cycle, motion.duration)
-        sensitivity += waiting_sensitivity(problem.arm, held, *times, problem.cycle, spread)
+        sensitivity += waiting_sensitivity(problem.arm, motion.q[-1], held, *times, problem.cycle, spread)
     return Baseline(
         name=name,
         duration=motion.duration,

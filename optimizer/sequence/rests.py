@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from models.robot import Array
-from models.uncertainty.parameters import count
 from optimizer.energy.dwell import brake_power, dwell_energy, holding_power, waits
 from optimizer.energy.interval import arm_spread
 from optimizer.energy.plant import Plant
@@ -45,12 +44,13 @@ def rest_energy(asked: WorkRound, move: PlannedMove, length: float, hold: float)
 def rest_sensitivity(asked: WorkRound, move: PlannedMove, length: float, q: Array) -> Sensitivity:
     """How `rest_energy` at q (nq,) [rad] hangs on the arm's figures."""
     arm = move.arm_after
+    spread = arm_spread(arm)
     if length <= 0:
-        return Sensitivity(np.zeros(count(arm.robot.nq)), 0.0)
+        return Sensitivity(np.zeros_like(spread.mean), 0.0)
     cycle = asked.waiting(length)
     still = np.zeros((1, len(q)))
     held = Plant(arm).torques(q[None], still, still)[0]
-    return waiting_sensitivity(arm, held, *waits(cycle, 0.0), cycle, arm_spread(arm))
+    return waiting_sensitivity(arm, q, held, *waits(cycle, 0.0), cycle, spread)
 
 
 def dwell_energies(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:

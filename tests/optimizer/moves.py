@@ -76,9 +76,9 @@ def random_moves(seed: int, count: int) -> Iterator[tuple[Array, Array]]:
 
 
 def torques(task: Problem, q: Array, v: Array, a: Array) -> Array:
-    """Rigid body and rotor torques (k, nq) by Pinocchio, payload and gravity included."""
-    load = task.arm.payload
-    model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
+    """Rigid body and rotor torques (k, nq) by Pinocchio, payload, gravity and scaled links included."""
+    arm, load = task.arm, task.arm.payload
+    model = arm.robot.loaded_model(load.mass, load.com, load.inertia, arm.gravity, arm.link_mass_scale)
     data = model.createData()
     return np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)])
 

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import get_args
 
+import click
+import numpy as np
 import pytest
 
+from app.cli.identify import identify, summary_of
 from app.schemas import errors as problems
-from app.schemas.identifications import IdentificationResult
+from app.schemas.identifications import IdentificationResult, Target, Term
 from models.registry import load_robot
+from optimizer.problem.arm import Payload
 from tests.app.cli.console import Here
 from tests.identification_logs import csv_of, recorded, truth_of
 
@@ -35,6 +40,46 @@ def test_logs_become_figures(here: Here, logs: list[str], tmp_path: Path) -> Non
     assert result.validation.moves == 3
     assert "log0" in result.document["friction_laws"]["identified"]["coulomb"]["source"]
     assert b"log1" not in told
+
+
+def test_what_is_found_can_be_chosen(here: Here, logs: list[str], tmp_path: Path) -> None:
+    output = tmp_path / "figures.json"
+    chosen = ("--fit", "torque_constant", "--fit", "friction", "--term", "coulomb", "--term", "viscous")
+    assert here.run("identify", logs[0], *chosen, "--payload", "0", "-o", str(output))[0] == 0
+    result = IdentificationResult.model_validate_json(output.read_bytes())
+    found = {each.figure for each in result.parameters}
+    # the log has power, which is added by itself
+    assert found == {"torque_constant", "coulomb", "viscous", "idle_power", "copper", "inverter_linear"}
+
+
+def test_a_payload_is_that_of_the_last_log(here: Here, tmp_path: Path) -> None:
+    files = list[str]()
+    for name, carried in (("empty", None), ("loaded", Payload(mass=2.0, com=np.array([0.0, 0.0, 0.06])))):
+        file = tmp_path / f"{name}.csv"
+        truth = truth_of(ROBOT, payload=carried)
+        file.write_bytes(csv_of(recorded(ROBOT, truth, moves=8, seed=len(name)), without="P"))
+        files.append(str(file))
+    output = tmp_path / "figures.json"
+    assert here.run("identify", *files, "--fit", "payload", "--payload", "0", "-o", str(output))[0] == 0
+    payload = IdentificationResult.model_validate_json(output.read_bytes()).payload
+    assert payload is not None and payload.log == 1
+    assert abs(payload.mass - 2.0) <= 4 * payload.mass_sd < 0.2
+    assert summary_of(json.loads(output.read_bytes()))["payload"].startswith(f"{payload.mass:.3g} kg")
+
+
+def test_power_is_refused_of_logs_without(here: Here, tmp_path: Path) -> None:
+    file = tmp_path / "still.csv"
+    file.write_bytes(csv_of(recorded(ROBOT, truth_of(ROBOT), moves=3), without="P"))
+    code, content = here.problem("identify", str(file), "--fit", "power", "--payload", "0")
+    assert code == 1
+    problems.NoPowerChannel.model_validate(content)
+
+
+@pytest.mark.parametrize(("option", "literal"), [("fit", Target), ("terms", Term)])
+def test_the_choices_are_those_of_the_service(option: str, literal: object) -> None:
+    choices = next(each for each in identify.params if each.name == option).type
+    assert isinstance(choices, click.Choice)
+    assert set(choices.choices) == set(get_args(literal))
 
 
 def test_a_log_of_one_motion_is_a_problem(here: Here, tmp_path: Path) -> None:

@@ -6,11 +6,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from models.registry import load_figures, load_robot
 from models.robot import Array, FrictionLaw, Robot
-from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, PER_JOINT, count, place, values
+from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS, PER_JOINT, count, index, place, values
 from models.uncertainty.ranges import default_ranges
 from models.uncertainty.spread import DRAWS, Spread, spread_of
 from optimizer.energy.dwell import dwell_energy, holding_power
@@ -29,7 +30,7 @@ from optimizer.search.baselines import guesses
 from optimizer.solution import Sensitivity
 from optimizer.trajectories.spline import Spline, fine_samples
 from optimizer.trajectories.time_scalings import quintic_spline
-from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, problem, torques
+from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, problem, torques
 from tests.optimizer.test_load_friction import loaded
 
 # relative to the largest derivative: central differences over 1e-4 of a figure, corners of the power between samples
@@ -37,6 +38,8 @@ DIFFERENCE, STEP = 2e-3, 1e-4
 # of the interval's half-width: energy is not quite linear in the figures, and both sides are drawn
 ENDS = 0.12
 SAMPLES = 400
+# step of a link's parameter [SI]
+H = 1e-3
 
 
 def with_values(robot: Robot, law: FrictionLaw, vector: Array) -> Robot:
@@ -120,6 +123,63 @@ def test_the_gradient_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -
         slope = (energy(up) - energy(down)) / (up[k] - down[k])
         # the corners of |i| and of the power move a little: in watts over the motion
         assert found[k] == pytest.approx(slope, rel=DIFFERENCE, abs=2e-3), name_of
+
+
+def with_link(robot: Robot, part: str, joint: int, by: float) -> Robot:
+    """The robot with a parameter of one link changed."""
+    model = robot.model.copy()
+    changed = model.inertias[joint + 1].toDynamicParameters()
+    changed[LINKS.index(part)] += by
+    model.inertias[joint + 1] = pin.Inertia.FromDynamicParameters(changed)
+    return replace(robot, model=model)
+
+
+def masses(robot: Robot) -> list[float]:
+    """Of the moving links [kg]."""
+    return [float(body.mass) for body in list(robot.model.inertias)[1:]]
+
+
+def with_link_errors(robot: Robot) -> Robot:
+    """The robot with masses of links that are known to 5 %."""
+    names = [f"inertials.m.{joint}" for joint in range(6)]
+    matrix = np.diag([(0.05 * mass) ** 2 for mass in masses(robot)]).tolist()
+    return replace(robot, figures=robot.figures | {"covariance": {"names": names, "matrix": matrix}})
+
+
+@pytest.mark.parametrize("name", ["shared", "load", "isolated", "cycle by motors"])
+def test_the_gradient_by_the_links_is_the_slope(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Under a tilted gravity, with links of another weight, which multiplies that of the figures."""
+    given = dict(CONDITIONS[name]) | {"gravity": TILTED}
+    given.pop("inverter", None)
+    robot, spline = with_link_errors(given.pop("robot", ROBOT)), quintic_spline(START, GOAL, 0.9)
+    scale = np.array([1.0, 0.8, 1.2, 1.0, 1.0, 1.0])
+    task = problem(**given, robot=robot, link_mass_scale=scale)
+    monkeypatch.setattr("optimizer.energy.interval.spread_of", lambda *given: certain(spread_of(*given)))
+    found = PreparedProblem.of(task).sensitivity(spline).gradient
+    assert found.shape == (count(6, links=True),)
+    for part, joint in (("m", 1), ("mx", 1), ("mz", 2), ("Izz", 1), ("my", 3), ("Ixz", 4)):
+        changed = [problem(**given, robot=with_link(robot, part, joint, by), link_mass_scale=scale) for by in (H, -H)]
+        up, down = (Reevaluated(each, spline)(nominal(each)) for each in changed)
+        assert found[index(part, joint, 6)] == pytest.approx((up - down) / (2 * H), rel=DIFFERENCE, abs=2e-3), part
+
+
+def test_errors_of_the_links_widen_the_interval() -> None:
+    """By as much as other masses change the energy."""
+    robot, spline = with_link_errors(ROBOT), quintic_spline(START, GOAL, 0.9)
+    plain, task = (problem(payload=PAYLOAD, robot=each) for each in (ROBOT, robot))
+    before, after = (
+        interval_of(Known(60.0, PreparedProblem.of(each).sensitivity(spline), 0.9), each.arm) for each in (plain, task)
+    )
+
+    def energy(task: Problem) -> float:
+        return Reevaluated(task, spline)(nominal(task))
+
+    apart = [
+        energy(problem(payload=PAYLOAD, robot=with_link(ROBOT, "m", joint, 0.05 * mass))) - energy(plain)
+        for joint, mass in enumerate(masses(ROBOT))
+    ]
+    assert np.sqrt(after.sd**2 - before.sd**2) == pytest.approx(float(np.linalg.norm(apart)), rel=0.05)
+    assert after.shares["inertials"] > 0 and sum(after.shares.values()) == pytest.approx(1.0)
 
 
 def test_the_interval_is_that_of_drawn_figures() -> None:

@@ -13,13 +13,14 @@ from models.from_figures import robot_of
 from models.registry import load_robot
 from models.robot import Array, Robot
 from models.uncertainty.document import covariance_of, with_document
+from models.uncertainty.parameters import LINKS
+from optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.consistent import solve_consistent
 from optimizer.identification.document import document_of
 from optimizer.identification.identify import fit
 from optimizer.identification.options import Options
 from optimizer.identification.pseudo_inertia import nearness, pseudo_inertias
-from optimizer.identification.regressor import body_parameters, rigid_regressor, rigid_torques
 from tests.identification_logs import recorded, truth_of
 
 ROUNDING = 1e-9
@@ -147,4 +148,23 @@ def test_identified_figures_become_a_robot() -> None:
     assert body_parameters(made.model) == pytest.approx(body_parameters(robot.model) + change, abs=1e-6)
     known = covariance_of(figures)
     assert known is not None and known.move_sd == found.spread.move
-    assert {"electronics.idle_power", "friction_laws.identified.coulomb.1"} <= set(known.names)
+    assert {"electronics.idle_power", "friction_laws.identified.coulomb.1", "inertials.mx.1"} <= set(known.names)
+    assert found.figures().sd.shape == (len(known.names),)
+
+
+def test_errors_of_refitted_links_are_those_that_the_document_says() -> None:
+    """Torques of other motions, by links that the robot's own are not, and how far they may be off."""
+    robot = load_robot("ur10e")
+    real = heavier(robot)
+    log = replace(recorded(real, truth_of(real, 1), moves=12).log(), power=None)
+    found = fit(robot, [log], Options(refit=True, held_out=0.0))
+    known = covariance_of(document_of(found.figures(), "2025-03-14"))
+    assert known is not None and found.fitted.arm.bodies is not None
+    at = [known.names.index(f"inertials.{part}.{joint}") for joint in range(6) for part in LINKS]
+    covariance = known.matrix[np.ix_(at, at)]
+    regressor = rigid_regressor(robot.model, *states(6, 200))[:, 1:3].reshape(-1, 60)
+    wrong = regressor @ (body_parameters(robot.model) + found.fitted.arm.bodies - body_parameters(real.model))
+    sd = np.sqrt(np.einsum("np,pq,nq->n", regressor, covariance, regressor))
+    assert (np.abs(wrong) <= 3 * sd).mean() > 0.95
+    # and not by far more than they are
+    assert np.sqrt(np.mean((wrong / sd) ** 2)) > 0.2

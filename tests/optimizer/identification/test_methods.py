@@ -10,11 +10,11 @@ import pytest
 
 from models.registry import load_robot
 from models.robot import Array
+from optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.base_parameters import base_parameters
 from optimizer.identification.base_wrench import base_wrench_regressor, fit_base_wrench
 from optimizer.identification.periodic import mean_period, most_likely
-from optimizer.identification.regressor import body_parameters, rigid_regressor, rigid_torques
 from optimizer.identification.threshold import velocity_threshold
 
 ROBOT = load_robot("ur5e")
