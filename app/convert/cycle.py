@@ -151,6 +151,8 @@ def to_cycle_response(
             "solved": sum(move.solved for move in found.moves),
             "wall_time": found.wall_time,
         },
+        # the last: see `TaskResult.of_kept_json`
+        "answer": None,
     }
 
 

@@ -64,12 +64,14 @@ class TaskResult:
         return cls(json_document(content), "application/json", stored)
 
     @classmethod
-    def of_kept_json(cls, content: Mapping[str, Any], figures: AnswerFigures) -> TaskResult:
+    def of_kept_json(
+        cls, content: Mapping[str, Any], figures: AnswerFigures, stored: tuple[StoredAnswer, ...] = ()
+    ) -> TaskResult:
         """A JSON document that is to be kept, with its path as the last field, `answer`."""
         kept = StoredAnswer(str(uuid.uuid4()), b"")
         document = json_document({**content, "answer": kept.path})
         is_optimal = figures.status == "optimal"
-        return cls(document, "application/json", kept_as=kept.id, figures=figures, is_optimal=is_optimal)
+        return cls(document, "application/json", stored, kept.id, figures, is_optimal)
 
     def without_path(self) -> TaskResult:
         """The same document, which was not kept: its field `answer` is null."""

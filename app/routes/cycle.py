@@ -14,7 +14,7 @@ from app.routes.problem_lists import CYCLE_PROBLEMS
 from app.routes.reply import BY_EVENTS, ServiceReply
 from app.schemas import errors as problems
 from app.schemas.cycle import CycleRequest, CycleResponse
-from app.store.store_answers import store_answers
+from app.store.store_answers import keep_answer, store_answers
 from app.tasks.cycle import CycleTask
 from optimizer.progress import Tell
 
@@ -52,6 +52,9 @@ async def cycle(
 
     async def work(tell: Tell) -> TaskResult:
         result = await engine.run(task, deadline_of(body, settings.max_deadline), tell)
-        return await store_answers(store, settings, "optimize", result, client.owner)
+        result = await store_answers(store, settings, "optimize", result, client.owner)
+        if result.kept_as is None:  # a table
+            return result
+        return await keep_answer(store, settings, "cycle", result, client.owner)
 
     return await reply.of(work)

@@ -280,3 +280,6 @@ class CycleResponse(Answer):
     certificate: RoundCertificate = part("Independent check of all moves.")
     warnings: list[str] = described(f"{WARNINGS} Each names its move.", None, [])
     search: CycleSearch = part("Size and effort of the search for the round.")
+    answer: str | None = described(
+        "Path of this answer: `GET` returns it again. Null if it could not be kept.", None, ANSWER_PATH
+    )

@@ -13,6 +13,7 @@ from app.engine.listening import listener
 from app.engine.result import TaskResult
 from app.schemas.cycle import CycleRequest
 from app.tasks.answer_collector import AnswerCollector
+from app.tasks.answer_figures import figures_of
 from app.tasks.certified import certified
 from optimizer.optimize_round import optimize_round
 from optimizer.solution import Solution
@@ -38,4 +39,5 @@ class CycleTask:
             answer = to_optimize_response(self.request, self.request_id, certified(solution), next(arms))
             return collector.add(answer)
 
-        return TaskResult.of_json(to_cycle_response(self.request, self.request_id, found, store), collector.stored)
+        content = to_cycle_response(self.request, self.request_id, found, store)
+        return TaskResult.of_kept_json(content, figures_of(content), collector.stored)

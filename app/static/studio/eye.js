@@ -108,8 +108,7 @@ export class Eye {
     this.ray.far = Infinity;
     const all = this.obstacles.children.filter(({ userData }) => userData.hides);
     const [hit] = this.ray.intersectObjects(all, true);
-    if (!hit) return null;
-    return { object: all.find((each) => each.getObjectById(hit.object.id)), at: hit.point.toArray() };
+    return hit ? { object: all.find((each) => each.getObjectById(hit.object.id)), at: hit.point.toArray() } : null;
   }
 
   /** The obstacles between an eye and the origin of a frame. */

@@ -4,9 +4,7 @@ import { el } from "./dom.js";
 
 export class Labels {
   constructor(layer, camera) {
-    this.layer = layer;
-    this.camera = camera;
-    this.all = new Map();
+    Object.assign(this, { layer, camera, all: new Map() });
   }
 
   /** A label by its name: its text, the point [x, y, z] it belongs to, and its kind. */

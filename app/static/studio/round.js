@@ -23,7 +23,7 @@ export async function showRound(round, request) {
   const clearance = worst && { ...worst, time: worst.time + round.legs[worst.leg].t0 };
   // what the page shows of a motion, of the whole round; the proven bound of a round is that of its energy
   const answer = {
-    ...first, answer: null, arm: null, trajectory, duration: round.duration, status: round.status, energy: round.energy, objective: "electrical",
+    ...first, answer: round.answer ?? null, arm: null, trajectory, duration: round.duration, status: round.status, energy: round.energy, objective: "electrical",
     baselines: round.baselines.map((each) => ({ ...each, mechanical: 0, reason: each.within_limits ? null : "a limit of a move" })),
     candidates: [], candidate_counts: {}, certificate: { ...first.certificate, ...round.certificate, clearance }, warnings: round.warnings,
     branch: { start: round.legs[0].start, goal: round.legs.at(-1).goal },

@@ -52,6 +52,7 @@ class View {
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("start", () => { this.turned = true; });
     this.parts = Object.fromEntries(["arms", "ghosts", "obstacles", "margins", "path", "nearest", "axes"].map((name) => {
       const group = new THREE.Group();
       this.scene.add(group);
@@ -106,7 +107,8 @@ class View {
     this.explain();
     this.nameStops(round);
     this.buildGhosts();
-    if (this.shown !== answer.robot) this.look(1);
+    // a view that was chosen by hand stays, as long as the arm is the same
+    if (this.shown !== answer.robot || !this.turned) this.look(1);
     this.shown = answer.robot;
     this.pose();
   }
@@ -293,6 +295,7 @@ class View {
   /** One of the six views, by its number. */
   look(number) {
     this.eye.look(number);
+    this.turned = number !== 1;
     this.draw();
   }
 

@@ -41,6 +41,15 @@ def answer(client: TestClient) -> dict[str, Any]:
     return content
 
 
+def test_the_round_is_kept(client: TestClient, answer: dict[str, Any]) -> None:
+    again = client.get(answer["answer"]).json()
+    assert (again["kind"], again["answer"]) == ("cycle", answer)
+    exported = client.post("/export/csv", json={"answer": answer["answer"]})
+    assert exported.status_code == 200, exported.text
+    table = list(csv.reader(exported.text.splitlines()))
+    assert float(table[-1][0]) == pytest.approx(answer["duration"], rel=1e-3)
+
+
 def test_legs_are_in_the_order_of_time(answer: dict[str, Any]) -> None:
     kinds = [(leg["kind"], leg["start"]["stop"], leg["goal"]["stop"]) for leg in answer["legs"]]
     assert kinds == [
