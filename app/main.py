@@ -62,6 +62,7 @@ from app.routes import (
 )
 from app.settings import Settings
 from app.store.store import Store
+from app.tasks.in_flight import InFlight
 
 ROUTES = (
     optimize,
@@ -114,6 +115,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.state.settings = settings
     app.state.metrics = Metrics()
+    app.state.in_flight = InFlight()
     keys = key_ring(settings)
     _add_middleware(app, settings, keys)
     install_handlers(app)

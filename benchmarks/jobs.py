@@ -30,7 +30,7 @@ import numpy as np
 
 from app.schemas.examples.values import HOME, NEAR
 from benchmarks.command import parser, write_json
-from benchmarks.service import START, Client, Service, a_cluster, running
+from benchmarks.service import COMPUTED, START, Client, Service, a_cluster, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
 
@@ -54,9 +54,9 @@ def random(seed: int, count: int) -> list[Results]:
     return [{"optimize": request_task(seed, index).body} for index in range(count)]
 
 
-def send(client: Client, requests: list[Results]) -> str:
+def send(client: Client, requests: list[Results], **headers: str) -> str:
     """The path of a new job."""
-    return str(client.post("/jobs", {"requests": requests}).headers["location"])
+    return str(client.post("/jobs", {"requests": requests}, **headers).headers["location"])
 
 
 def wait(client: Client, path: str) -> Results:
@@ -101,7 +101,7 @@ def overhead_of(requests: list[Results], workers_for_jobs: int, **environment: s
             found = statuses(client, path)
         # the service has ended, and the log of SQLite is in the file
         size = _size(folder) - empty
-    elapsed = _seconds(job["started"], job["ended"])
+    elapsed = time_of(job)
     work = sum(each["wall_time"] for each in found)
     count = len(requests)
     return {
@@ -121,8 +121,10 @@ def _size(folder: str) -> int:
     return sum(file.stat().st_size for file in Path(folder).iterdir())
 
 
-def _seconds(start: str, end: str) -> float:
-    return float((np.datetime64(end.rstrip("Z")) - np.datetime64(start.rstrip("Z"))) / np.timedelta64(1, "s"))
+def time_of(job: Results) -> float:
+    """Time [s] from the start of a job to its end."""
+    start, end = (np.datetime64(job[name].rstrip("Z")) for name in ("started", "ended"))
+    return float((end - start) / np.timedelta64(1, "s"))
 
 
 def _overheads(given: Any, workers_for_random: int, **environment: str) -> list[Results]:
@@ -168,7 +170,7 @@ def interactive(given: Any) -> tuple[Results, bool]:
         for turn in range(given.turns):
             part = bodies[turn :: given.turns]
             idle += [client.optimize(body).wall for body in part]
-            path = send(client, random(given.seed, given.beside))
+            path = send(client, random(given.seed, given.beside), **COMPUTED)
             beside += [client.optimize(body).wall for body in part]
             assert client.get(f"{path}?limit=1").content["state"] == "running", "the job is too short"
             client.post(f"{path}/cancel", {})
@@ -227,7 +229,7 @@ def cancel(given: Any) -> tuple[Results, bool]:
         for _ in range(given.cancels):
             _settle(service)
             before = {pid: processor_time(pid) for pid in service.worker_pids()}
-            path = send(client, [hard])
+            path = send(client, [hard], **COMPUTED)
             _until_at_work(before)
             began = time.perf_counter()
             client.post(f"{path}/cancel", {})

@@ -64,9 +64,9 @@ class Client:
         self._connection.connect()
         self._connection.sock.sendall(content)
 
-    def post(self, path: str, body: Any) -> Answer:
+    def post(self, path: str, body: Any, **headers: str) -> Answer:
         """A POST with a JSON body. Raises the same errors as `get`."""
-        return self._exchange("POST", path, orjson.dumps(body))
+        return self._exchange("POST", path, orjson.dumps(body), **headers)
 
     def close(self) -> None:
         """Closes the connection."""

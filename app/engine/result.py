@@ -87,6 +87,14 @@ class TaskResult:
         rest = self.document[self.document.index(b'"', len(_ID)) :]
         return replace(self, document=_ID + request_id.encode() + rest)
 
+    def copied(self, request_id: str) -> TaskResult:
+        """The same document for another request, to be kept as another answer."""
+        own = self.with_id(request_id)
+        if self.kept_as is None or not own.document.endswith(end := _last_field(self.kept_as)):
+            return replace(own, kept_as=str(uuid.uuid4()))
+        new = str(uuid.uuid4())
+        return replace(own, document=own.document[: -len(end)] + _last_field(new), kept_as=new)
+
     @classmethod
     def of_csv(cls, table: str, stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:
         """A CSV document."""

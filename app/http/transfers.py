@@ -13,9 +13,12 @@ from app.exceptions import RequestTimeout, TooManyBytes, TooManyBytesOfClient
 from app.http.client import client_of
 from app.http.handlers import problem_response
 from app.http.refused_body import RefusedBody
+from app.http.turns import Turns
 
 _SMALL = 1 << 16
 """Largest body or answer [byte] that does not count: small requests find room whatever others hold."""
+_PIECES = 4
+"""Pieces of large bodies, of some 256 KiB, that are read in one turn of the event loop."""
 _PIECE = 1 << 18
 """Bytes of an answer that are handed to the connection at a time: the next ones wait until the client has read."""
 
@@ -48,11 +51,13 @@ class BytesInFlight:
 class Bodies:
     """ASGI middleware: reading a body raises RefusedBody if there is no room for it, or if it takes too long.
 
-    A declared size counts from the first read, so that a body for which there is no room is not read on.
+    A declared size counts from the first read, so that a body for which there is no room is not read on. The pieces of
+    large bodies have turns: the connections of those that wait are not read from.
     """
 
     def __init__(self, app: ASGIApp, in_flight: BytesInFlight, time: float) -> None:
         self._app, self._in_flight, self._time = app, in_flight, time
+        self._turns = Turns(_PIECES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes the request on."""
@@ -71,6 +76,8 @@ class Bodies:
                 return await receive()
             try:
                 async with asyncio.timeout_at(until):
+                    if max(expected, received) > _SMALL:
+                        await self._turns.next()
                     message = await receive()
                 received += len(message.get("body", b""))
                 held.hold(max(expected, received))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from functools import partial
 
 from app.engine.work import Ended
 from app.exceptions import StoreUnavailable, TaskFailed
 from app.jobs.changes import Changes
+from app.jobs.equals import Equals, Sorted
 from app.jobs.executor import Executor
 from app.jobs.heap import Heap, Held, Taker
 from app.jobs.holder import is_gone, new_holder
@@ -35,6 +36,10 @@ MOST_AHEAD = 32
 """Requests for each worker that are leased ahead of time at most."""
 GATHER = 0.05
 """Time [s] in which outcomes are gathered, to be stored together, while the workers have more to do."""
+MOST_EQUAL = 500
+"""Requests that are leased beyond that, because they wait for equal ones."""
+MOST_KNOWN = 64
+"""The same, because those before them were all known."""
 PRUNING = timedelta(hours=1)
 """Time between two deletions of old jobs."""
 _STOP = 3.0
@@ -68,12 +73,14 @@ class Dispatcher:
         self._store, self._executor, self._settings, self._now = store, executor, settings, now
         self._held: dict[Key, Held] = {}
         self._heap = Heap()
+        self._equals = Equals(store)
         self._outcomes: list[Outcome] = []
         self._bell = asyncio.Event()
         self._times = _Times(now())
         self._mean_work = AHEAD
         self._mean_of: dict[str, float] = {}
         self._more = True
+        self._more_known = 0
         self._draining = False
         self._tasks: list[asyncio.Task[None]] = []
 
@@ -140,22 +147,27 @@ class Dispatcher:
             self._heap.put_back(held for held in left if not held.dropped)
             for held in left:
                 if held.dropped:
-                    # it waits again, unless its job was cancelled: `settle` knows
-                    self._has_outcome(held, Outcome(held.lease, "waiting"))
+                    self._give_back(held)
 
     def _ended(self, held: Held, how: Ended) -> None:
-        outcome = outcome_of(held.lease, how, held.began)
+        outcome = replace(outcome_of(held.lease, how, held.began), asked=held.asked)
         taken, kind = outcome.wall_time, held.lease.kind
         if taken is not None:
             self._mean_work += 0.2 * (taken - self._mean_work)
             self._mean_of[kind] = self._mean_of.get(kind, taken) + 0.2 * (taken - self._mean_of.get(kind, taken))
         self._has_outcome(held, outcome)
 
+    def _give_back(self, held: Held) -> None:
+        """A request that nobody wants here waits again, unless its job was cancelled: `settle` knows."""
+        self._has_outcome(held, Outcome(held.lease, "waiting"))
+
     def _has_outcome(self, held: Held, outcome: Outcome) -> None:
         self._outcomes.append(outcome)
         if self._held.get(held.lease.key) is held:
             del self._held[held.lease.key]
         self._bell.set()
+        for other, same in self._equals.ended(held, outcome):
+            self._has_outcome(other, same)
 
     async def _dispatch(self) -> None:
         """Exchanges leases and outcomes with the database."""
@@ -191,7 +203,8 @@ class Dispatcher:
         # one of them dispatches; those beyond the slots find nothing to do
         more = self._executor.slots + 1 - len(self._tasks)
         self._tasks += [asyncio.create_task(self._run()) for _ in range(more)]
-        want = self._most_held - len(self._held)
+        await self._begin(self._equals.released())
+        want = self._most_held + min(self._equals.waiting, MOST_EQUAL) + self._more_known - len(self._held)
         if want <= 0 or self._draining:
             return
         now = self._now()
@@ -199,10 +212,30 @@ class Dispatcher:
             lease = partial(leases.lease, holder=self.holder, count=want, now=now, until=now + LEASE)
             leased, changed = await self._store.write(lease)
             self._more = len(leased) == want
-            for each in leased:
-                self._held[each.key] = held = Held(each, Found(each.attempt), dropped=self._draining)
-                self._heap.put(held)
             self.changes.ring(changed)
+            fresh = [Held(each, Found(each.attempt), dropped=self._draining) for each in leased]
+            self._held |= {held.lease.key: held for held in fresh}
+            if await self._begin(fresh) or not fresh:
+                self._more_known = 0
+            else:  # where all were known, more may be
+                self._more_known = min(max(1, 2 * self._more_known), MOST_KNOWN)
+
+    async def _begin(self, held: list[Held]) -> int:
+        """Has requests computed that are equal to no others; returns their number."""
+        wanted = [each for each in held if not each.dropped]
+        for each in held:
+            if each.dropped:
+                self._give_back(each)
+        try:
+            found = await self._equals.sort(wanted)
+        except Exception as error:
+            if not isinstance(error, StoreUnavailable):
+                logger.exception("unforeseen error")
+            found = Sorted(wanted, {})  # computed twice is better than never
+        self._heap.put(*found.to_compute)
+        for each, outcome in found.known.items():
+            self._has_outcome(each, outcome)
+        return len(found.to_compute)
 
     @property
     def _most_held(self) -> int:

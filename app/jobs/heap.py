@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from app.engine.work import Ended, Work
 from app.jobs.progress import HEARD, Found
 from app.jobs.work import MOST_PREEMPTIONS, task_of
+from app.store.cache import Asked
 from app.store.leases import Lease
 from optimizer.progress import nobody
 
@@ -21,13 +22,18 @@ SMALL = 1 << 12
 
 @dataclass(eq=False)
 class Held:
-    """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody wants it any more."""
+    """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody wants it any more.
+
+    `leads`: equal requests may wait for it.
+    """
 
     lease: Lease
     found: Found
     taker: Taker | None = None
     began: float = 0.0
     dropped: bool = False
+    asked: Asked | None = None
+    leads: bool = False
 
     def drop(self) -> None:
         """Stops the work on it."""

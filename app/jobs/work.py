@@ -35,7 +35,7 @@ MOST_PREEMPTIONS = 2
 
 def task_of(lease: Lease) -> JobRequestTask:
     """The task of a lease."""
-    return JobRequestTask(lease.kind, lease.body, _request_id(lease))
+    return JobRequestTask(lease.kind, lease.body, request_id_of(lease))
 
 
 def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
@@ -51,7 +51,7 @@ def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
     error = TooManyDeaths() if isinstance(ended, WorkerDied) else ended
     if isinstance(error, JoulepathError | ServiceError):
         return _failed(lease, error, began)
-    logger.error("unforeseen error", exc_info=error, extra={"request_id": _request_id(lease)})
+    logger.error("unforeseen error", exc_info=error, extra={"request_id": request_id_of(lease)})
     return defect(lease)
 
 
@@ -67,20 +67,22 @@ def _done(lease: Lease, result: TaskResult) -> Outcome:
         result.stored,
         result.parts,
         identified=result.identified,
+        is_optimal=result.is_optimal,
     )
 
 
 def defect(lease: Lease) -> Outcome:
     """The outcome of a request that a defect of the service ends; the log has it."""
-    return Outcome(lease, "failed", problem=_content(TaskFailed(), _request_id(lease)))
+    return Outcome(lease, "failed", problem=_content(TaskFailed(), request_id_of(lease)))
 
 
-def _request_id(lease: Lease) -> str:
+def request_id_of(lease: Lease) -> str:
+    """The id of the request."""
     return f"{lease.job_id}.{lease.number}"
 
 
 def _failed(lease: Lease, error: Exception, began: float) -> Outcome:
-    return Outcome(lease, "failed", time.perf_counter() - began, problem=_content(error, _request_id(lease)))
+    return Outcome(lease, "failed", time.perf_counter() - began, problem=_content(error, request_id_of(lease)))
 
 
 def _content(error: Exception, request_id: str) -> dict[str, Any]:

@@ -12,10 +12,12 @@ from app.engine.pool import ClientEngine, Engine
 from app.http.client import client_of
 from app.http.metrics import Metrics
 from app.jobs.jobs import Jobs
+from app.routes.parameters import is_fresh
 from app.settings import Settings
 from app.store.store import Store
 from app.tasks.answer_cache import AnswerCache
 from app.tasks.arm_engine import ArmEngine
+from app.tasks.in_flight import InFlight
 
 # coroutines, because FastAPI would run plain functions in a thread
 
@@ -78,8 +80,8 @@ async def _arm_engine(engine: ServiceClientEngine, store: ServiceStore) -> ArmEn
 
 
 async def _cache(request: Request, store: ServiceStore, client: ServiceClient) -> AnswerCache:
-    by_passed = "no-cache" in request.headers.get("cache-control", "").lower()
-    return AnswerCache(store, client.owner, by_passed)
+    in_flight: InFlight = request.app.state.in_flight
+    return AnswerCache(store, client.owner, is_fresh(request), in_flight)
 
 
 ServiceCache = Annotated[AnswerCache, Depends(_cache)]

@@ -13,7 +13,7 @@ from app.http.json_body import FORM, TEXT
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings
 from app.routes.later import ACCEPTED, ServiceLater, deadlines
-from app.routes.parameters import WantedFormat
+from app.routes.parameters import WantedFormat, is_fresh
 from app.routes.problem_lists import WORKER_PROBLEMS
 from app.routes.query_settings import query_parameters
 from app.routes.uploads import upload
@@ -91,7 +91,7 @@ async def evaluate(
             file.write(chunk)
         kind = kind or _kind_of(file)
         if later.wanted and kind == "json":
-            body = JobBodyTask(path, deadlines(settings), request.state.id, evaluate=True)
+            body = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request), evaluate=True)
             return await later.respond_with(await later.validated(body))
         task = EvaluateTask(path, kind, dict(request.query_params), wanted, request.state.id, longest)
         return result_response(await unless_disconnected(request, engine.run(task, longest)))

@@ -62,7 +62,8 @@ async def add(
         robots.add((await store.read(partial(stored_logs.about, log_id=each))).robot)
     if len(robots) > 1:
         raise InvalidRequest([{"loc": ["body", "logs"], "msg": "All logs must be of one robot."}])
-    job_id, again = await jobs.create(job_of_one(IDENTIFY, body, deadlines(jobs.settings)), key, client.owner)
+    new = job_of_one(IDENTIFY, body, deadlines(jobs.settings), fresh=True)
+    job_id, again = await jobs.create(new, key, client.owner)
     set_location(request, response, f"/identifications/{job_id}", again)
     return await _shown(store, job_id)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Coroutine
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import orjson
 from fastapi import APIRouter, Path, Request, Response
@@ -14,7 +14,7 @@ from app.engine.result import StoredAnswer, TaskResult
 from app.exceptions import InvalidRequest
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceCache, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import CREATED_HEADERS, Key, StudyId, deadline_of, set_location
 from app.routes.problem_lists import MOTION_PROBLEMS
@@ -22,8 +22,10 @@ from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.studies import IterationBody, IterationDetail
 from app.store import studies
+from app.store.cache import Answered, Asked
 from app.store.tables import Study, new_id
 from app.studies.answers import detail
+from app.tasks.answer_cache import AnswerCache
 from app.tasks.answer_figures import figures_of
 from app.tasks.arm_engine import ArmEngine
 from app.tasks.evaluate import EvaluateTask
@@ -32,6 +34,7 @@ from app.tasks.read_body import HeldBody
 from app.tasks.study_step import StudyStep, StudyStepTask, large_step, study_step
 from optimizer.exceptions import InvalidProblem, InvalidTable, OutsideLimits
 
+T = TypeVar("T")
 router = APIRouter(route_class=LargeBodyRoute, prefix="/studies", tags=["studies"])
 
 MOST_ITERATIONS = 2**31 - 1
@@ -65,6 +68,7 @@ async def add(
     engine: ServiceArmEngine,
     store: ServiceStore,
     client: ServiceClient,
+    cache: ServiceCache,
     key: Key = None,
 ) -> Any:
     """Computes the next iteration and stores the request and the complete answer. Returns its energy and the changes
@@ -74,8 +78,8 @@ async def add(
     step = await unless_disconnected(request, _step(body, study, request.state.id, engine, settings))
     known = await store.read(partial(studies.known_step, study_id=id, kind=step.kind, request=step.sent, key=key))
     if known is None:
-        work = _located(step.kind, _result(step, request.state.id, engine, settings.max_deadline))
-        made = _made(step, await unless_disconnected(request, work))
+        work = _located(step.kind, _made(step, request.state.id, engine, settings.max_deadline, cache))
+        made = await unless_disconnected(request, work)
         number, again = await store.write(partial(studies.add, study_id=id, step=made, key=key, client=client))
     else:
         number, again = known, True
@@ -93,7 +97,7 @@ async def _step(
     return large_step(await engine.run(task, settings.max_deadline))
 
 
-async def _located(kind: str, work: Coroutine[Any, Any, TaskResult]) -> TaskResult:
+async def _located(kind: str, work: Coroutine[Any, Any, T]) -> T:
     """What `work` returns. Raises what it raises; errors about a field with its path in this request."""
     try:
         return await work
@@ -106,13 +110,21 @@ async def _located(kind: str, work: Coroutine[Any, Any, TaskResult]) -> TaskResu
         raise InvalidProblem(f"{kind}.{error.field}", str(error)) from None
 
 
-async def _result(step: StudyStep, request_id: str, engine: ArmEngine, max_deadline: float) -> TaskResult:
-    """The answer of the endpoint that the request is for."""
-    if step.optimize is not None:
-        return await engine.run(OptimizeTask(step.optimize, request_id), deadline_of(step.optimize, max_deadline))
-    with upload() as (file, path):
-        file.write(step.evaluate)
-        return await engine.run(EvaluateTask(path, "json", {}, "json", request_id, max_deadline), max_deadline)
+async def _made(
+    step: StudyStep, request_id: str, engine: ArmEngine, max_deadline: float, cache: AnswerCache
+) -> studies.Step:
+    """The iteration, with the answer of the endpoint that the request is for, or to an equal request."""
+    if step.optimize is None:
+        with upload() as (file, path):
+            file.write(step.evaluate)
+            task = EvaluateTask(path, "json", {}, "json", request_id, max_deadline)
+            return _iteration(step, await engine.run(task, max_deadline))
+    deadline = deadline_of(step.optimize, max_deadline)
+    asked = await cache.asked("optimize", step.optimize, deadline)
+    copy = await cache.copy(asked, request_id)
+    if copy is not None:
+        return _iteration(step, copy)
+    return _iteration(step, await engine.run(OptimizeTask(step.optimize, request_id), deadline), asked)
 
 
 @router.get(
@@ -130,14 +142,17 @@ async def show(
     return detail(await store.read(partial(studies.entry, study_id=id, number=number)))
 
 
-def _made(step: StudyStep, result: TaskResult) -> studies.Step:
+def _iteration(step: StudyStep, result: TaskResult, asked: Asked | None = None) -> studies.Step:
+    """The iteration with this answer, which answers what was `asked`, too."""
     answer = orjson.loads(result.document)
     energy = answer["energy"] if step.kind == "optimize" else answer["total"]["energy"]
+    stored = StoredAnswer(result.kept_as or new_id(), result.document, figures_of(answer))
     return studies.Step(
         step.kind,
         step.sent,
-        StoredAnswer(result.kept_as or new_id(), result.document, figures_of(answer)),
+        stored,
         answer["duration"],
         energy["electrical"]["total"],
         energy["mechanical"]["total"],
+        None if asked is None else Answered(asked, stored.id, result.is_optimal),
     )

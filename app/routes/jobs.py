@@ -17,7 +17,7 @@ from app.jobs.answers import as_csv, as_lines, detail, summary
 from app.jobs.events import events_after
 from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings, ServiceStore
 from app.routes.later import deadlines
-from app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, set_location
+from app.routes.parameters import CREATED_HEADERS, Key, WantedFormat, is_fresh, set_location
 from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.examples.jobs import RESULTS_CSV, RESULTS_LINES
@@ -83,7 +83,7 @@ async def create(
     with upload() as (file, path):
         async for chunk in request.stream():
             file.write(chunk)
-        task = JobBodyTask(path, deadlines(settings), request.state.id)
+        task = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request))
         result = await unless_disconnected(request, engine.run(task, settings.max_deadline))
     assert isinstance(result, Validated)
     job_id, again = await jobs.create(result.job, key, client.owner)

@@ -14,7 +14,7 @@ from app.http.disconnect import unless_disconnected
 from app.http.handlers import PROBLEM_MEDIA_TYPE
 from app.jobs.answers import summary
 from app.routes.dependencies import ServiceClient, ServiceClientEngine, ServiceJobs, ServiceSettings
-from app.routes.parameters import CREATED_HEADERS, Key, set_location
+from app.routes.parameters import CREATED_HEADERS, Key, is_fresh, set_location
 from app.schemas.common import Request as RequestModel
 from app.schemas.jobs import Job
 from app.store import jobs as stored_jobs
@@ -59,9 +59,11 @@ class Later:
         TooManyWaiting or StoreUnavailable."""
         longest = deadlines(self.jobs.settings)
         if isinstance(asked, HeldBody):
-            new = await self.validated(JobOfOneTask(kind, asked, longest, self.request.state.id))
+            new = await self.validated(
+                JobOfOneTask(kind, asked, longest, self.request.state.id, is_fresh(self.request))
+            )
         else:
-            new = job_of_one(kind, asked, longest)
+            new = job_of_one(kind, asked, longest, is_fresh(self.request))
         return await self.respond_with(new)
 
     async def validated(self, task: JobBodyTask | JobOfOneTask) -> NewJob:

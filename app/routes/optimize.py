@@ -17,7 +17,7 @@ from app.schemas.request import OptimizeRequest
 from app.schemas.response import OptimizeResponse
 from app.store.store_answers import keep_answer
 from app.tasks.optimize import OptimizeTask
-from optimizer.progress import Tell
+from optimizer.progress import Tell, nobody
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
 
@@ -54,10 +54,11 @@ async def optimize(
     async def work(tell: Tell) -> TaskResult:
         deadline = deadline_of(body, settings.max_deadline)
         asked = await cache.asked("optimize", body, deadline)
-        known = await cache.find(asked, request.state.id)
-        if known is not None:
-            return known
-        result = await engine.run(task, deadline, tell)
-        return await keep_answer(store, settings, "optimize", result, client.owner, asked)
+
+        async def compute(left: float) -> TaskResult:
+            result = await engine.run(task, left, tell)
+            return await keep_answer(store, settings, "optimize", result, client.owner, asked)
+
+        return await cache.answer(asked, request.state.id, deadline, compute, tell is not nobody)
 
     return await reply.of(work)

@@ -80,6 +80,11 @@ CREATED_HEADERS = {
 }
 
 
+def is_fresh(request: Request) -> bool:
+    """Whether the client wants its request to be computed, although an equal one was answered before."""
+    return "no-cache" in request.headers.get("cache-control", "").lower()
+
+
 def set_location(request: Request, response: Response, path: str, again: bool) -> None:
     """Sets the headers of a response about a created resource; `again`: an earlier request with this key created it."""
     response.headers["Location"] = f"{request.scope.get('root_path', '')}{path}"

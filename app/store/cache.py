@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from typing import TypedDict
 
 from sqlalchemy import select
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
-from app.store.answers import get
-from app.store.tables import CachedAnswer
+from app.store.tables import Answer, CachedAnswer
+
+
+class Meaning(TypedDict):
+    """What a request means to a version of the service: the hash of its canonical form, and the name of its robot."""
+
+    version: str
+    digest: str
+    robot: str
 
 
 @dataclass(frozen=True)
@@ -20,24 +29,54 @@ class Asked:
     deadline: float
 
 
-def find(session: Session, asked: Asked) -> tuple[datetime, bytes] | None:
-    """When an answer to this request was stored, and its document; None if there is none.
+@dataclass(frozen=True)
+class Answered:
+    """A request, the id of the answer to it, and whether no more time would make that better."""
+
+    asked: Asked
+    answer_id: str
+    is_optimal: bool
+
+
+def find(session: Session, asked: Sequence[Asked]) -> dict[Asked, Answer]:
+    """The stored answers to some of these requests.
 
     An answer that is not optimal does for requests with the same deadline or a shorter one.
     """
-    known = session.scalar(select(CachedAnswer).where(CachedAnswer.key == asked.key))
-    if known is None or (known.deadline is not None and known.deadline < asked.deadline):
-        return None
-    answer, document = get(session, known.answer_id)
-    return answer.created, document
+    query = select(CachedAnswer, Answer).join(Answer, Answer.id == CachedAnswer.answer_id)
+    query = query.where(CachedAnswer.key.in_({each.key for each in asked}))
+    known = {cached.key: (cached.deadline, answer) for cached, answer in session.execute(query)}
+    found = {}
+    for each in asked:
+        deadline, answer = known.get(each.key, (0.0, None))
+        if answer is not None and (deadline is None or deadline >= each.deadline):
+            found[each] = answer
+    return found
 
 
-def remember(session: Session, asked: Asked, answer_id: str, is_optimal: bool) -> None:
-    """Has a stored answer answer this request from now on. Nothing takes the place of an optimal one but another."""
-    known = session.get(CachedAnswer, asked.key)
-    if known is None:
-        known = CachedAnswer(key=asked.key)
-        session.add(known)
-    elif known.deadline is None and not is_optimal:
+def remember(session: Session, answered: Iterable[Answered]) -> None:
+    """Has stored answers answer these requests from now on. Nothing takes the place of an optimal one but another.
+
+    It never waits for a request that somebody else is remembering, and fails for none.
+    """
+    new = {each.asked.key: each for each in answered}
+    if not new:
         return
-    known.answer_id, known.deadline = answer_id, None if is_optimal else asked.deadline
+    session.flush()  # the answers come first
+    rows = select(CachedAnswer).where(CachedAnswer.key.in_(new)).with_for_update(skip_locked=True)
+    for known in session.scalars(rows):
+        own = new.pop(known.key)
+        if known.deadline is not None or own.is_optimal:
+            known.answer_id, known.deadline = own.answer_id, _longest(own)
+    if new:
+        is_postgresql = session.get_bind().dialect.name == "postgresql"
+        insert = postgresql.insert(CachedAnswer) if is_postgresql else sqlite.insert(CachedAnswer)
+        values = [
+            {"key": key, "answer_id": own.answer_id, "deadline": _longest(own)} for key, own in sorted(new.items())
+        ]
+        session.execute(insert.on_conflict_do_nothing(), values)
+
+
+def _longest(own: Answered) -> float | None:
+    """Longest deadline [s] of a request that it answers; None if that does not matter."""
+    return None if own.is_optimal else own.asked.deadline

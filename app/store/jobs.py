@@ -13,6 +13,7 @@ from sqlalchemy.orm import Session, defer
 from app.access.client import Client
 from app.access.rules import check_owner
 from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownJob
+from app.store.cache import Meaning
 from app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
 from app.store.paging import position_after, position_of
 from app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
@@ -20,11 +21,13 @@ from app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
 
 @dataclass(frozen=True)
 class NewRequest:
-    """A validated request to the endpoint `kind`: its `body`, compressed JSON, and its deadline [s]."""
+    """A validated request to the endpoint `kind`: its `body`, compressed JSON, its deadline [s], and what it means, if
+    an equal one may answer it."""
 
     kind: str
     body: bytes
     deadline: float
+    meaning: Meaning | None = None
 
 
 @dataclass(frozen=True)

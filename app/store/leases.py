@@ -7,7 +7,7 @@ of `jobs` never waits for rows of `job_requests`. So no two transactions wait fo
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Any, Literal
@@ -17,7 +17,8 @@ from sqlalchemy.orm import Session, defer
 
 from app.engine.result import AnswerFigures, StoredAnswer
 from app.exceptions import TooManyFigures
-from app.store import answers, figures, jobs
+from app.store import answers, cache, figures, jobs
+from app.store.cache import Answered, Asked, Meaning
 from app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
 from app.store.tables import Job, JobRequest, new_id
 
@@ -27,7 +28,7 @@ Key = tuple[str, int]
 
 @dataclass(frozen=True)
 class Lease:
-    """A request that is to be worked on: compressed JSON `body` of the endpoint `kind`, with a deadline [s]."""
+    """A request of `owner` that is to be worked on: compressed JSON `body` of the endpoint `kind`, a deadline [s]."""
 
     job_id: str
     number: int
@@ -37,6 +38,8 @@ class Lease:
     deadline: float
     deaths: int
     preempted: int
+    meaning: Meaning | None
+    owner: str | None
 
     @property
     def key(self) -> Key:
@@ -58,7 +61,8 @@ class Outcome:
 
     `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its id, if it says so
     itself. `parts` are the answers that it refers to, compressed, of the endpoint `parts_kind`. `identified` are the
-    figures of an arm that were found, if any.
+    figures of an arm that were found, if any. `is_optimal`: no more time would make the answer better. It answers what
+    was `asked`, too.
     """
 
     lease: Lease
@@ -73,6 +77,8 @@ class Outcome:
     died: bool = False
     preempted: bool = False
     identified: FoundFigures | None = None
+    is_optimal: bool = False
+    asked: Asked | None = None
 
 
 def lease(session: Session, holder: str, count: int, now: datetime, until: datetime) -> tuple[list[Lease], set[str]]:
@@ -97,8 +103,8 @@ def lease(session: Session, holder: str, count: int, now: datetime, until: datet
             changed.add(job.id)
         request.state, request.attempt = "running", request.attempt + 1
         request.leased_by, request.leased_until = holder, until
-        names = ("job_id", "number", "attempt", "kind", "body", "deadline", "deaths", "preempted")
-        leased.append(Lease(**{name: getattr(request, name) for name in names}))
+        names = ("job_id", "number", "attempt", "kind", "body", "deadline", "deaths", "preempted", "meaning")
+        leased.append(Lease(**{name: getattr(request, name) for name in names}, owner=job.owner))
     for job_id in changed:
         if locked[job_id].state == "cancelling":
             conclude(session, locked[job_id], now)
@@ -120,6 +126,7 @@ def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: date
             _store(session, job, request, outcome, most)
             if request.state == "failed" and not job.keep_going:
                 stopped.append(job)
+    cache.remember(session, _answered(held))
     for job in stopped:
         if job.state == "running":
             jobs.stop(session, job, now)
@@ -194,6 +201,12 @@ def _held(session: Session, holder: str, outcomes: Iterable[Outcome]) -> dict[tu
 def _locked(session: Session, job_ids: Iterable[str]) -> dict[str, Job]:
     query = select(Job).where(Job.id.in_(set(job_ids))).order_by(Job.id).with_for_update(key_share=True)
     return {job.id: job for job in session.scalars(query.execution_options(populate_existing=True))}
+
+
+def _answered(held: Iterable[tuple[Outcome, JobRequest | None]]) -> Iterator[Answered]:
+    for outcome, request in held:
+        if request is not None and request.answer_id is not None and outcome.asked is not None:
+            yield Answered(outcome.asked, request.answer_id, outcome.is_optimal)
 
 
 def _store(session: Session, job: Job, request: JobRequest, outcome: Outcome, most: int) -> None:

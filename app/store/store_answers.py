@@ -7,14 +7,13 @@ from dataclasses import replace
 from datetime import timedelta
 from functools import partial
 
-from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from app.engine.result import StoredAnswer, TaskResult
 from app.exceptions import StoreUnavailable
 from app.settings import Settings
 from app.store import answers, cache
-from app.store.cache import Asked
+from app.store.cache import Answered, Asked
 from app.store.store import Store
 from app.store.tables import Answer
 
@@ -48,14 +47,10 @@ async def keep_answer(
 
     def remember(session: Session) -> None:
         if asked is not None:
-            cache.remember(session, asked, kept.id, result.is_optimal)
+            cache.remember(session, [Answered(asked, kept.id, result.is_optimal)])
 
-    put = partial(_put, store, settings, kind, [kept], owner, most=settings.answers_max_bytes)
     try:
-        try:
-            await put(also=remember)
-        except IntegrityError:  # an equal request was answered elsewhere at the same time
-            await put()
+        await _put(store, settings, kind, [kept], owner, settings.answers_max_bytes, remember)
     except (StoreUnavailable, _TooLarge):
         return result.without_path()
     return replace(result, kept_as=None)

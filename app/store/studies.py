@@ -13,7 +13,8 @@ from app.access.client import Client
 from app.access.rules import check_owner
 from app.engine.result import StoredAnswer
 from app.exceptions import KeyReused, UnknownIteration, UnknownStudy
-from app.store import answers
+from app.store import answers, cache
+from app.store.cache import Answered
 from app.store.paging import position_after, position_of
 from app.store.tables import Iteration, Study, is_id, new_id, now
 
@@ -31,6 +32,8 @@ class Step:
     duration: float
     electrical: float
     mechanical: float
+    answered: Answered | None = None
+    """What the answer answers from now on, if it was computed."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +148,7 @@ def add(session: Session, study_id: str, step: Step, key: str | None, client: Cl
         return known, True
     answers.put(session, step.kind, step.answer, study_id, owner=client.owner)
     session.flush()
+    cache.remember(session, [] if step.answered is None else [step.answered])
     so_far, energy = _state(session, study), energy_of(study, step)
     number = 1 if so_far.last is None else so_far.last.number + 1
     met_by = number if energy <= study.threshold else None

@@ -233,6 +233,8 @@ class JobRequest(Table):
     """Time [s] from the begin of the work."""
     body: Mapped[bytes] = mapped_column(LargeBinary)
     """The request: JSON, compressed."""
+    meaning: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    """See `cache.Meaning`; null if it is to be computed whatever was computed before."""
     state: Mapped[str] = mapped_column(String(16))
     attempt: Mapped[int]
     """How often it was handed out, apart from the times that another request took its worker."""

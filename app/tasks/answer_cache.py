@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
-from dataclasses import dataclass
+import zlib
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-import orjson
+from sqlalchemy.orm import Session
 
-from app import __version__
 from app.engine.result import TaskResult
 from app.exceptions import StoreUnavailable
 from app.schemas.common import Request
 from app.store import cache
-from app.store.cache import Asked
+from app.store.cache import Asked, Meaning
 from app.store.store import Store
-from app.store.tables import now
+from app.store.tables import Answer, now
 from app.tasks.arm_engine import own_figures
+from app.tasks.in_flight import Compute, InFlight
 from app.tasks.read_body import HeldBody
+from app.tasks.request_key import key_of, meaning_of
 from models.registry import robot_names
 from optimizer.exceptions import UnknownRobot
 
@@ -34,37 +35,71 @@ class AnswerCache:
     store: Store
     owner: str | None
     by_passed: bool
+    in_flight: InFlight = field(default_factory=InFlight)
 
     async def asked(self, kind: str, body: Request | HeldBody, deadline: float) -> Asked | None:
         """A validated request to the endpoint `kind`, as the cache knows it. None for one that it does not: too large,
         or of a robot that is not known.
 
-        Two are the same if they have the same fields but for the deadline, defaults included, the same robot and the
-        same client, and are for the same version of the service.
+        Two are the same if they mean the same, have the same robot and the same client, and are for the same version
+        of the service.
         """
         if isinstance(body, HeldBody) or self.store.fault is not None:
             return None
-        content = body.model_dump(mode="json", exclude={"deadline"})
-        robot: Any = content["robot"]
-        if robot not in robot_names():
-            try:
-                robot = await own_figures(self.store, robot)
-            except (UnknownRobot, StoreUnavailable):
-                return None
-        parts = [__version__, kind, self.owner, robot, content]
-        return Asked(hashlib.sha256(orjson.dumps(parts, option=orjson.OPT_SORT_KEYS)).hexdigest(), deadline)
+        return await asked_for(self.store, meaning_of(kind, body), deadline, self.owner)
+
+    async def answer(
+        self, asked: Asked | None, request_id: str, deadline: float, compute: Compute, is_heard: bool
+    ) -> TaskResult:
+        """The answer to a request: a stored one, that to an equal request which is being computed, or what `compute`
+        returns in `deadline` [s]. Raises what that raises. `is_heard`: somebody listens to what `compute` finds."""
+        known = await self.find(asked, request_id)
+        if known is not None:
+            return known
+        if asked is None or self.by_passed or is_heard:
+            return await compute(deadline)
+        result, is_anothers = await self.in_flight.result(asked, compute)
+        return replace(result, age=0).with_id(request_id) if is_anothers else result
 
     async def find(self, asked: Asked | None, request_id: str) -> TaskResult | None:
         """A stored answer as that to the request with this id; None if there is none."""
+        found = await self._find(asked)
+        return None if found is None else found.with_id(request_id)
+
+    async def copy(self, asked: Asked | None, request_id: str) -> TaskResult | None:
+        """The same, to be kept as another answer."""
+        found = await self._find(asked)
+        return None if found is None else found.copied(request_id)
+
+    async def _find(self, asked: Asked | None) -> TaskResult | None:
         if asked is None or self.by_passed:
             return None
         try:
             async with asyncio.timeout(PATIENCE):
-                found = await self.store.read(partial(cache.find, asked=asked))
+                known = await self.store.read(partial(_with_document, asked=asked))
         except (StoreUnavailable, TimeoutError):
             return None
-        if found is None:
+        if known is None:
             return None
-        created, document = found
-        age = max(0, int((now() - created).total_seconds()))
-        return TaskResult(document, "application/json", age=age).with_id(request_id)
+        answer, document = known
+        age = max(0, int((now() - answer.created).total_seconds()))
+        return TaskResult(document, "application/json", kept_as=answer.id, age=age)
+
+
+def _with_document(session: Session, asked: Asked) -> tuple[Answer, bytes] | None:
+    answer = cache.find(session, [asked]).get(asked)
+    return None if answer is None else (answer, zlib.decompress(answer.body))
+
+
+async def asked_for(
+    store: Store, meaning: Meaning, deadline: float, owner: str | None, job_id: str | None = None
+) -> Asked | None:
+    """A request of a client as the cache knows it; None if its robot is not known. With a `job_id`, no request of
+    another job is the same."""
+    own: dict[str, Any] | None = None
+    if meaning["robot"] not in robot_names():
+        try:
+            own = await own_figures(store, meaning["robot"])
+        except (UnknownRobot, StoreUnavailable):
+            return None
+    return Asked(key_of(meaning, owner, own, job_id), deadline)

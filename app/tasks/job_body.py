@@ -19,6 +19,7 @@ from app.schemas.evaluate import EvaluateRequest
 from app.schemas.jobs import NewJob as JobModel
 from app.store.jobs import NewJob, NewRequest
 from app.tasks.read_body import HeldBody
+from app.tasks.request_key import meaning_of
 
 
 @dataclass(frozen=True)
@@ -43,11 +44,15 @@ class Validated(TaskResult):
 
 @dataclass(frozen=True)
 class JobBodyTask:
-    """The JSON body of `POST /jobs` in `file`; with `evaluate`, the body of `POST /evaluate` as a job of its own."""
+    """The JSON body of `POST /jobs` in `file`; with `evaluate`, the body of `POST /evaluate` as a job of its own.
+
+    `fresh`: the answers of equal requests do not do.
+    """
 
     file: str
     deadlines: Deadlines
     request_id: str
+    fresh: bool
     evaluate: bool = False
 
     def run(self, deadline: float) -> TaskResult:
@@ -55,11 +60,13 @@ class JobBodyTask:
         content = parsed_json(Path(self.file).read_bytes())
         try:
             if self.evaluate:
-                return Validated.of(job_of_one("evaluate", EvaluateRequest.model_validate(content), self.deadlines))
+                return Validated.of(
+                    job_of_one("evaluate", EvaluateRequest.model_validate(content), self.deadlines, self.fresh)
+                )
             asked = JobModel.model_validate(content)
         except ValidationError as error:
             raise invalid_request(error, "body") from None
-        return Validated.of(_job(asked, self.deadlines))
+        return Validated.of(_job(asked, self.deadlines, self.fresh))
 
 
 @dataclass(frozen=True)
@@ -70,23 +77,25 @@ class JobOfOneTask:
     asked: Request | HeldBody
     deadlines: Deadlines
     request_id: str
+    fresh: bool
 
     def run(self, deadline: float) -> TaskResult:
         """The job. Raises InvalidRequest."""
         assert not isinstance(self.asked, HeldBody), "in a worker it is the model itself"
-        return Validated.of(job_of_one(self.kind, self.asked, self.deadlines))
+        return Validated.of(job_of_one(self.kind, self.asked, self.deadlines, self.fresh))
 
 
-def job_of_one(kind: str, asked: Request, deadlines: Deadlines) -> NewJob:
-    """A validated request as a job. Raises InvalidRequest if its deadline is too long."""
+def job_of_one(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> NewJob:
+    """A validated request as a job; `fresh`: the answer of an equal one does not do. Raises InvalidRequest if its
+    deadline is too long."""
     too_long = _too_long(asked, deadlines)
     if too_long is not None:
         raise InvalidRequest([{"loc": ["body", "deadline"], "msg": too_long}])
-    requests = [_new_request(kind, asked, deadlines)]
+    requests = [_new_request(kind, asked, deadlines, fresh)]
     return NewJob(requests, _fingerprint(requests, "one"))
 
 
-def _job(asked: JobModel, deadlines: Deadlines) -> NewJob:
+def _job(asked: JobModel, deadlines: Deadlines, fresh: bool) -> NewJob:
     wrong, requests = [], []
     for index, each in enumerate(asked.requests):
         ((kind, request),) = ((name, getattr(each, name)) for name in type(each).model_fields)
@@ -94,7 +103,7 @@ def _job(asked: JobModel, deadlines: Deadlines) -> NewJob:
         if too_long is not None:
             wrong.append({"loc": ["body", "requests", index, kind, "deadline"], "msg": too_long})
         else:
-            requests.append(_new_request(kind, request, deadlines))
+            requests.append(_new_request(kind, request, deadlines, fresh))
     if wrong:
         raise InvalidRequest(wrong[:MOST_ERRORS])
     told_apart_by = f"{asked.keep_going} {asked.name}"
@@ -107,11 +116,12 @@ def _too_long(asked: Request, deadlines: Deadlines) -> str | None:
     return f"deadline must be at most {deadlines.longest:g} s." if too_long else None
 
 
-def _new_request(kind: str, asked: Request, deadlines: Deadlines) -> NewRequest:
+def _new_request(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -> NewRequest:
     given = getattr(asked, "deadline", None)
     deadline = min(deadlines.without if given is None else given, deadlines.longest)
     body = asked.model_dump_json(exclude_unset=True).encode()
-    return NewRequest(kind, zlib.compress(body), deadline)
+    meaning = None if fresh else meaning_of(kind, asked)
+    return NewRequest(kind, zlib.compress(body), deadline, meaning)
 
 
 def _fingerprint(requests: Iterable[NewRequest], rest: str) -> str:

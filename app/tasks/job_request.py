@@ -75,6 +75,7 @@ class JobRequestTask:
             tuple(replace(part, body=zlib.compress(part.body)) for part in result.stored),
             result.kept_as,
             figures,
+            result.is_optimal,
             wall_time=time.perf_counter() - began,
             parts="evaluate" if self.kind == "whatif" and answer["objective"] is None else "optimize",
             identified=_identified(answer) if self.kind == IDENTIFY else None,

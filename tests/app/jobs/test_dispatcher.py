@@ -45,6 +45,7 @@ class Work:
         self.stoppable: list[bool] = []
         self.errors: list[Exception] = []
         self.tell: Tell = nobody
+        self.answer: Callable[[JobRequestTask], TaskResult] = lambda task: answer(name)
 
     async def run(self, take: Take) -> None:
         while (work := take()) is not None:
@@ -64,7 +65,7 @@ class Work:
             except asyncio.CancelledError:
                 self.stopped.append(index)
                 raise
-            work.ended(answer(self.name))
+            work.ended(self.answer(work.task))
 
 
 class Service:

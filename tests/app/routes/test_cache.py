@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import orjson
 import pytest
+from sqlalchemy.orm import Session
 from starlette.testclient import TestClient
 
 from app.engine.result import TaskResult
 from app.schemas.request import OptimizeRequest
 from app.settings import Settings
-from app.store import cache
 from app.store.answers import prune
 from app.store.cache import Asked
 from app.store.store import Store
@@ -23,6 +24,7 @@ from app.store.tables import CachedAnswer
 from app.tasks.answer_cache import AnswerCache
 from app.tasks.answer_figures import figures_of
 from app.tasks.read_body import HeldBody
+from tests.app.job_clients import ended
 from tests.app.requests import HOME, NEAR, move
 from tests.app.store.test_store import with_store
 
@@ -125,19 +127,13 @@ def test_two_services_that_answer_at_the_same_time_lose_nothing(tmp_path: Path) 
 
     async def test(store: Store) -> None:
         asked, settings = Asked("key", 1.0), Settings()
-        remember, raced = cache.remember, [False]
-
-        def late(session: Any, *args: Any) -> None:
-            if not raced[0]:
-                raced[0] = True
-                session.add(CachedAnswer(key="key", answer_id="00000000-0000-0000-0000-000000000000", deadline=1.0))
-                session.flush()
-            remember(session, *args)
-
+        first = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(cache, "remember", late)
-            answered = await keep_answer(store, settings, "optimize", result(1, "optimal"), None, asked)
-        assert raced == [True] and not answered.document.endswith(b'"answer":null}')
+            patch.setattr(Session, "scalars", lambda *_: [])  # it sees nothing
+            second = await keep_answer(store, settings, "optimize", result(2, "optimal"), None, asked)
+        assert first.document != second.document and not second.document.endswith(b'"answer":null}')
+        known = await AnswerCache(store, None, False).find(asked, "mine")
+        assert known is not None and numbers(known.document) == 1
 
     with_store(f"sqlite:///{tmp_path}/joulepath.db", test)
 
@@ -182,3 +178,62 @@ def test_a_database_that_hangs_is_not_waited_for(tmp_path: Path) -> None:
         assert await AnswerCache(store, None, False).find(Asked("key", 1.0), "mine") is None
 
     asyncio.run(test())
+
+
+def job(client: TestClient, requests: list[Any], headers: dict[str, str]) -> list[dict[str, Any]]:
+    """The lines of the results of a job."""
+    answer = client.post("/jobs", json={"requests": requests}, headers=headers)
+    assert answer.status_code == 202, answer.text
+    path = answer.headers["location"]
+    assert ended(client, path)["state"] == "done"
+    return [orjson.loads(line) for line in client.get(f"{path}/results").text.splitlines()]
+
+
+def without_paths(answer: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in answer.items() if name not in ("id", "answer")}
+
+
+def test_jobs_have_what_was_answered_and_answer_what_comes(client: TestClient) -> None:
+    body = move(method="time_scaling", payload=load(0.127))
+    first = sent(client, body, **KNOWN).json()
+    spelled_out = body | {"robot": "ur5e", "deadline": 3.0}
+    lines = job(client, [{"optimize": body}, {"optimize": spelled_out}], KNOWN)
+    for line in lines:
+        # the wall times of its search, too
+        assert without_paths(line["result"]) == without_paths(first)
+        assert line["result"]["answer"] == line["answer"] != first["answer"]
+        assert line["energy"] == first["energy"]["electrical"]["total"] and line["status"] == first["status"]
+    other = move(method="time_scaling", payload=load(0.128))
+    (line,) = job(client, [{"optimize": other}], KNOWN)
+    again = sent(client, other, **KNOWN)
+    assert is_hit(again) and without_paths(again.json()) == without_paths(line["result"])
+    (fresh,) = job(client, [{"optimize": other}], {"Cache-Control": "no-cache"})
+    assert fresh["result"]["solver"] != line["result"]["solver"], "it has taken another time"
+
+
+def test_studies_have_what_was_answered_and_answer_what_comes(client: TestClient) -> None:
+    body = move(method="time_scaling", payload=load(0.129))
+    study = client.post("/studies", json={"name": "cached", "threshold": 1.0}).headers["location"]
+
+    def step(**headers: str) -> dict[str, Any]:
+        made = client.post(f"{study}/iterations", json={"optimize": body}, headers=headers)
+        assert made.status_code == 201, made.text
+        path = f"/answers/{made.json()['answer']}"
+        answer: dict[str, Any] = client.get(path).json()["answer"]
+        assert answer["answer"] == path
+        return answer
+
+    first, second, fresh = step(**KNOWN), step(**KNOWN), step(**{"Cache-Control": "no-cache"})
+    assert without_paths(first) == without_paths(second) and first["id"] != second["id"]
+    assert fresh["solver"] != first["solver"]
+    again = sent(client, body | {"candidates": "all"}, **KNOWN)
+    assert is_hit(again) and without_paths(again.json()) == without_paths(fresh), "the last one"
+
+
+def test_equal_requests_at_the_same_time_are_computed_once(client: TestClient) -> None:
+    body = move(payload=load(0.13))
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: sent(client, body, **KNOWN), range(4)))
+    assert sum(map(is_hit, answers)) == 3
+    assert len({answer.json()["id"] for answer in answers}) == 4
+    assert len({orjson.dumps(without_paths(answer.json())) for answer in answers}) == 1

@@ -1,0 +1,113 @@
+"""Requests of jobs that are equal to others: they are answered by copies, and computed once."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from app import __version__
+from app.engine.result import AnswerFigures, TaskResult
+from app.jobs.heap import Held
+from app.jobs.work import request_id_of
+from app.store import cache
+from app.store.cache import Asked
+from app.store.leases import Outcome
+from app.store.store import Store
+from app.store.tables import Answer
+from app.tasks.answer_cache import asked_for
+
+ALONE = ("optimize", "compare", "evaluate")
+"""Endpoints whose answers refer to no other answer. The others refer to answers that are kept as long as their job."""
+
+
+@dataclass(frozen=True)
+class Sorted:
+    """Leased requests: those that must be computed, and the outcomes of those that are known."""
+
+    to_compute: Sequence[Held]
+    known: Mapping[Held, Outcome]
+
+
+class Equals:
+    """Those that wait until an equal one has been computed here: `released` gives them once its answer is stored."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._followers: dict[str, list[Held]] = {}
+        self._released: list[Held] = []
+
+    @property
+    def waiting(self) -> int:
+        """How many wait."""
+        return sum(map(len, self._followers.values())) + len(self._released)
+
+    async def sort(self, held: Sequence[Held]) -> Sorted:
+        """Finds out which requests must be computed; others are known, or wait. Raises StoreUnavailable."""
+        began = time.perf_counter()
+        for each in held:
+            each.asked = await self._asked(each)
+        asked = [each.asked for each in held if each.asked is not None]
+        found = await self._store.read(partial(cache.find, asked=asked)) if asked else {}
+        hits = [(each, found[each.asked]) for each in held if each.asked is not None and each.asked in found]
+        known = await asyncio.to_thread(_copies, hits, began) if hits else {}
+        return Sorted([each for each in held if each not in known and not self._follows(each)], known)
+
+    def ended(self, held: Held, outcome: Outcome) -> list[tuple[Held, Outcome]]:
+        """A request has been computed; the outcomes of those that wait for it and fail as it did."""
+        if held.asked is None or not held.leads:
+            return []
+        held.leads = False
+        followers = self._followers.pop(held.asked.key)
+        problem = outcome.problem
+        if outcome.state != "failed" or problem is None or problem["status"] >= 500:
+            self._released += followers
+            return []
+        # the request itself is at fault
+        return [
+            (each, replace(outcome, lease=each.lease, problem=problem | {"instance": request_id_of(each.lease)}))
+            for each in followers
+        ]
+
+    def released(self) -> list[Held]:
+        """Those that wait no longer: for an answer that is there, or because nobody wants them any more."""
+        for key, followers in self._followers.items():
+            self._released += [each for each in followers if each.dropped]
+            self._followers[key] = [each for each in followers if not each.dropped]
+        released, self._released = self._released, []
+        return released
+
+    def _follows(self, held: Held) -> bool:
+        """Whether it waits for another one. If not, others may wait for it."""
+        if held.asked is None:
+            return False
+        followers = self._followers.get(held.asked.key)
+        if followers is None:
+            self._followers[held.asked.key] = []
+            held.leads = True
+            return False
+        followers.append(held)
+        return True
+
+    async def _asked(self, held: Held) -> Asked | None:
+        lease = held.lease
+        # another version may have understood it in another way
+        if lease.meaning is None or lease.meaning["version"] != __version__:
+            return None
+        job_id = None if lease.kind in ALONE else lease.job_id
+        return await asked_for(self._store, lease.meaning, lease.deadline, lease.owner, job_id)
+
+
+def _copies(hits: Iterable[tuple[Held, Answer]], began: float) -> dict[Held, Outcome]:
+    return {held: _copy(held, answer, began) for held, answer in hits}
+
+
+def _copy(held: Held, answer: Answer, began: float) -> Outcome:
+    figures = AnswerFigures(answer.robot, answer.energy, answer.duration, answer.status)
+    result = TaskResult(zlib.decompress(answer.body), "application/json", kept_as=answer.id)
+    copy = result.copied(request_id_of(held.lease))
+    document = zlib.compress(copy.document, zlib.Z_BEST_SPEED)
+    return Outcome(held.lease, "done", time.perf_counter() - began, figures, document, copy.kept_as)

@@ -1,0 +1,60 @@
+"""Work that several requests wait for: equal requests at the same time are computed once."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any
+
+from app.engine.result import TaskResult
+from app.exceptions import ServiceError
+from app.store.cache import Asked
+
+Compute = Callable[[float], Coroutine[Any, Any, TaskResult]]
+"""Computes an answer, with so much time [s]."""
+
+
+@dataclass(eq=False)
+class _Work:
+    computing: asyncio.Task[TaskResult]
+    waiting: int = 0
+
+
+class InFlight:
+    """What is being computed in this service, by the requests that it answers."""
+
+    def __init__(self) -> None:
+        self._works: dict[Asked, _Work] = {}
+
+    async def result(self, asked: Asked, compute: Compute) -> tuple[TaskResult, bool]:
+        """The answer to a request, and whether it was computed for an equal one, with the same deadline.
+
+        The work goes on while somebody waits for it. Raises what it raises. If another request's work fails because of
+        the service, not of the request, this one is computed itself.
+        """
+        loop = asyncio.get_running_loop()
+        end = loop.time() + asked.deadline
+        if (known := self._works.get(asked)) is not None:
+            try:
+                return await self._awaited(asked, known), True
+            except ServiceError:
+                return await compute(end - loop.time()), False
+        work = self._works[asked] = _Work(asyncio.create_task(compute(asked.deadline)))
+        work.computing.add_done_callback(lambda _: self._forget(asked, work))
+        return await self._awaited(asked, work), False
+
+    async def _awaited(self, asked: Asked, work: _Work) -> TaskResult:
+        work.waiting += 1
+        try:
+            return await asyncio.shield(work.computing)
+        finally:
+            work.waiting -= 1
+            if not work.waiting:
+                # whoever comes now must not wait for what is being stopped
+                self._forget(asked, work)
+                work.computing.cancel()
+
+    def _forget(self, asked: Asked, work: _Work) -> None:
+        if self._works.get(asked) is work:
+            del self._works[asked]

@@ -1,0 +1,169 @@
+"""Equal requests of jobs: one is computed, the others get copies of its answer."""
+
+from __future__ import annotations
+
+import zlib
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pytest
+
+from app import __version__
+from app.access.client import OPERATOR
+from app.engine.result import AnswerFigures, TaskResult
+from app.exceptions import TaskFailed
+from app.store import jobs
+from app.store.cache import Meaning
+from app.store.jobs import NewJob, NewRequest
+from app.store.store import Store
+from app.store.tables import JobRequest
+from app.tasks.job_request import JobRequestTask, JobResult
+from optimizer.exceptions import OutsideLimits
+from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, until, with_store
+
+
+def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
+    figures = AnswerFigures("ur5e", 5.0, 1.0, status)
+    result = TaskResult.of_kept_json({"id": task.request_id, "by": task.request_id}, figures)
+    document = zlib.compress(result.document)
+    return JobResult(
+        document, result.media_type, (), result.kept_as, figures, result.is_optimal, wall_time=0.1, parts="optimize"
+    )
+
+
+def asks(digest: str = "a", deadline: float = 10.0, kind: str = "optimize", version: str = __version__) -> NewRequest:
+    return NewRequest(kind, BODY, deadline, Meaning(version=version, digest=digest, robot="ur5e"))
+
+
+def service_of(store: Store, workers: int = 1) -> Service:
+    service = Service("only", store, workers)
+    service.work.answer = computed
+    return service
+
+
+async def send(service: Service, *asked: NewRequest, owner: str | None = None) -> str:
+    return (await service.jobs.create(NewJob(asked, "x"), None, owner))[0]
+
+
+async def done(service: Service, *asked: NewRequest, owner: str | None = None) -> tuple[str, list[JobRequest]]:
+    """A job after its end, and its requests."""
+    job_id = await send(service, *asked, owner=owner)
+    await until(lambda: is_done(service, job_id))
+    return job_id, await requests(service.jobs.store, job_id)
+
+
+async def document(service: Service, job_id: str, number: int) -> Any:
+    _, body = await service.jobs.store.read(partial(jobs.outcome, job_id=job_id, number=number))
+    assert body is not None
+    return orjson.loads(zlib.decompress(body))
+
+
+def test_one_is_computed_and_the_others_get_its_answer(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = service_of(store, workers=2)
+        service.dispatcher.start()
+        first = await send(service, *[asks()] * 20, asks("b"), asks(deadline=99.0))
+        await until(lambda: sorted(service.work.begun) == [0, 20])
+        service.work.free.set()
+        await until(lambda: is_done(service, first))
+        found = await requests(store, first)
+        assert {each.state for each in found} == {"done"} and {each.energy for each in found} == {5.0}
+        for number in (*range(20), 21):
+            own = {"id": f"{first}.{number}", "by": f"{first}.0", "answer": f"/answers/{found[number].answer_id}"}
+            assert await document(service, first, number) == own
+        await done(service, asks(), asks("b"))
+        assert len(service.work.begun) == 2, "those of another job are known, too"
+        await done(service, asks(), owner="somebody")
+        await done(service, asks(version="another"), NewRequest("optimize", BODY, 10.0))
+        assert len(service.work.begun) == 5
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_more_time_may_find_a_better_answer(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = service_of(store)
+        service.work.answer = partial(computed, status="feasible")
+        service.work.free.set()
+        service.dispatcher.start()
+        await done(service, asks(), asks(deadline=20.0), asks(deadline=5.0))
+        assert service.work.begun == [0, 1]
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_answers_that_refer_to_others_stay_in_their_job(tmp_path: Path) -> None:
+    """Those that they refer to are deleted with it."""
+
+    async def test(store: Store) -> None:
+        service = service_of(store)
+        service.work.free.set()
+        service.dispatcher.start()
+        await done(service, asks(kind="cycle"), asks(kind="cycle"))
+        assert service.work.begun == [0]
+        await done(service, asks(kind="cycle"))
+        assert service.work.begun == [0, 0]
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+@pytest.mark.parametrize(("error", "begun"), [(OutsideLimits("start", 1, 9.0, -1.0, 1.0), [0]), (TaskFailed(), [0, 1])])
+def test_only_a_request_that_is_wrong_fails_for_all(tmp_path: Path, error: Exception, begun: list[int]) -> None:
+    async def test(store: Store) -> None:
+        service = service_of(store, workers=2)
+        service.work.errors = [error]
+        service.work.free.set()
+        service.dispatcher.start()
+        job_id, found = await done(service, asks(), asks(), asks())
+        assert service.work.begun == begun
+        failed = [each for each in found if each.state == "failed"]
+        assert len(failed) == (3 if len(begun) == 1 else 1)
+        assert [each.problem and each.problem["instance"] for each in failed] == [
+            f"{job_id}.{each.number}" for each in failed
+        ]
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_one_that_waits_for_another_can_be_cancelled(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = service_of(store)
+        first = await send(service, asks())
+        service.dispatcher.start()
+        await until(lambda: service.work.begun == [0])
+        second = await send(service, asks())
+        await until(lambda: service.dispatcher._equals.waiting == 1)
+        await service.jobs.cancel(second, OPERATOR)
+        await until(lambda: is_done(service, second))
+        third = await send(service, asks())
+        await until(lambda: service.dispatcher._equals.waiting == 1)
+        await service.jobs.cancel(first, OPERATOR)
+        await until(lambda: is_done(service, first))
+        service.work.free.set()
+        await until(lambda: is_done(service, third))
+        assert [each.state for each in await requests(store, third)] == ["done"], "it is computed in its place"
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
+
+
+def test_a_job_that_is_deleted_takes_its_answers_with_it(tmp_path: Path) -> None:
+    async def test(store: Store) -> None:
+        service = service_of(store)
+        service.work.free.set()
+        service.dispatcher.start()
+        first, _ = await done(service, asks())
+        second, _ = await done(service, asks())
+        await service.jobs.delete(first, OPERATOR)
+        assert (await document(service, second, 0))["id"] == f"{second}.0", "it has a copy"
+        await done(service, asks())
+        assert service.work.begun == [0, 0]
+        await service.dispatcher.stop()
+
+    with_store(tmp_path, test)
