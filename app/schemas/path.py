@@ -74,7 +74,7 @@ class PathTolerance(Request):
         "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must to follow the path, "
         "and as needs least energy. `rotation` is for the direction of this axis then. At both ends of the path the "
         "tool has its full orientation. Null: the orientation is that of the path.",
-        None,
+        "1",
         [0.0, 0.0, 1.0],
         default=None,
     )

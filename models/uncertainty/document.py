@@ -62,8 +62,8 @@ class InvalidFigures(ValueError):
 @dataclass(frozen=True)
 class Covariance:
     """Covariance `matrix` (n, n) of the identified parameters; see the module. A name is the path of a figure, with the
-    index of the joint where it has one value each: `friction_laws.identified.coulomb.0`, `electronics.idle_power`. Links
-    have the parameters that their torques are linear in: `inertials.mx.1`."""
+    index of the joint where it has one value each: `friction_laws.identified.coulomb.0`, `electronics.idle_power`.
+    Links have the parameters that their torques are linear in: `inertials.mx.1`."""
 
     names: tuple[str, ...]
     matrix: Array
@@ -241,8 +241,8 @@ def _uncertainty(document: dict[str, Any], figures: dict[str, Any], nq: int) -> 
             raise InvalidFigures(
                 f"covariance.names.{k}",
                 "is no parameter of these figures: use paths like friction_laws.LAW.coulomb.0, drives.copper.2 or "
-                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or inertials.m.1 with one "
-                f"of {', '.join(LINKS)}.",
+                f"electronics.idle_power, of {', '.join((*FRICTION, *DRIVES))} and idle_power, or inertials.m.1 with "
+                f"one of {', '.join(LINKS)}.",
             )
     matrix = numbers("covariance.matrix", given["matrix"], (len(names), len(names)))
     scale = float(np.abs(matrix).max())

@@ -13,8 +13,8 @@ BASE_POWER = "base_power"
 FRICTION = ("coulomb", "curved", "speed", "viscous", "load")
 DRIVES = ("torque_constant", "rotor_inertia", "copper", "inverter_constant", "inverter_linear", "inverter_quadratic")
 PER_JOINT = FRICTION + DRIVES
-# of each link: mass [kg], first moments [kg·m] and inertia [kg·m²] in the frame of its joint, in Pinocchio's order. They
-# stand behind the others, link by link, and only where a document has errors of them
+# of each link: mass [kg], first moments [kg·m] and inertia [kg·m²] in the frame of its joint, in Pinocchio's order.
+# They stand behind the others, link by link, and only where a document has errors of them
 LINKS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
 
 
