@@ -227,17 +227,23 @@ class PathAttempt:
 class PathInfeasible(JoulepathError):
     """No configuration at the start of a tool path leads along all of it; `attempts` say how far each one gets.
 
-    `path` is the name of it, `length` [m] its length, a radian of turning counted as a quarter of a metre.
+    `path` is the name of it, `length` [m] its length, a radian of turning counted as a quarter of a metre. `in_parts`:
+    nor do several configurations lead along it, one after the other.
     """
 
-    def __init__(self, length: float, attempts: Sequence[PathAttempt], path: str = "path") -> None:
+    def __init__(
+        self, length: float, attempts: Sequence[PathAttempt], path: str = "path", in_parts: bool = False
+    ) -> None:
         self.length, self.path = length, path
         self.attempts = sorted(attempts, key=lambda each: -each.followed)[:MOST_BRANCHES]
         best = self.attempts[0]
         way = "the path" if path == "path" else path
+        remedy = "Move it, widen limits.position, or ask POST /cycle to divide it: a stop's path with split."
+        if in_parts:
+            remedy = "Some place of it is out of reach in all of them, so that it cannot be divided: move it."
         super().__init__(
             f"The arm cannot follow {way} to its end from any configuration: {best.label} gets {best.followed:.1%} of "
-            f"the way and ends there ({best.reason}). Move it, divide it, or widen limits.position."
+            f"the way and ends there ({best.reason}). {remedy}"
         )
 
 

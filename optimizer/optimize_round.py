@@ -6,10 +6,12 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from optimizer.deadline import Clock
+from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
+from optimizer.exceptions import DeadlineExceeded
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
+from optimizer.sequence.divided_paths import with_divided_paths
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.proven_bound import proven_bound
 from optimizer.sequence.rests import rest_sensitivity
@@ -41,6 +43,7 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tel
     """
     with one_thread():
         began, tell = clock(), forward(tell)
+        asked = _divided(asked, clock)
         if asked.order is None:
             found = _in_given_order(asked, clock, tell)
             _tell_found(tell, found)
@@ -62,6 +65,17 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tel
         )
         _tell_found(tell, found)
         return found
+
+
+def _divided(asked: WorkRound, clock: Clock) -> WorkRound:
+    """The round with its paths divided where they have to be, in the time that is left."""
+    end = Deadline.after(asked.deadline, clock)
+    try:
+        with watch(end):
+            divided = with_divided_paths(asked)
+    except DeadlinePassed:
+        raise DeadlineExceeded([]) from None
+    return asked if divided is asked else replace(divided, deadline=max(end.left, LEAST_TIME))
 
 
 def _tell_found(tell: Tell, found: RoundSolution) -> None:
@@ -98,8 +112,11 @@ def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution
         bound = max(bound, timing.bound(price, ours.energy))
         compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
     complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
+    # a path may be divided at other places
+    divided = any(move.tool_path is not None and move.tool_path.section is not None for move in asked.moves)
+    done = _is_done(search, timing, timed, moves) and complete and not divided
     return RoundSolution(
-        status="optimal" if _is_done(search, timing, timed, moves) and complete else "feasible",
+        status="optimal" if done else "feasible",
         moves=moves,
         lower_bound=bound,
         price_of_time=price,

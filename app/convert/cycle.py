@@ -12,7 +12,7 @@ from app.convert.fields import fields
 from app.convert.pose import to_base, to_base_pose
 from app.convert.request import to_branch, to_target, to_tool_path
 from app.convert.solution import energy_fields, optimality_gap
-from app.convert.warnings import MISSED, NO_DEFAULT_MOTION, certified_warnings
+from app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
 from app.schemas.arm import MoveLimits
 from app.schemas.path import Line as LineRequest
@@ -100,7 +100,7 @@ def _to_path(k: int, path: StopPathRequest | None, robot: Robot) -> StopPath | N
         return None
     try:
         way = to_tool_path(path, path.points[1:-1], robot)
-        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.max)
+        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.max, split=path.split)
     except InvalidProblem as error:
         raise at_stop(k, error) from None
 
@@ -161,12 +161,20 @@ def _warnings(found: RoundSolution) -> list[str]:
     of_all = [] if found.complete else [MISSED]
     if found.moves[0].planned.arm.robot.default_motion is None:
         of_all.append(NO_DEFAULT_MOTION)
+    of_all += [DIVIDED.format(name, last) for name, last in _divided(found)]
     return of_all + [
         f"{move.planned.start} to {move.planned.goal}: {words}"
         for move in found.moves
         for words in certified_warnings(move.solution)
         if words != NO_DEFAULT_MOTION
     ]
+
+
+def _divided(found: RoundSolution) -> list[tuple[str, float]]:
+    """Where paths are divided: the stop at which a part ends, and the share of the path until there."""
+    paths = [(move.planned.goal, move.planned.tool_path) for move in found.moves]
+    parts = [(name, path.section) for name, path in paths if path is not None and path.section is not None]
+    return [(name, section.last) for name, section in parts if section.last < 1]
 
 
 def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:

@@ -19,6 +19,10 @@ MISSED = (
     "The inverse kinematics of this arm may have missed arm configurations: the answer is the best of those found, its "
     "status is not `optimal`, and its lower bound covers those that may be missing."
 )
+DIVIDED = (
+    "{} is where the path is divided, at {:.1%} of its length: no arm configuration follows it whole. `status` and "
+    "`lower_bound` are for this division."
+)
 NO_DEFAULT_MOTION = "No default motion of the robot's controller is known: `controller_default` is left out."
 
 

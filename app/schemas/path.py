@@ -145,6 +145,14 @@ class StopPath(_OnPath):
             {"position": [0.4, 0.3, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
         ],
     )
+    split: bool = described(
+        "Whether a path that no arm configuration follows whole is divided: into as few parts as possible, with moves "
+        "from one configuration to another between them. Each part is a stop of its own: `NAME/1`, `NAME/2` and so on, "
+        "the last one `NAME`; each has the lines of the stop.",
+        None,
+        True,
+        default=False,
+    )
 
 
 class Line(Request):

@@ -21,6 +21,8 @@ COMPARED, STEP = 100, 0.002
 AHEAD = 2.0
 # how much of the length of a course by distance its turns are counted as
 TURNS = 1e-3
+# fractions of a course that differ by less are the same
+SAME_FRACTION = 1e-9
 # m²: two poses of the course that are nearer are the same
 TINY = 1e-24
 
@@ -35,18 +37,35 @@ class ToolCourse:
     by_distance: tuple[Array, Array] | None = None
     # the angle [rad] by which the tool is turned about the path's free axis at a fraction of the way; None: by none
     turning: CubicSpline | None = None
+    # the part of the shape that the course follows, from one fraction to another one, in this direction
+    first: float = 0.0
+    last: float = 1.0
 
     @classmethod
     def of(cls, path: ToolPath, T_start: Array, T_goal: Array) -> ToolCourse:
-        """The course of a path from T_start to T_goal (4, 4). Raises InvalidProblem; see `shape_of`. Its ramps must
-        leave something between them."""
+        """The course of a path, or a section of it, from T_start to T_goal (4, 4).
+
+        Raises InvalidProblem; see `shape_of`. The ramps of a path must leave something between them.
+        """
+        if path.section is not None:
+            T_start, T_goal = path.section.start.T, path.section.goal.T
         course = cls(path, shape_of(path, np.array([T_start, *(pose.T for pose in path.via), T_goal])))
-        return course if path.least_speed is None else course._by_distance()
+        if path.least_speed is not None:
+            course = course._by_distance()
+        if path.section is not None:
+            course = course.part(path.section.first, path.section.last)
+        if path.least_speed is not None:
+            course._check_ramps()
+        return course
+
+    def part(self, first: float, last: float) -> ToolCourse:
+        """The course from one fraction of the whole way to another one."""
+        return replace(self, first=first, last=last)
 
     @property
     def length(self) -> float:
         """Length of the way [m]; a radian of turning counts as TURNING."""
-        return float(self.shape.pieces[-1])
+        return abs(self.last - self.first) * float(self.shape.pieces[-1])
 
     def measured(self, count: int, step: float) -> tuple[Array, Array]:
         """Fractions (k,) of the way, as of `grid`, and how far the TCP has moved until there (k,) [m], turns left
@@ -57,26 +76,31 @@ class ToolCourse:
 
     def _by_distance(self) -> ToolCourse:
         """The same course, whose fractions are those of the distance that the TCP moves: at an even speed they rise
-        evenly. Raises InvalidProblem if the ramps leave nothing between them."""
+        evenly."""
         at, gone = self.measured(COMPARED, STEP)
-        length = float(gone[-1])
+        # where the tool turns in place, the fractions have to rise, too
+        rising = gone + TURNS * gone[-1] * at
+        if not rising[-1] > 0:
+            return self
+        return replace(self, by_distance=(at * self.length, rising / rising[-1]))
+
+    def _check_ramps(self) -> None:
+        length = float(self.measured(COMPARED, STEP)[1][-1])
         if length <= 2 * self.path.ramp:
             raise InvalidProblem(
                 "path.speed.ramp",
                 f"The TCP moves {length:.4g} m along this path: its ramps, {self.path.ramp:g} m at either end, leave "
                 "nothing between them for path.speed.min.",
             )
-        # where the tool turns in place, the fractions have to rise, too
-        rising = gone + TURNS * length * at
-        return replace(self, by_distance=(at * self.length, rising / rising[-1]))
 
     def poses(self, fraction: Array) -> Array:
         """T_base_tcp (k, 4, 4) at fractions (k,) of the way."""
         fraction = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0)
-        way = fraction * self.length
+        at, whole = self.first + fraction * (self.last - self.first), float(self.shape.pieces[-1])
+        way = at * whole
         if self.by_distance is not None:
-            ways, at = self.by_distance
-            way = np.clip(CubicSpline(at, ways)(fraction), 0.0, self.length)
+            ways, fractions = self.by_distance
+            way = np.clip(CubicSpline(fractions, ways)(at), 0.0, whole)
         T = self.shape.poses(way)
         return T if self.turning is None else self.turned(T, self.turning(fraction))
 
@@ -116,11 +140,14 @@ class ToolCourse:
         [m]."""
         knots = self.shape.pieces
         knots = knots[np.append(True, np.diff(knots) > SAME_POSE)]
+        at = knots / knots[-1] if self.by_distance is None else np.interp(knots, *self.by_distance)
+        inside = np.sort((at - self.first) / (self.last - self.first))
+        inside = inside[(inside > SAME_FRACTION) & (inside < 1 - SAME_FRACTION)]
         pieces = [
-            np.linspace(a, b, max(count, int(np.ceil((b - a) / step))), endpoint=False) for a, b in pairwise(knots)
+            np.linspace(a, b, max(count, int(np.ceil((b - a) * self.length / step))), endpoint=False)
+            for a, b in pairwise([0.0, *inside.tolist(), 1.0])
         ]
-        at = np.append(np.concatenate(pieces) / self.length, 1.0)
-        return at if self.by_distance is None else np.interp(at * self.length, *self.by_distance)
+        return np.append(np.concatenate(pieces), 1.0)
 
     def _matched(self, at: Array, known: Array, asked: Array) -> tuple[Array, Array, float]:
         """Fractions (k,) of the way that are compared with a motion; what is left out before each (k,) [m], and after

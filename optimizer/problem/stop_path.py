@@ -17,7 +17,8 @@ STRAIGHT = ToolPath()
 class StopPath:
     """The TCP goes from the stop's target, which is one pose then, over `path.via` to `goal`, and rests at both ends.
 
-    `speed` [m/s] bounds the speed of the TCP on the way.
+    `speed` [m/s] bounds the speed of the TCP on the way. With `split`, a path that no configuration follows whole is
+    divided by reconfigurations: moves between configurations of one pose.
 
     Raises InvalidProblem, with the field named.
     """
@@ -25,6 +26,7 @@ class StopPath:
     goal: Pose
     path: ToolPath = STRAIGHT
     speed: float | None = None
+    split: bool = False
 
     def __post_init__(self) -> None:
         if self.speed is not None and not (np.isfinite(self.speed) and self.speed > 0):

@@ -29,6 +29,16 @@ SPEED_RANGE = 1.05
 SAME_POSE = 1e-6
 
 
+@dataclass(frozen=True)
+class Section:
+    """The part of a path from the fraction `first` to `last` of its way; all of it leads from `start` to `goal`."""
+
+    start: Pose
+    goal: Pose
+    first: float
+    last: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class ToolPath:
     """How the TCP goes from the start of a motion to its goal over the poses `via` in the base frame.
@@ -39,7 +49,7 @@ class ToolPath:
     the one pose of `via` and the goal. The motion may be off by at most `position_tolerance` [m] and
     `rotation_tolerance` [rad]. With `about`, an axis (3,) of the TCP, the tool may turn about it between the ends as it
     likes: the tolerance is for the direction of the axis then. The TCP is no slower than `least_speed` [m/s], but
-    within `ramp` [m] of either end.
+    within `ramp` [m] of either end. With a `section` only this part of the path is followed.
 
     Raises InvalidProblem, with the field named.
     """
@@ -52,6 +62,7 @@ class ToolPath:
     about: Sequence[float] | None = None
     least_speed: float | None = None
     ramp: float = RAMP
+    section: Section | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "via", tuple(self.via))

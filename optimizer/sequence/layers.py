@@ -42,17 +42,16 @@ class Layer:
         return any(end.sampled for end in self.ends)
 
 
-def layer_of(asked: WorkRound, place: str, field: str, target: Target, branch: BranchFilter | None) -> Layer:
-    """The layer of a target, held with every arm that comes to this place or leaves it.
+def layer_of(
+    asked: WorkRound, place: str, field: str, target: Target, branch: BranchFilter | None, windings: bool
+) -> Layer:
+    """The layer of a target, held with every arm that comes to this place or leaves it, with `windings` or without.
 
     Raises the errors of `optimize` for an end, which name `start` or `stops/NAME`; InvalidProblem, with `field` named,
     for too many configurations.
     """
     name = place if place == START else f"stops/{place}"
-    problems = [
-        Problem(arm=arm, start=target, goal=target, branch=branch, windings=asked.windings)
-        for arm in arms_at(asked, place)
-    ]
+    problems = [Problem(arm=arm, start=target, goal=target, branch=branch) for arm in arms_at(asked, place)]
     problem = problems[0]
     found, _ = ends_of(PreparedProblem.of(problem), name, problem.goal)
     q = np.array([end.q for end in found])
@@ -61,7 +60,7 @@ def layer_of(asked: WorkRound, place: str, field: str, target: Target, branch: B
     raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in found], either)
     held = [end for end, cause in zip(found, either, strict=True) if cause is None]
     middle = (asked.arm.active_limits.q_min + asked.arm.active_limits.q_max) / 2
-    nodes = [(k, np.array(node)) for k, end in enumerate(held) for node in _nodes(end, asked.windings, middle)]
+    nodes = [(k, np.array(node)) for k, end in enumerate(held) for node in _nodes(end, windings, middle)]
     if len(nodes) > MOST_NODES:
         raise InvalidProblem(
             field,

@@ -25,7 +25,7 @@ from optimizer.sequence.layers import Layer, layer_of
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
 from optimizer.sequence.rests import dwell_energies
-from optimizer.sequence.ways import layers_with_ways
+from optimizer.sequence.ways import layers_of_stop
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
 
@@ -199,8 +199,7 @@ class RoundSearch(LazySearch):
 def layers_of(asked: WorkRound) -> dict[str, Layer]:
     """The layers of all places of a round by their names, in their order. Raises the errors of `layer_of`, and
     PathInfeasible."""
-    layers = {START: layer_of(asked, START, "start", asked.start, asked.branch)}
+    layers = {START: layer_of(asked, START, "start", asked.start, asked.branch, asked.windings)}
     for k, stop in enumerate(asked.stops):
-        at = layer_of(asked, stop.entry, f"stops.{k}.target", stop.target, stop.branch)
-        layers |= zip(stop.places, layers_with_ways(asked, k, at), strict=True)
+        layers |= zip(stop.places, layers_of_stop(asked, k), strict=True)
     return layers

@@ -26,7 +26,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.search.end_feasibility import check_configurations
 from optimizer.search.ends import EndConfiguration, label_of
 from optimizer.search.path_ends import attempt_of
-from optimizer.sequence.layers import Layer, arms_at
+from optimizer.sequence.layers import Layer, arms_at, layer_of
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,16 @@ class _Way:
         return ToolCourse.of(ToolPath(), T, T_end)
 
 
-def layers_with_ways(asked: WorkRound, k: int, at: Layer) -> list[Layer]:
-    """The layers of the places of stop `k` in their order, from that of its target, `at`.
+def layers_of_stop(asked: WorkRound, k: int) -> list[Layer]:
+    """The layers of the places of stop `k` in their order.
 
-    Raises PathInfeasible if no configuration is left; InvalidProblem for a path through poses that make none.
+    Raises the errors of `layer_of`; PathInfeasible if no configuration is left; InvalidProblem for a path through poses
+    that make none.
     """
     stop = asked.stops[k]
+    # along a path joints may move far: full turns count until it is known which of them can follow it
+    windings = asked.windings or stop.path is not None
+    at = layer_of(asked, stop.entry, f"stops.{k}.target", stop.target, stop.branch, windings)
     layers, kept = {stop.entry: at}, np.ones(len(at.q), dtype=bool)
     for way in _ways(stop):
         origin = layers[way.origin]
@@ -68,7 +72,20 @@ def layers_with_ways(asked: WorkRound, k: int, at: Layer) -> list[Layer]:
             attempts = _attempts(asked, origin, found, blocked, follows)
             raise PathInfeasible(length, attempts, layers[way.end].name)
         kept &= follows
+    if windings and not asked.windings:
+        kept = _nearest_to_middle(asked, at, kept)
     return [_only(layers[place], kept) for place in stop.places]
+
+
+def _nearest_to_middle(asked: WorkRound, at: Layer, kept: Mask) -> Mask:
+    """Of the nodes that are kept, the one of each configuration that is nearest to the middle of the joints' range."""
+    limits = asked.arm.active_limits
+    away = np.where(kept, np.abs(at.q - (limits.q_min + limits.q_max) / 2).sum(axis=1), np.inf)
+    nearest = np.zeros_like(kept)
+    for end in np.unique(at.end[kept]):
+        own = np.flatnonzero(at.end == end)
+        nearest[own[away[own].argmin()]] = True
+    return nearest
 
 
 def _ways(stop: Stop) -> Iterator[_Way]:

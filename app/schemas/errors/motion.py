@@ -193,8 +193,8 @@ class PathAttempt(Response):
 
 
 class PathInfeasible(ProblemDetails):
-    """From no arm configuration can the tool follow a path, or a line of a stop, to its end. Move it, divide it, or
-    widen `limits.position`."""
+    """From no arm configuration can the tool follow a path, or a line of a stop, to its end. Move it, widen
+    `limits.position`, or ask `POST /cycle` to divide it: a stop's `path` with `split`."""
 
     type: Literal["/problems/path-infeasible"] = fixed("type", "/problems/path-infeasible")
     title: Literal["Path infeasible"] = fixed("title", "Path infeasible")

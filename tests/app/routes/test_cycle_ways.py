@@ -148,6 +148,32 @@ def test_a_wrong_path_names_its_field(client: TestClient, fields: dict[str, Any]
     assert reply.json()["errors"][0]["loc"] == ["body", "stops", 0, *where]
 
 
+def test_a_path_is_divided_on_request(client: TestClient) -> None:
+    """A joint comes to the end of its range on the way."""
+    low, high = [-3.3, -6.2, -3.1, -6.2, -6.2, -6.2], [3.3, 6.2, 3.1, 6.2, 6.2, 6.2]
+    points = [POINTS[0] | {"position": at} for at in ([0.45, -0.1, 0.2], [0.2, 0.5, 0.2])]
+    path: dict[str, Any] = {"points": points, "split": True}
+    stop = {"name": "glue", "path": path, "branch": {"shoulder": "left", "elbow": "up"}}
+    content = a_round(stops=[stop], limits={"position": {"lower": low, "upper": high}}, collisions=False)
+    reply = client.post("/cycle", json=content)
+    assert reply.status_code == 200, reply.text
+    answer = CycleResponse.model_validate_json(reply.content)
+    assert answer.order == ["glue/1", "glue"] and answer.status == "feasible"
+    assert [(leg.kind, leg.goal.stop) for leg in answer.legs] == [
+        ("move", "glue/1/entry"),
+        ("path", "glue/1"),
+        ("move", "glue/entry"),
+        ("path", "glue"),
+        ("move", "start"),
+    ]
+    (warning,) = answer.warnings
+    assert warning.startswith("glue/1 is where the path is divided")
+    path["split"] = False
+    refusal = client.post("/cycle", json=content).json()
+    assert refusal["type"] == "/problems/path-infeasible" and "split" in refusal["detail"]
+    assert {each["reason"] for each in refusal["attempts"]} == {"outside_limits"}
+
+
 @pytest.mark.parametrize("fields", [{"target": down(0.4, 0.0, 0.2)}, {"path": None}], ids=["both", "neither"])
 def test_a_stop_has_a_target_or_a_path(client: TestClient, fields: dict[str, Any]) -> None:
     content = with_path()
