@@ -18,13 +18,16 @@ from benchmarks.service import running
 OPTIONS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 SIZE = ViewportSize(width=1280, height=800)
 PLAYING = 5.0  # time over which frames are counted [s]
-# in the page: time from its navigation to the frame that first shows the example, and bytes of all but the answer
+# in the page: time from its navigation to the frame that first shows the example
 SHOWN = """async () => {
     while (!(window.studio?.state.answer && studio.view.frames > 0)) await new Promise(requestAnimationFrame);
-    const shown = performance.now() / 1000;
+    return performance.now() / 1000;
+}"""
+# bytes of all that it loads by itself but the answer
+LOADED = """() => {
     const files = performance.getEntriesByType("resource").filter(each => !each.name.endsWith("/optimize"));
     const [page] = performance.getEntriesByType("navigation");
-    return [shown, [page, ...files].reduce((sum, each) => sum + each.transferSize, 0)];
+    return [page, ...files].reduce((sum, each) => sum + each.transferSize, 0);
 }"""
 FRAMES = """async (time) => {
     document.getElementById("speed").value = "0.1";
@@ -43,11 +46,12 @@ def measure(browser: Browser, url: str, whole: bool) -> tuple[float, float, floa
     context = browser.new_context(viewport=ViewportSize(width=1900, height=900) if whole else SIZE)
     page = context.new_page()
     page.goto(f"{url}/studio", wait_until="commit")
-    shown, size = page.evaluate(SHOWN)
+    shown = page.evaluate(SHOWN)
     if whole:
         page.evaluate("([w, h]) => Object.assign(studio.view.box.style, {position: 'fixed', inset: 0, width: w + 'px', "
                       "height: h + 'px', zIndex: 9})", [SIZE["width"], SIZE["height"]])  # fmt: skip
     rate, fineness = page.evaluate(FRAMES, PLAYING)
+    size = page.evaluate(LOADED)
     context.close()
     return shown, size, rate, fineness
 

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import gzip
+from collections.abc import Mapping
+from functools import lru_cache
 
 import zstandard
 from starlette.datastructures import Headers, MutableHeaders
@@ -21,8 +23,10 @@ _LEAST = 1024
 """Smaller bodies [byte] fit into one packet anyway."""
 _INSTANT = 1 << 15
 """Bodies below this size [byte] are compressed in less time than it takes to pass them to a thread."""
-_GZIP_LEVEL = 5
-_ZSTD_LEVEL = 3
+_LEVELS = {"zstd": 3, "gzip": 5}
+_FILE_LEVELS = {"zstd": 12, "gzip": 9}
+"""Of files, which have an entity tag: they are compressed once and sent often."""
+_MOST_FILES = 64
 _COMPRESSIBLE = ("text/", "application/json", "application/problem+json", "application/javascript", "model/")
 _STREAM = "text/event-stream"
 
@@ -73,10 +77,8 @@ async def _encoded(start: Message, message: Message, coding: Coding) -> Message:
     body: bytes = message.get("body", b"")
     if coding == "identity" or message.get("more_body", False) or len(body) < _LEAST:
         return message
-    if len(body) < _INSTANT:
-        body = _compress(body, coding)
-    else:
-        body = await asyncio.to_thread(_compress, body, coding)
+    compress = _compressed_file if "etag" in headers else _compress
+    body = compress(body, coding) if len(body) < _INSTANT else await asyncio.to_thread(compress, body, coding)
     headers["Content-Encoding"] = coding
     headers["Content-Length"] = str(len(body))
     if headers.get("etag", "").startswith('"'):
@@ -85,8 +87,13 @@ async def _encoded(start: Message, message: Message, coding: Coding) -> Message:
     return {**message, "body": body}
 
 
-def _compress(body: bytes, coding: Coding) -> bytes:
+@lru_cache(_MOST_FILES)
+def _compressed_file(body: bytes, coding: Coding) -> bytes:
+    return _compress(body, coding, _FILE_LEVELS)
+
+
+def _compress(body: bytes, coding: Coding, levels: Mapping[str, int] = _LEVELS) -> bytes:
     if coding == "zstd":
         # a compressor may not be shared by threads
-        return zstandard.ZstdCompressor(level=_ZSTD_LEVEL).compress(body)
-    return gzip.compress(body, _GZIP_LEVEL, mtime=0)
+        return zstandard.ZstdCompressor(level=levels[coding]).compress(body)
+    return gzip.compress(body, levels[coding], mtime=0)

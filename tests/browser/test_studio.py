@@ -26,6 +26,9 @@ DRAWN = 1e-6  # m; the certificate's own tolerance of an end
 ROUNDING = 1e-9  # m; sums of some ten products in double precision
 # relative; the service integrates the power of the recording's samples by another rule
 RECORDED = 2e-3
+MOST_BYTES = 1_000_000  # of a first visit, without the answer
+LOADED = """() => [...performance.getEntriesByType("navigation"), ...performance.getEntriesByType("resource")]
+    .filter(({ name }) => !name.endsWith("/optimize")).reduce((sum, { transferSize }) => sum + transferSize, 0)"""
 PIXELS = """() => {
     const { view } = studio;
     view.setFineness(0.5);
@@ -60,6 +63,8 @@ def test_the_first_look_moves(browser: Browser, service: Server) -> None:
         joules = float(page.locator("#joules").inner_text().split()[0])
         assert joules == pytest.approx(answer["energy"]["electrical"]["total"], abs=0.05)
         assert state(page, "asked") == FIRST
+        until(page, MESHES)
+        assert page.evaluate(LOADED) <= MOST_BYTES
 
 
 def test_the_picture_is_of_the_motion(page: Page) -> None:

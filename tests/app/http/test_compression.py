@@ -19,7 +19,7 @@ from app.http.accept_encoding import preferred
 from app.http.compression import Compression
 from app.http.content_coding import ContentCoding
 from app.schemas import errors as problems
-from tests.app.live import ANSWER, Server
+from tests.app.live import ANSWER, ROOT, Server
 from tests.app.requests import move
 
 POSE = {"pose": {"position": [0.4, -0.2, 0.3], "quaternion": [0.0, 1.0, 0.0, 0.0]}}
@@ -134,6 +134,16 @@ def test_streams_pass_piece_by_piece() -> None:
         messages = through(StreamingResponse(events(), media_type=kind))
         assert b"content-encoding" not in headers_of(messages)
         assert [len(message["body"]) for message in messages[1:]] == [len("data: 0\n\n" * 1000)] * 3 + [0]
+
+
+@pytest.mark.parametrize("coding", ["zstd", "gzip"])
+def test_files_are_packed_smaller_than_answers(coding: str) -> None:
+    """A file has an entity tag: it is sent often, and packed once."""
+    text = (ROOT / "app" / "static" / "studio" / "view.js").read_text()
+    responses = [Response(text, media_type="text/plain", headers=tag) for tag in ({}, {"ETag": '"1"'})]
+    answer, file = (through(response, coding)[1]["body"] for response in responses)
+    assert unpacked(coding, answer) == unpacked(coding, file) == text.encode()
+    assert len(file) < len(answer)
 
 
 def test_a_strong_etag_becomes_weak_and_a_packed_body_is_left_alone() -> None:
