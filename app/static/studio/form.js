@@ -16,6 +16,7 @@ export function createForm() {
   follow("request", () => {
     if (!own) showForm().catch(problem);
   });
+  follow("problem", () => placeErrors(state.problem?.details?.errors ?? []));
   // the first answer does not wait for the document
   follow("answer", () => $("form").firstChild || showForm().catch(problem));
   for (const id of ["angles", "lengths"]) $(id).onchange = () => showForm().catch(problem);
@@ -174,7 +175,7 @@ function number(schema, value, path, label) {
 }
 
 /** Puts errors of the service beside the fields that they name. */
-export function placeErrors(errors) {
+function placeErrors(errors) {
   for (const old of document.querySelectorAll("#form .error")) old.remove();
   for (const { loc, msg } of errors) {
     let path = "";

@@ -26,8 +26,7 @@ async function ask() {
 
 function draw() {
   const box = $("front");
-  if (state.asked !== front?.asked) box.replaceChildren(el("p", { class: "hint" }, "How much a slower or faster motion would need."));
-  if (!front || !state.answer || state.asked !== front.asked) return;
+  if (!front || state.asked !== front.asked) return box.replaceChildren(el("p", { class: "hint" }, "How much a slower or faster motion would need."));
   const { points } = front;
   const own = { duration: state.answer.duration, energy: state.answer.energy[state.answer.objective].total };
   const all = [...points, own];

@@ -3,7 +3,7 @@ import { createCandidates } from "./candidates.js";
 import { $, figure, percent, tabs } from "./dom.js";
 import { createDrag } from "./drag.js";
 import { createEnergy } from "./energy.js";
-import { createForm, placeErrors, showForm } from "./form.js";
+import { createForm, showForm } from "./form.js";
 import { createFront } from "./front.js";
 import { openAnswer, showKept } from "./kept.js";
 import { createLimits } from "./limits.js";
@@ -14,7 +14,7 @@ import { createRequest, keepRobot, optimise, problem, setFirst, setRequest, show
 import { createRound } from "./round.js";
 import { createShare, shared } from "./share.js";
 import { embedded } from "./standalone.js";
-import { follow, set, state } from "./store.js";
+import { follow, state } from "./store.js";
 import { createView, drawnTcp } from "./view.js";
 
 const view = createView();
@@ -29,7 +29,6 @@ const inside = embedded();
 if (!inside) for (const create of [createFront, createRequest, createForm, createDrag]) create(view);
 createMeshes(view, inside);
 if (!inside) tabs(document.querySelector("#ask > .tabs"), () => Promise.all([showForm(), showKept()]).catch(problem));
-if (!inside) follow("problem", () => placeErrors(state.problem?.details?.errors ?? []));
 follow("answer", headline);
 
 /** For tests, and for those who look in the console. */
@@ -41,9 +40,7 @@ async function start() {
   const given = inside ?? (await shared());
   if (inside) {
     keepRobot(inside.robot);
-    await showAnswer(inside.answer, inside.request);
-    set({ round: inside.round });
-    view?.build();
+    await showAnswer(inside.answer, inside.request, inside.round);
   } else if (given.answer) {
     await openAnswer(given.answer);
   } else {
@@ -56,13 +53,15 @@ async function start() {
 function headline() {
   const { answer } = state;
   if (!answer) return;
-  $("joules").textContent = `${figure(answer.energy[answer.objective].total)} J`;
-  const gap = answer.energy.optimality_gap;
+  const { total } = answer.energy[answer.objective];
+  const bound = answer.energy.lower_bound;
   const usual = answer.baselines.find(({ name }) => name === "controller_default");
-  const facts = [`${figure(answer.duration)} s`, answer.status, `at most ${percent(gap, 2)} above what any motion needs`];
-  if (usual && usual.saving > 0) facts.push(`${percent(usual.saving, 2)} less than the controller's default${usual.within_limits ? "" : " (which breaks a limit)"}`);
+  const facts = [`${figure(answer.duration)} s`, answer.status];
+  if (bound > 0) facts.push(`within ${percent(total / bound - 1, 2)} of the least possible`);
+  if (usual && usual.saving > 0) facts.push(`${percent(usual.saving, 2)} less than the controller's default${usual.within_limits ? "" : " (breaks a limit)"}`);
   $("facts").textContent = facts.join(" · ");
+  $("joules").textContent = `${figure(total)} J`;
   const [from, to] = [answer.branch.start.label, answer.branch.goal.label];
   $("view").setAttribute("aria-label", `The arm ${answer.robot} moves from ${from} to ${to} in ${figure(answer.duration)} s and draws ${figure(answer.energy.electrical.total)} J.`);
-  document.title = `${figure(answer.energy[answer.objective].total)} J in ${figure(answer.duration)} s · joulepath studio`;
+  document.title = `${figure(total)} J in ${figure(answer.duration)} s · joulepath studio`;
 }

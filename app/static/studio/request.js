@@ -156,11 +156,11 @@ export async function robotOf(name) {
 }
 
 /** Shows an answer of POST /optimize. Without its request, the cell is what the answer says of its arm. */
-export async function showAnswer(answer, request) {
+export async function showAnswer(answer, request, round = null) {
   const robot = await robotOf(answer.robot);
   const asked = { ...answer.arm, ...request, robot: answer.robot };
   set({
-    asked: request ?? null, cell: cellOf(asked, robot), robot, answer, chosen: [], round: null, time: 0, duration: answer.duration,
+    asked: request ?? null, cell: cellOf(asked, robot), robot, answer, chosen: [], round, time: 0, duration: answer.duration,
     arms: [{ name: "this motion", answer }],
   });
   const { warnings } = answer;

@@ -113,7 +113,8 @@ function meshFile({ format, data, scale = 1 }, material) {
   const group = new THREE.Group();
   group.scale.setScalar(scale);
   const fill = (object) => {
-    object.traverse((part) => { if (part.isMesh) part.material = material; });
+    // some files have no normals, or zeros
+    object.traverse((part) => { if (part.isMesh) part.geometry.computeVertexNormals(), part.material = material; });
     group.add(object);
     group.dispatchEvent({ type: "filled" });
   };
