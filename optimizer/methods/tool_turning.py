@@ -154,7 +154,7 @@ class _TimeLaw:
         """Which configurations (n, nq) are outside of the joints' range, or collide."""
         limits, arm = self.prepared.arm.active_limits, self.prepared.arm
         outside = ((q < limits.q_min) | (q > limits.q_max)).any(axis=1)
-        if not arm.collisions:
+        if not (arm.collisions and len(self.prepared.surroundings.model.pairs)):
             return np.asarray(outside)
         hits = [each.distance < 0 for each in self.prepared.surroundings.model.closest_pairs(q, within=0.0)]
         return np.asarray(outside | np.array(hits))
