@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -91,10 +92,14 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
             model.gravity.linear = log.gravity
             piece["regressor"] = rigid_regressor(model, piece["q"], piece["v"], piece["a"])
         pieces.append(piece)
-    # taken out one by one: regressors are large
-    joined = {name: np.concatenate([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
+    # taken out one by one, and not copied if there is nothing to join: regressors are large
+    joined = {name: _joined([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
     return Rows(**joined, current=meanings == ["current"])
+
+
+def _joined(parts: list[Any]) -> Any:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _stride(logs: Sequence[Log], most: int) -> int:

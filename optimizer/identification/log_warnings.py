@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.identification.columns import Columns
 from optimizer.identification.filters import derivative, low_passed
 from optimizer.identification.grid import Grid
@@ -57,15 +57,20 @@ def _constant(log: Log) -> Iterator[str]:
 def _saturated(log: Log) -> Iterator[str]:
     if log.effort is None:
         return
-    moving = [log.effort[move.start : move.end] for move in log.moves if not move.at_rest]
-    if not moving:
-        return
-    size = np.abs(np.concatenate(moving))
-    at_most = (size == size.max(axis=0)).sum(axis=0)
-    cut_off = (at_most > max(_LEAST_SATURATED, _SATURATED * len(size))) & (np.ptp(log.effort, axis=0) > 0)
-    if cut_off.any():
-        joints = _numbers(np.flatnonzero(cut_off))
-        yield f"The effort of joints {joints} stays at its greatest value: it is cut off there."
+    moving = np.zeros(len(log.effort), dtype=bool)
+    for move in log.moves:
+        moving[move.start : move.end] = not move.at_rest
+    # joint by joint: a log can fill half of the memory
+    wrong = [joint for joint, effort in enumerate(log.effort.T) if _cut_off(effort, moving)]
+    if wrong:
+        yield f"The effort of joints {_numbers(wrong)} stays at its greatest value: it is cut off there."
+
+
+def _cut_off(effort: Array, moving: Mask) -> bool:
+    size = np.abs(effort[moving])
+    if not size.size or np.ptp(effort) == 0:
+        return False
+    return int((size == size.max()).sum()) > max(_LEAST_SATURATED, _SATURATED * len(size))
 
 
 def _misfit(log: Log) -> Iterator[str]:
