@@ -12,8 +12,8 @@ from models.robot import Array
 from optimizer.energy.link_regressor import body_parameters
 from optimizer.energy.torque_regressor import torque_regressor
 from optimizer.excitation.excitation_problem import Part
-from optimizer.identification.base_parameters import base_parameters
-from optimizer.identification.torque_fit import LEAST_LOAD_SPREAD
+from optimizer.identification.arm.base_parameters import base_parameters
+from optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
 

@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from models.registry import load_robot
 from optimizer.identification.identify import fit
-from optimizer.identification.log import Move
+from optimizer.identification.logs.log import Move
 from optimizer.identification.options import Options
 from tests.identification_logs import recorded, truth_of
 robot = load_robot("ur10e")
@@ -46,7 +46,7 @@ from pathlib import Path
 from models.registry import load_robot
 from optimizer.identification.identify import fit
 from optimizer.identification.options import Options
-from optimizer.identification.reading import read_log
+from optimizer.identification.logs.reading import read_log
 robot = load_robot("ur10e")
 log = read_log(Path(sys.argv[1]), robot)
 fit(robot, [log], Options(refit=True))
