@@ -27,16 +27,16 @@ from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_re
 from models.registry import load_robot
 from models.robot import Robot
 from models.uncertainty.ranges import P95
-from optimizer.identification.base_fit import BaseFit, base_arm, fit_base
-from optimizer.identification.base_parameters import base_parameters
-from optimizer.identification.clusters import clusters_of
-from optimizer.identification.estimate import Name
-from optimizer.identification.fit_rows import Rows, rows_of
-from optimizer.identification.fitting import fit_rows
+from optimizer.identification.arm.base_parameters import base_parameters
+from optimizer.identification.estimates.estimate import Name
+from optimizer.identification.fits.base_fit import BaseFit, base_arm, fit_base
+from optimizer.identification.fits.fitting import fit_rows
 from optimizer.identification.identify import fit
-from optimizer.identification.interval import energy_sd, spread_of
 from optimizer.identification.options import Options
-from optimizer.identification.validation import power_errors
+from optimizer.identification.quality.interval import energy_sd, spread_of
+from optimizer.identification.quality.validation import power_errors
+from optimizer.identification.rows.clusters import clusters_of
+from optimizer.identification.rows.fit_rows import Rows, rows_of
 from tests.identification_logs import Truth, recorded, truth_of
 
 DRAWS = 100

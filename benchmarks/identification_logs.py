@@ -14,9 +14,9 @@ from models.own_arm.figures import own_figures
 from models.own_arm.robots import own_robot
 from models.registry import load_robot
 from models.robot import Array, Robot
-from optimizer.identification.log import Log
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.reading import read_log
 from optimizer.identification.options import Coupling
-from optimizer.identification.reading import read_log
 
 PLACE = "JOULEPATH_TEST_DATA"
 MISSING = f"{PLACE} does not name the folder of the real logs."

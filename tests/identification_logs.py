@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array, Robot
-from optimizer.identification.log import EffortMeaning, Log, Move
+from optimizer.identification.logs.log import EffortMeaning, Log, Move
 from optimizer.problem.arm import Payload
 
 GRAVITY = np.array([0.0, 0.0, -9.81])

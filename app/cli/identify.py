@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import gzip
+import shutil
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from app.cli import terminal
 from app.cli.answer import OUTPUT, answered, new_id, parsed, validated, write
 
 _GZIP = b"\x1f\x8b"
+_PIECE = 1 << 20
 # a stand-in for the ids of stored logs: the command's are files
 _FILE_ID = "file"
 
@@ -118,8 +121,15 @@ def _json(content: dict[str, Any]) -> bytes:
 
 
 def _packed(file: Path) -> bytes:
-    body = file.read_bytes()
-    return body if body.startswith(_GZIP) else gzip.compress(body, compresslevel=1)
+    with file.open("rb") as plain:
+        if plain.read(len(_GZIP)) == _GZIP:
+            return file.read_bytes()
+        plain.seek(0)
+        packed = BytesIO()
+        # piece by piece: a log can be large
+        with gzip.GzipFile(fileobj=packed, mode="wb", compresslevel=1) as file_of:
+            shutil.copyfileobj(plain, file_of, _PIECE)
+    return packed.getvalue()
 
 
 def summary_of(result: dict[str, Any]) -> dict[str, str]:

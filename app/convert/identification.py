@@ -10,9 +10,9 @@ import numpy as np
 
 from app.schemas.identifications import Fraction, IdentifyRequest
 from optimizer.identification.document import document_of
+from optimizer.identification.fits.payload_fit import Carried
 from optimizer.identification.identify import Identification
 from optimizer.identification.options import Options
-from optimizer.identification.payload_fit import Carried
 from optimizer.identification.results import Validation
 
 

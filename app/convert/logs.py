@@ -7,8 +7,8 @@ from typing import Any
 
 from app.convert.arm import robot_named, to_payload
 from app.schemas.logs import LogSettings
-from optimizer.identification.log import Log
-from optimizer.identification.reading import LogOptions, Reading, read_log
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.reading import LogOptions, Reading, read_log
 
 
 def to_log_options(settings: LogSettings, most_bytes: int) -> LogOptions:

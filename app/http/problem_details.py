@@ -57,7 +57,7 @@ from app.schemas import errors as problems
 from optimizer import exceptions as optimizer_errors
 from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
-from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
+from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
 from optimizer.simulation.simulator import SimulatorMissing
 
 TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {

@@ -23,7 +23,7 @@ class ExcitationRequest(ArmRequest):
 
     parameters: Annotated[list[Part], Field(min_length=1, max_length=3)] = described(
         "Parameters that the motion is to tell apart: `inertials` (base parameters of the links), `rotor` (rotor "
-        "inertias), `friction` (Coulomb, viscous, offset).",
+        "inertias), `friction` (Coulomb, viscous, offset, and load where a joint carries enough).",
         None,
         ["rotor", "friction"],
         default=_ALL,
@@ -84,7 +84,7 @@ class PredictedDeviation(Response):
 
     parameter: str = described(
         "A base parameter as a sum of parameters of bodies (`m`, `mx` …, `Ixx` …) and rotors (`Ia`), each with the "
-        "number of its joint; or `coulomb`, `viscous` or `offset` of a joint.",
+        "number of its joint; or `coulomb`, `viscous`, `offset` or `load` of a joint.",
         None,
         "coulomb2",
     )

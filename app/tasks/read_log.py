@@ -12,7 +12,7 @@ from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.schemas.logs import LogSettings
 from optimizer.exceptions import InvalidProblem, InvalidTable
-from optimizer.identification.reading import read
+from optimizer.identification.logs.reading import read
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from optimizer.replay.sampler import MOST_SAMPLES
 
 Part = Literal["inertials", "rotor", "friction"]
 """Parameters that are to be told apart: base parameters of the links, rotor inertias, friction (Coulomb, viscous,
-offset)."""
+offset, load)."""
 Criterion = Literal["d", "condition"]
 
 MOST_HARMONICS = 10

@@ -12,16 +12,22 @@ from models.robot import Array
 from optimizer.energy.link_regressor import body_parameters
 from optimizer.energy.torque_regressor import torque_regressor
 from optimizer.excitation.excitation_problem import Part
-from optimizer.identification.base_parameters import base_parameters
+from optimizer.identification.arm.base_parameters import base_parameters
+from optimizer.identification.fits.torque_fit import LEAST_LOAD_SPREAD
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.problem.arm import Arm
 
 # speed [rad/s] over which the sign of a speed is smoothed: friction of slower joints tells little
 KNEE = 0.05
+# corner of the load that friction grows with, as a share of the torque limit
+BEND = 0.01
+# poses in which the weight that a joint carries is looked at
+POSES = 200
 
 
 class TorqueColumns:
-    """Columns for n states of an arm: base parameters of its links and rotors, then friction of every joint.
+    """Columns for n states of an arm: base parameters of its links and rotors, then friction of every joint. Load
+    friction is that of the arm's own rigid torque, at the joints whose load varies enough to tell it.
 
     `names` (p,) are those of the columns, `wanted` the indices of those of `parts`. `dynamics` (p,) are the arm's own
     values of links and rotors, zero for friction: with them the columns give the torques without friction.
@@ -35,7 +41,9 @@ class TorqueColumns:
         links = torque_regressor(model, q, v, a, gravity)
         dynamics = ca.horzcat(links, ca.diag(a))[:, list(base.independent)]
         sign = v / ca.sqrt(v * v + KNEE * KNEE)
-        columns = ca.horzcat(dynamics, ca.diag(sign), ca.diag(v), ca.SX.eye(nq))
+        carried = loaded_joints(arm)
+        load = ca.diag(sign * _size(ca.mtimes(links, ca.DM(body_parameters(model))), arm))[:, carried]
+        columns = ca.horzcat(dynamics, ca.diag(sign), ca.diag(v), ca.SX.eye(nq), load)
         seed = ca.SX.sym("seed", nq, columns.shape[1])
         state = ca.vertcat(q, v, a)
         self.shape = (nq, columns.shape[1])
@@ -43,9 +51,10 @@ class TorqueColumns:
         pulled = ca.gradient(ca.dot(seed, columns), state)
         self._pulled_back = ca.Function("pulled_back", [q, v, a, seed], [ca.densify(pulled)]).map(n)
         kinds = ("coulomb", "viscous", "offset")
-        self.names = (*base.expressions, *(f"{kind}{j}" for kind in kinds for j in range(1, nq + 1)))
-        self.dynamics = np.append(base.combination @ _own(model), np.zeros(3 * nq))
-        self.wanted = _wanted(base.independent, nq, parts)
+        friction = [f"{kind}{j}" for kind in kinds for j in range(1, nq + 1)] + [f"load{j + 1}" for j in carried]
+        self.names = (*base.expressions, *friction)
+        self.dynamics = np.append(base.combination @ _own(model), np.zeros(len(friction)))
+        self.wanted = _wanted(base.independent, nq, parts, len(friction))
 
     def values(self, q: Array, v: Array, a: Array) -> Array:
         """Columns (n, nq, p) at states q, v, a (n, nq)."""
@@ -60,13 +69,29 @@ class TorqueColumns:
         return by_q, by_v, by_a
 
 
+def loaded_joints(arm: Arm) -> list[int]:
+    """Joints whose load varies by as much as an identification asks for, by the weight of links and payload."""
+    model, limits = rigid_body_model(arm), arm.active_limits
+    data = model.createData()
+    low, high = np.maximum(limits.q_min, -np.pi), np.minimum(limits.q_max, np.pi)
+    poses = np.random.default_rng(0).uniform(low, high, (POSES, model.nq))
+    weights = np.array([pin.computeGeneralizedGravity(model, data, q) for q in poses])
+    return np.flatnonzero(weights.std(axis=0) >= LEAST_LOAD_SPREAD * arm.robot.limits.tau_max).tolist()
+
+
+def _size(tau: ca.SX, arm: Arm) -> ca.SX:
+    """The size (nq,) of rigid torques (nq,), with a rounded corner."""
+    bend = ca.DM(BEND * arm.robot.limits.tau_max)
+    return ca.sqrt(tau * tau + bend * bend)
+
+
 def _own(model: pin.Model) -> Array:
     return np.append(body_parameters(model), model.armature)
 
 
-def _wanted(independent: Sequence[int], nq: int, parts: Sequence[Part]) -> list[int]:
+def _wanted(independent: Sequence[int], nq: int, parts: Sequence[Part], friction: int) -> list[int]:
     rotors = 10 * nq
     chosen = [k for k, number in enumerate(independent) if ("inertials" if number < rotors else "rotor") in parts]
     if "friction" in parts:
-        chosen += range(len(independent), len(independent) + 3 * nq)
+        chosen += range(len(independent), len(independent) + friction)
     return chosen

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from models.robot import Array
+from optimizer.identification.fits.whole_fit import LINK_NAMES
 from optimizer.identification.results import IdentifiedFigures
-from optimizer.identification.whole_fit import LINK_NAMES
 
 LAW = "identified"
 """Name of the friction law."""

@@ -11,19 +11,23 @@ from models.robot import Array, Mask, Robot
 from models.uncertainty.parameters import LINKS
 from optimizer.energy.link_regressor import BODY, body_parameters
 from optimizer.exceptions import InvalidProblem
-from optimizer.identification.advice import advice_of
-from optimizer.identification.block import own_value
+from optimizer.identification.arm.fitted_arm import own_arm
 from optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadUnknown
-from optimizer.identification.estimate import Estimate, Name
-from optimizer.identification.fit_rows import Rows, rows_of
-from optimizer.identification.fitted_arm import own_arm
-from optimizer.identification.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
-from optimizer.identification.grouped import lag_one
-from optimizer.identification.interval import Spread, sessions, spread_of
-from optimizer.identification.log import Log
-from optimizer.identification.log_errors import EffortNotUsable
+from optimizer.identification.estimates.estimate import Estimate, Name
+from optimizer.identification.estimates.grouped import lag_one
+from optimizer.identification.fits.block import own_value
+from optimizer.identification.fits.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
+from optimizer.identification.fits.payload_fit import Carried, joints_without_gravity, loaded, payload_of
+from optimizer.identification.fits.temperature import temperatures_of
+from optimizer.identification.fits.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
+from optimizer.identification.fits.whole_fit import LINK, LINK_NAMES
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
-from optimizer.identification.payload_fit import Carried, joints_without_gravity, loaded, payload_of
+from optimizer.identification.quality.advice import advice_of
+from optimizer.identification.quality.interval import Spread, sessions, spread_of
+from optimizer.identification.quality.structure import inertials_of, physical_of, structure_of
+from optimizer.identification.quality.validation import Fold, validate
 from optimizer.identification.results import (
     Advice,
     IdentifiedFigures,
@@ -34,12 +38,8 @@ from optimizer.identification.results import (
     Temperatures,
     Validation,
 )
-from optimizer.identification.split import held_out
-from optimizer.identification.structure import inertials_of, physical_of, structure_of
-from optimizer.identification.temperature import temperatures_of
-from optimizer.identification.torque_fit import MOST_RELATIVE_SD, UNSURE, ZERO
-from optimizer.identification.validation import Fold, validate
-from optimizer.identification.whole_fit import LINK, LINK_NAMES
+from optimizer.identification.rows.fit_rows import Rows, rows_of
+from optimizer.identification.rows.split import held_out
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.arm import Payload
 

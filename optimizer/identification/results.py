@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from models.robot import Array
-from optimizer.identification.estimate import Name
+from optimizer.identification.estimates.estimate import Name
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from optimizer import exceptions
 from optimizer.exceptions import JoulepathError
 from optimizer.excitation.errors import ExcitationInfeasible
 from optimizer.identification import errors as identification_errors
-from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
+from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
 from optimizer.simulation.simulator import SimulatorMissing
 from optimizer.solution import CandidateReport, Clearance, UnreachableTarget
 

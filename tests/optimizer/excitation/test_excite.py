@@ -15,13 +15,15 @@ from optimizer.excitation.excite import MOUNTING_PLANE, Excitation, excite
 from optimizer.excitation.fourier import FourierBasis
 from optimizer.excitation.information import Information
 from optimizer.excitation.torque_columns import TorqueColumns
-from optimizer.problem.arm import Arm
+from optimizer.kinematics.rigid_body_model import rigid_body_model
+from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.scene import Obstacle, Scene, Sphere
 from optimizer.problem.tool_cone import ToolCone
 
 ARM = Arm(robot=load_robot("ur5e"))
 # of finite differences over 2e-6 of a cost with corners in its second derivative
 GRADIENT = 1e-3
+FRICTION = ("coulomb", "viscous", "offset", "load")
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +53,9 @@ def test_limits_clearance_and_condition(found: Excitation) -> None:
     assert certificate.clearance is not None and certificate.clearance.min_clearance >= 0.02
     assert found.scaled_condition <= 60 < found.condition
     assert (found.starts, found.feasible) == (1, 1)
-    assert len(found.names) == len(found.predicted_sd) == 40 + 18
+    # the load of shoulder and elbow varies enough to tell its friction
+    assert found.names[40 + 18 :] == ("load2", "load3")
+    assert len(found.names) == len(found.predicted_sd)
 
 
 def test_the_plane_that_the_arm_stands_on_is_kept(found: Excitation) -> None:
@@ -99,6 +103,25 @@ def test_the_columns_give_pinocchios_torques() -> None:
     # independent columns are found to 1e-8
     assert np.abs(columns.values(q, v, a) @ columns.dynamics - expected).max() < 1e-6
     assert len(columns.wanted) == 40
+
+
+def test_load_friction_is_a_column() -> None:
+    """That of the rigid torque, the payload included; none at joints that carry little."""
+    loaded = Arm(robot=ARM.robot, payload=Payload(4.0, np.array([0.0, 0.0, 0.1])))
+    columns = TorqueColumns(loaded, ("friction",), 7)
+    random = np.random.default_rng(3)
+    q, v, a = random.uniform(-2, 2, (3, 7, 6))
+    v += np.sign(v)  # where the sign of the speed is one
+    model = rigid_body_model(loaded)
+    model.armature = np.zeros(6)
+    tau = np.array([pin.rnea(model, model.createData(), *row) for row in zip(q, v, a, strict=True)])
+    values = columns.values(q, v, a)
+    for name in ("load2", "load3"):
+        joint, column = int(name[-1]) - 1, values[:, :, columns.names.index(name)]
+        assert column[:, joint] == pytest.approx(np.abs(tau[:, joint]) * np.sign(v[:, joint]), rel=0.02, abs=1.6)
+        assert not np.delete(column, joint, axis=1).any()
+    assert {"load1", "load6"}.isdisjoint(columns.names)
+    assert len(columns.wanted) == len([each for each in columns.names if each[:-1] in FRICTION])
 
 
 def test_series_at_rest_have_two_directions_fewer() -> None:

@@ -13,8 +13,8 @@ from optimizer.exceptions import InvalidProblem
 from optimizer.identification.document import document_of
 from optimizer.identification.errors import NoPowerChannel, NotExcited, NothingHeldOut
 from optimizer.identification.identify import Identification, fit
-from optimizer.identification.log import Log, Move
-from optimizer.identification.log_errors import EffortNotUsable
+from optimizer.identification.logs.log import Log, Move
+from optimizer.identification.logs.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
 from optimizer.problem.arm import Payload
 from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of

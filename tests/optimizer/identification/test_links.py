@@ -15,12 +15,12 @@ from models.robot import Array, Robot
 from models.uncertainty.document import covariance_of, with_document
 from models.uncertainty.parameters import LINKS
 from optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
-from optimizer.identification.base_parameters import base_parameters
-from optimizer.identification.consistent import solve_consistent
+from optimizer.identification.arm.base_parameters import base_parameters
+from optimizer.identification.arm.pseudo_inertia import nearness, pseudo_inertias
 from optimizer.identification.document import document_of
+from optimizer.identification.fits.consistent import solve_consistent
 from optimizer.identification.identify import fit
 from optimizer.identification.options import Options
-from optimizer.identification.pseudo_inertia import nearness, pseudo_inertias
 from tests.identification_logs import recorded, truth_of
 
 ROUNDING = 1e-9

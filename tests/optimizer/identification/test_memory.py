@@ -1,12 +1,18 @@
-"""The memory of a fit: logs can be long."""
+"""The memory of reading a log and of a fit: logs can be long."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
+from itertools import cycle
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from models.registry import load_robot
+from tests.identification_logs import recorded, truth_of
 
 ROOT = Path(__file__).parents[3]
 # of the rows and columns of a fit with the links' inertials, beside the log
@@ -17,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 from models.registry import load_robot
 from optimizer.identification.identify import fit
-from optimizer.identification.log import Move
+from optimizer.identification.logs.log import Move
 from optimizer.identification.options import Options
 from tests.identification_logs import recorded, truth_of
 robot = load_robot("ur10e")
@@ -30,6 +36,44 @@ before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 fit(robot, [log], Options(refit=True))
 print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
 """
+
+# of the whole process, from the file to the figures
+MOST_OF_ALL = 500 * 2**20
+ROWS = 1_000_000
+FROM_FILE = """
+import resource, sys
+from pathlib import Path
+from models.registry import load_robot
+from optimizer.identification.identify import fit
+from optimizer.identification.options import Options
+from optimizer.identification.logs.reading import read_log
+robot = load_robot("ur10e")
+log = read_log(Path(sys.argv[1]), robot)
+fit(robot, [log], Options(refit=True))
+print(len(log.time), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+def lines() -> Iterator[str]:
+    """Of a log with all channels, which repeats the same moves."""
+    robot = load_robot("ur10e")
+    short = recorded(robot, truth_of(robot), moves=30, rate=500.0)
+    names = ["t", *(f"{part}{joint}" for part in "qvai" for joint in range(1, 7)), "P"]
+    table = np.hstack([short.q, short.v, short.a, short.current, short.power[:, None]])
+    cells = [",".join(f"{value:.5g}" for value in row) for row in table.tolist()]
+    yield ",".join(names)
+    yield from (f"{k / 500:.3f},{row}" for k, row in zip(range(ROWS), cycle(cells), strict=False))
+
+
+@pytest.mark.long
+def test_a_million_rows_of_a_file_are_refitted_within_memory(tmp_path: Path) -> None:
+    file = tmp_path / "log.csv"
+    with file.open("w") as written:
+        written.writelines(f"{line}\n" for line in lines())
+    command = [sys.executable, "-c", FROM_FILE, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    rows, memory = (int(each) for each in done.stdout.split())
+    assert rows == ROWS and 0 < memory < MOST_OF_ALL
 
 
 @pytest.mark.long

@@ -12,10 +12,10 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.energy.link_regressor import body_parameters, rigid_regressor, rigid_torques
 from optimizer.exceptions import InvalidProblem
-from optimizer.identification.base_parameters import base_parameters
-from optimizer.identification.base_wrench import base_wrench_regressor, fit_base_wrench
-from optimizer.identification.periodic import mean_period, most_likely
-from optimizer.identification.threshold import velocity_threshold
+from optimizer.identification.arm.base_parameters import base_parameters
+from optimizer.identification.fits.base_wrench import base_wrench_regressor, fit_base_wrench
+from optimizer.identification.fits.periodic import mean_period, most_likely
+from optimizer.identification.fits.threshold import velocity_threshold
 
 ROBOT = load_robot("ur5e")
 # of the standard deviations: what one of a thousand figures exceeds

@@ -10,10 +10,10 @@ import pytest
 from models.registry import load_robot
 from optimizer.exceptions import InvalidProblem
 from optimizer.identification.errors import NotExcited, PayloadUnknown
+from optimizer.identification.fits.payload_fit import Carried
 from optimizer.identification.identify import fit
-from optimizer.identification.log import Log
+from optimizer.identification.logs.log import Log
 from optimizer.identification.options import Options
-from optimizer.identification.payload_fit import Carried
 from optimizer.problem.arm import Payload
 from tests.identification_logs import Noise, recorded, truth_of
 

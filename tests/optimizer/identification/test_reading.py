@@ -14,9 +14,9 @@ import pytest
 
 from models.registry import load_robot
 from optimizer.exceptions import InvalidProblem, InvalidTable
-from optimizer.identification.log import Log
-from optimizer.identification.log_errors import EffortNotUsable, LogTooLarge
-from optimizer.identification.reading import LogOptions, read, read_log
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.log_errors import EffortNotUsable, LogTooLarge
+from optimizer.identification.logs.reading import LogOptions, read, read_log
 from optimizer.problem.arm import Payload
 from tests.identification_logs import SILENT, Form, Recording, csv_of, recorded, rigid_torques, truth_of, with_current
 
@@ -333,7 +333,7 @@ def test_a_million_rows_stay_within_memory(tmp_path: Path) -> None:
             np.savetxt(out, np.column_stack([t, q, q, q, q]), fmt="%.7g", delimiter=",")
     script = (
         "import resource, sys\nfrom pathlib import Path\nfrom models.registry import load_robot\n"
-        "from optimizer.identification.reading import read_log\nrobot = load_robot('ur5e')\n"
+        "from optimizer.identification.logs.reading import read_log\nrobot = load_robot('ur5e')\n"
         "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "log = read_log(Path(sys.argv[1]), robot, effort='external')\n"
         "print(len(log.time), (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)"

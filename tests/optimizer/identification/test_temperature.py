@@ -10,7 +10,7 @@ import pytest
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.identification.identify import fit
-from optimizer.identification.log import Log
+from optimizer.identification.logs.log import Log
 from optimizer.identification.options import Options
 from tests.identification_logs import recorded, rigid_torques, truth_of
 

@@ -1,0 +1,1 @@
+"""An arm with fitted figures: what its torques and its power are made of."""

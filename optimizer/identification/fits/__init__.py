@@ -1,0 +1,1 @@
+"""Fits, one kind per file: torques, links, power, payload, temperature."""

@@ -1,0 +1,187 @@
+"""One fit: from rows of logs to an arm with fitted figures, and how well they are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Array, Robot
+from optimizer.energy.link_regressor import body_parameters
+from optimizer.identification.arm.fitted_arm import FittedArm, own_arm, with_torques
+from optimizer.identification.arm.power_model import Electrics, packed_size
+from optimizer.identification.estimates.estimate import Estimate, Name, joined
+from optimizer.identification.fits.power_fit import Prior, fit_power, prior_of
+from optimizer.identification.fits.torque_fit import fit_torques
+from optimizer.identification.fits.whole_fit import fit_whole
+from optimizer.identification.options import Options
+from optimizer.identification.rows.clusters import Clusters, clusters_of
+from optimizer.identification.rows.fit_rows import Rows
+
+# share of the greatest variance, of parameters that are scaled to one size: below it, a common error is rounding
+LEAST_ERROR = 1e-3
+LINK_MASS_SCALE = "link_mass_scale"
+"""The figure of the factor on the masses of all links."""
+# share of a figure's standard deviation before the log: beyond it, the log did not tell the figure
+WORTH = 0.7
+HARDLY = "The logs hardly tell it from the robot's own."
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """The arm with the fitted figures, the estimate behind it, and the arms (G,) with each cluster left out.
+
+    What the fit takes from the robot's own figures has errors: the `tilted` arms have one of them each, in the torques
+    and in what the electrics make of it. `drift` is the covariance of the packed electrics by their own ranges.
+    `mean_power` [W] is that of the rows, NaN without power.
+    """
+
+    arm: FittedArm
+    estimate: Estimate
+    clusters: Clusters
+    without: tuple[FittedArm, ...]
+    tilted: tuple[FittedArm, ...]
+    drift: Array
+    mean_power: float
+
+
+def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
+    """Fits what the rows have: torques, power or both."""
+    clusters, arm = clusters_of(rows), own_arm(robot, options.knee)
+    torque, with_power = motor_torque(arm, rows), bool(np.isfinite(rows.power).any())
+    fitted = Fitted(
+        arm=arm,
+        estimate=joined([]),
+        clusters=clusters,
+        without=(arm,) * clusters.count,
+        tilted=(),
+        drift=np.zeros((packed_size(robot.nq),) * 2),
+        mean_power=float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest])) if with_power else np.nan,
+    )
+    errors = np.zeros((0, 0))
+    if np.isfinite(torque).any():
+        fitted, errors = _with_torque(robot, rows, torque, fitted, options)
+    return _with_power(robot, rows, fitted, errors, options) if with_power else fitted
+
+
+def _with_torque(robot: Robot, rows: Rows, torque: Array, fitted: Fitted, options: Options) -> tuple[Fitted, Array]:
+    """With the torques fitted, and the errors (k, p) of the tilted arms' parameters."""
+    own, links = fitted.arm, body_parameters(robot.model)
+    found = (fit_whole if options.refit else fit_torques)(robot, rows, torque, fitted.clusters, options)
+    terms = len(found.names) - (len(links) if options.refit else 0)
+
+    def arm(values: Array) -> FittedArm:
+        made = with_torques(own, found.names[:terms], values[:terms], tuple(options.couplings))
+        return replace(made, bodies=values[terms:] - links) if options.refit else made
+
+    errors = _errors(found.drift)
+    made = replace(
+        fitted,
+        arm=arm(found.value),
+        estimate=found,
+        without=tuple(arm(values) for values in found.replicates),
+        tilted=tuple(arm(found.value + error) for error in errors),
+    )
+    return made, errors
+
+
+def _errors(covariance: Array) -> Array:
+    """Independent errors (k, p) of parameters (p,), whose squares add up to their covariance but for rounding."""
+    sd = np.sqrt(np.diag(covariance))
+    scale = np.where(sd > 0, sd, 1.0)
+    sizes, directions = np.linalg.eigh(covariance / np.outer(scale, scale))
+    kept = sizes > LEAST_ERROR * sizes[-1]
+    return np.asarray(np.sqrt(sizes[kept])[:, None] * directions[:, kept].T * sd)
+
+
+def motor_torque(arm: FittedArm, rows: Rows) -> Array:
+    """The logged motor torques (n, nq) [N·m], NaN where there are none."""
+    return rows.effort * arm.torque_constant if rows.current else rows.effort
+
+
+def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options: Options) -> Fitted:
+    """With the power fitted, whose figures follow the `errors` (k, p) of the tilted arms."""
+    use, clusters, arm = np.isfinite(rows.power), fitted.clusters, fitted.arm
+    part, of_row = rows.take(use), Clusters(clusters.of_row[use], clusters.count)
+    torque_known = len(fitted.estimate.names) > 0
+    prior = prior_of(robot, torque_known)
+    fit = fit_power(
+        arm.motion(part), part.power, arm.torque_constant, arm.regeneration, prior, of_row, options.estimator == "irls"
+    )
+    # an error of the torques moves the electrics, too: one step of the fit with each of them
+    others = fitted.without if torque_known else ()
+    here = replace(arm, electrics=Electrics.unpacked(fit.value)).power(part)[0]
+    moved = np.array([
+        fit.gain @ (here - replace(each, electrics=Electrics.unpacked(fit.value)).power(part)[0])
+        for each in (*others, *fitted.tilted)
+    ]).reshape(-1, len(fit.value))  # fmt: skip
+    shifts = moved[len(others) :]
+    replicates = fit.replicates + (moved[: len(others)] if torque_known else 0.0)
+    turn, constant, names = _figures_of_power(robot, prior, torque_known)
+    estimate = Estimate(
+        names,
+        turn @ fit.value + constant,
+        replicates @ turn.T + constant,
+        (),
+        turn @ (fit.drift + shifts.T @ shifts) @ turn.T,
+    )
+    before = turn @ np.linalg.inv(prior.precision) @ turn.T
+    untold = np.diag(estimate.covariance) > WORTH**2 * np.diag(before)
+    estimate = replace(estimate, why=tuple(HARDLY if each else "" for each in untold.tolist()))
+    # of factors, as they are scaled in the arm
+    relative, factors = np.ones(packed_size(robot.nq)), [*range(1 + 2 * robot.nq, 1 + 5 * robot.nq), -1]
+    relative[factors] /= np.maximum(fit.value[factors], 1e-3)
+    return replace(
+        fitted,
+        arm=_with_electrics(arm, fit.value, torque_known),
+        estimate=joined([fitted.estimate, estimate], errors.T @ shifts @ turn.T if torque_known else None),
+        without=tuple(
+            _with_electrics(each, values, torque_known) for each, values in zip(fitted.without, replicates, strict=True)
+        ),
+        tilted=tuple(
+            _with_electrics(each, fit.value + shift, torque_known)
+            for each, shift in zip(fitted.tilted, shifts, strict=True)
+        ),
+        drift=np.outer(relative, relative) * fit.drift,
+    )
+
+
+def _with_electrics(arm: FittedArm, values: Array, torque_known: bool) -> FittedArm:
+    electrics = Electrics.unpacked(values)
+    plain = Electrics.plain(electrics.idle, electrics.copper, electrics.inverter)
+    if torque_known:
+        return replace(arm, electrics=plain)
+    return replace(
+        arm,
+        coulomb=electrics.dry * arm.coulomb,
+        curved=electrics.dry * arm.curved,
+        viscous=electrics.viscous * arm.viscous,
+        rotor_inertia=electrics.rotor * arm.rotor_inertia,
+        load=arm.load + electrics.load,
+        offset=arm.offset + electrics.offset,
+        links=arm.links * electrics.links,
+        electrics=plain,
+    )
+
+
+def _figures_of_power(robot: Robot, prior: Prior, torque_known: bool) -> tuple[Array, Array, tuple[Name, ...]]:
+    """The matrix (f, p) and the constants (f,) that make figures of packed ones (p,), and the figures' names."""
+    nq, own, every = robot.nq, own_arm(robot), np.eye(packed_size(robot.nq))
+    names: list[Name] = [("idle_power", None)]
+    names += [(figure, joint) for figure in ("copper", "inverter_linear") for joint in range(nq)]
+    turn = [*every[: len(names)]]
+    constant = [0.0] * len(names)
+    if not torque_known:
+        for figure, part in (("coulomb", 2), ("curved", 2), ("viscous", 3), ("rotor_inertia", 4)):
+            for joint in np.flatnonzero(getattr(own, figure)).tolist():
+                names.append((figure, joint))
+                turn.append(getattr(own, figure)[joint] * every[1 + part * nq + joint])
+                constant.append(0.0)
+        for joint in np.flatnonzero(own.load + prior.mean[1 + 5 * nq : 1 + 6 * nq]).tolist():
+            names.append(("load", joint))
+            turn.append(every[1 + 5 * nq + joint])
+            constant.append(float(own.load[joint]))
+        names.append((LINK_MASS_SCALE, None))
+        turn.append(every[-1])
+        constant.append(0.0)
+    return np.array(turn), np.array(constant), tuple(names)

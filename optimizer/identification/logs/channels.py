@@ -1,0 +1,37 @@
+"""The channels of a log, one by one, as its report lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from models.robot import Array
+from optimizer.identification.logs.columns import Columns, Group
+from optimizer.identification.logs.filters import noise
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.log_report import Channel
+
+_UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s²", "power": "W", "temperature": "°C"}
+_EFFORT_UNITS = {"current": "A", "torque": "N·m", "external": "N·m"}
+
+
+def channels_of(log: Log, columns: Columns, effort: Group | None) -> tuple[Channel, ...]:
+    """All channels of a log from these columns, whose efforts come from the group `effort`."""
+    return tuple(_channels(log, columns, effort))
+
+
+def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Channel]:
+    units = _UNITS | {"effort": _EFFORT_UNITS.get(log.effort_meaning or "", "")}
+    sources: dict[str, Group | None] = {"q": "q", "v": "v", "a": "a", "effort": effort, "temperature": "temperature"}
+    for name, group in sources.items():
+        values: Array | None = getattr(log, name)
+        if values is None:
+            continue
+        indices = columns.groups.get(group) if group is not None else None
+        for j, size in enumerate(noise(values, log.rate)):
+            column = None if indices is None else columns.names[indices[j]]
+            low, high = float(values[:, j].min()), float(values[:, j].max())
+            yield Channel(f"{name}{j + 1}", column, units[name], low, high, float(size))
+    if log.power is not None:
+        column = " · ".join(columns.names[k] for k in columns.groups["power"])
+        (size,) = noise(log.power[:, None], log.rate)
+        yield Channel("power", column, "W", float(log.power.min()), float(log.power.max()), float(size))

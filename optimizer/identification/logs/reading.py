@@ -1,0 +1,200 @@
+"""Reads a log of one arm from a CSV file, or a packed one, into SI units on a uniform grid."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import pi
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from models.robot import Array, Robot
+from optimizer.csv_table import SEPARATORS, header_of
+from optimizer.exceptions import InvalidProblem, InvalidTable
+from optimizer.identification.logs.channels import channels_of
+from optimizer.identification.logs.columns import Columns, Group, mapped, recognised
+from optimizer.identification.logs.effort import effort_report
+from optimizer.identification.logs.filters import derivative
+from optimizer.identification.logs.grid import Grid, grid_of
+from optimizer.identification.logs.log import EffortMeaning, Log
+from optimizer.identification.logs.log_report import LogReport
+from optimizer.identification.logs.log_warnings import log_warnings
+from optimizer.identification.logs.moves import cut, still_by_command, still_by_speed
+from optimizer.identification.logs.rows import LONGEST_LINE, MOST_BYTES, Rows, Source
+from optimizer.identification.logs.usable_effort import usable
+from optimizer.problem.arm import Payload
+from optimizer.problem.arrays import frozen
+from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
+
+_OF_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
+_MOST_ANGLE = 20 * pi  # rad, ten turns
+_MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
+_MOST_OF_OTHERS = 1e6  # any unit
+_EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
+
+
+@dataclass(frozen=True)
+class LogOptions:
+    """What a file of a log does not say.
+
+    `payload`: what the arm carried; None: what the log says, else nothing. `gravity` (3,) [m/s²] in the base frame.
+    `columns` names the columns where their names are not known: see `mapped`. `units` are those of the joints,
+    `current_units` those of currents. `effort` says what the efforts are; `auto` finds it out. `most_bytes` is the
+    greatest size of the file after unpacking.
+    """
+
+    payload: Payload | None = None
+    gravity: Sequence[float] | Array = (0.0, 0.0, -9.81)
+    columns: Mapping[str, str | Sequence[str]] | None = None
+    units: Literal["rad", "deg"] = "rad"
+    current_units: Literal["A", "mA"] = "A"
+    effort: EffortMeaning | Literal["auto"] = "auto"
+    name: str | None = None
+    tags: tuple[str, ...] = ()
+    most_bytes: int = MOST_BYTES
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A log, and what was seen while it was read."""
+
+    log: Log
+    report: LogReport
+
+
+@dataclass
+class _Channels:
+    """Channels of a log, (rows, k) each, in SI units; taken out one by one, so that memory is freed early."""
+
+    grid: Grid
+    columns: Columns
+    values: dict[Group, Array] = field(default_factory=dict)
+
+    def take(self, group: Group) -> Array | None:
+        """The channels on the grid."""
+        values = self.values.pop(group, None)
+        if values is None:
+            return None
+        return self.grid.resampled(values[self.grid.kept] if self.grid.repeated else values, group in ("q", "v"))
+
+
+def read_log(source: Path | bytes, robot: Robot, **options: Any) -> Log:
+    """The log in a CSV file, which may be gzip. `options` are those of `LogOptions`. For errors see `read`."""
+    return read(source, robot, LogOptions(**options)).log
+
+
+def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
+    """The log in a CSV file, which may be gzip, and what was seen in it.
+
+    Without speeds or accelerations, they are derivatives of what is there, low-passed without delay.
+
+    Raises InvalidTable, with line and column, LogTooLarge, EffortNotUsable, or InvalidProblem for wrong options.
+    """
+    gravity = frozen(options.gravity, (3,), "gravity")
+    channels, dropped = _channels(source, robot, options)
+    grid, columns = channels.grid, channels.columns
+    rows = len(grid.kept)
+    payload, payload_known = _payload(channels, options.payload)
+    q = channels.take("q")
+    assert q is not None
+    logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
+    v = logged["v"] if logged["v"] is not None else derivative(q, grid.rate)
+    a = logged["a"] if logged["a"] is not None else derivative(v, grid.rate)
+    remarks: list[str] = []
+    named = next((group for group in _EFFORTS if group in channels.values), None)
+    effort, found = None, None
+    if named is not None:
+        effort = channels.take(named)
+        assert effort is not None
+        found = usable(effort_report(robot, payload, gravity, q, v, a, effort), named, options.effort, remarks)
+    power = channels.take("power")
+    still = still_by_speed(v, grid.rate) if logged["commanded"] is None else still_by_command(logged["commanded"])
+    log = Log(
+        robot=robot.name,
+        time=grid.time,
+        q=q,
+        v=v,
+        a=a,
+        effort=effort,
+        effort_meaning=None if found is None else found.meaning,
+        power=None if power is None else power.prod(axis=1),
+        temperature=logged["temperature"],
+        payload=payload,
+        payload_known=payload_known,
+        gravity=gravity,
+        rate=grid.rate,
+        moves=cut(still, grid.rate, grid.gaps),
+        name=options.name,
+        tags=tuple(options.tags),
+    )
+    remarks += log_warnings(log, grid, columns, logged["v"] is not None)
+    return Reading(log, LogReport(rows, dropped, grid.jitter, channels_of(log, columns, named), found, tuple(remarks)))
+
+
+def _channels(source: Path | bytes, robot: Robot, options: LogOptions) -> tuple[_Channels, int]:
+    """The channels of the file, in SI units, and the number of dropped lines."""
+    with Source(source, options.most_bytes) as file:
+        names, separator = header_of(file, LONGEST_LINE, SEPARATORS + " ")
+        nq = robot.nq
+        columns = recognised(names, nq) if options.columns is None else mapped(names, options.columns, nq)
+        used = columns.used
+        rows = Rows(file, names, separator, used)
+        where = {group: [used.index(k) for k in indices] for group, indices in columns.groups.items()}
+        scales: dict[Group, float] = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
+        scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
+        # arrays that grow in place: a log can fill half of the memory
+        parts = {group: array("d") for group in where}
+        times, numbers = array("d"), array("d")
+        for lines, block in rows.blocks():
+            times.frombytes(block[:, used.index(columns.time)].tobytes())
+            numbers.frombytes(lines.astype(float).tobytes())
+            for group, indices in where.items():
+                parts[group].frombytes((block[:, indices] * scales.get(group, 1.0)).tobytes())
+            _check_sizes(block, lines, rows, where, scales)
+            _check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
+    grid = grid_of(np.frombuffer(times), np.frombuffer(numbers), names[columns.time])
+    values = {group: np.frombuffer(part).reshape(-1, len(where[group])) for group, part in parts.items()}
+    return _Channels(grid, columns, values), rows.dropped
+
+
+def _check_sizes(
+    block: Array, lines: Array, rows: Rows, where: Mapping[Group, Sequence[int]], scales: Mapping[Group, float]
+) -> None:
+    """Raises InvalidTable for a number that no arm has: it would spoil everything that is computed."""
+    for group, indices in where.items():
+        wrong = np.argwhere(np.abs(block[:, indices]) * scales.get(group, 1.0) > _MOST.get(group, _MOST_OF_OTHERS))
+        if len(wrong):
+            at, column = wrong[0].tolist()
+            row, name = int(lines[at]), rows.columns[rows.used[indices[column]]]
+            raise InvalidTable(f"{name} in line {row} is too large to be a robot's: correct or delete it.", row, name)
+
+
+def _check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> None:
+    """Raises InvalidTable if q (n, joints), in lines `rows` (n,), is rather in degrees: far beyond the range of two
+    joints, or by many turns beyond that of one, as the last joint of some arms turns without end."""
+    ratios = np.abs(q) / np.maximum(np.abs(robot.limits.q_min), np.abs(robot.limits.q_max))
+    wrong = ((ratios > FAR_OUT).sum(axis=1) > 1) | (np.abs(q) > _MOST_ANGLE).any(axis=1)
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        row, name = int(rows[at]), names[int(ratios[at].argmax())]
+        raise InvalidTable(
+            f"{name} in line {row} is far beyond the joint's range and looks like degrees: give radians, or units=deg.",
+            row,
+            name,
+        )
+
+
+def _payload(channels: _Channels, given: Payload | None) -> tuple[Payload, bool]:
+    """What the arm carried, and whether anybody said so. Raises InvalidProblem for a mass that no body has."""
+    logged = channels.values.pop("payload", None)
+    if given is not None:
+        return given, True
+    if logged is None:
+        return Payload(), False
+    if np.ptp(logged, axis=0).max() > 0:
+        raise InvalidProblem("payload", "The payload changes within the log: divide it there, or give `payload`.")
+    mass, *com = logged[0].tolist()
+    return Payload(mass, np.array(com or [0.0, 0.0, 0.0])), True

@@ -1,0 +1,1 @@
+"""What fits see of logs: rows, the moves and motions that they belong to, and what is held out."""
