@@ -36,13 +36,13 @@ from optimizer.trajectories.spline import sample
 from optimizer.trajectories.time_scalings import quintic_spline
 
 # steps of the path; ratio of the durations of a cell, cells that share their boxes, and the greatest ratio of all cells
-STEPS, CELL, GROUP, WINDOW = 24, 1.06, 2, 4.0
+STEPS, CELL, GROUP, WINDOW = 64, 1.02, 2, 4.0
 # durations at which the plain bound is compared with the best energy
 PROBES = 400
 # multipliers' factors, and κ + μ in units of the friction's stiffness, of which μ is a share
-SCALES, STIFFNESSES, MIXING = (0.25, 0.5, 0.8), (0.8, 1.2), 0.2
+SCALES, STIFFNESSES, MIXING = (0.25, 0.5, 0.8), (0.7, 1.0, 1.4), 0.2
 # the terms along a path take less than this [s], and so does a bound from them: none is begun with less left
-TERMS_TIME, BOUND_TIME = 1.0, 0.2
+TERMS_TIME, BOUND_TIME = 1.5, 0.2
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
 WEIGHTLESS = 1e-9
 GRID_JOINTS = 2
