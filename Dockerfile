@@ -30,8 +30,9 @@ COPY app app
 RUN mv /tmp/studio/app/static/studio/vendor app/static/studio/
 ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 # Importing every module shows that nothing needed was left behind, and leaves the bytecode of what is used.
+COPY scripts/import_all.py /tmp/
 RUN mkdir /opt/matplotlib \
-    && python -c "import importlib, pkgutil; [importlib.import_module(m.name) for p in ('app', 'optimizer', 'models') for m in pkgutil.walk_packages([p], p + '.') if not m.name.endswith('__main__')]" \
+    && python /tmp/import_all.py \
     && python -m optimizer.energy.precompile
 
 FROM ${BASE_IMAGE}
@@ -54,7 +55,8 @@ ENV PATH=/opt/joulepath/venv/bin:$PATH \
     JOULEPATH_HOST=0.0.0.0 \
     JOULEPATH_OPEN=1 \
     PORT=8000
-USER joulepath
+# by number, so that an orchestrator can tell that it is not root
+USER 10001
 # studies outlast the container where a volume is mounted here
 VOLUME /var/lib/joulepath
 EXPOSE 8000

@@ -224,6 +224,7 @@ def cancel(given: Any) -> tuple[Results, bool]:
     """Prints and returns the times from a cancel to the end of the process that works on the job."""
     hard = {"optimize": {**random(given.seed, 1)[0]["optimize"], "deadline": 100.0}}
     hard["optimize"] |= {"objective": "mechanical", "duration": {"max": 600.0}, "start": {"pose": _POSE}}
+    hard["optimize"]["sample_period"] = 0.05  # an answer has 20,000 samples at most
     times = []
     with running(JOULEPATH_WORKERS=f"{WORKERS}") as service, closing(service.client()) as client:
         for _ in range(given.cancels):

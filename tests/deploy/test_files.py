@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,28 @@ def test_compose_keeps_the_cluster_apart(compose: dict[str, Any]) -> None:
             assert member["command"][4] == members["joulepath-1"]["environment"]["JOULEPATH_CLUSTER"]
             assert member["networks"] == ["cluster"]
         assert (ROOT / member["build"]["args"]["LOCK"]).exists()
+
+
+def test_the_image_is_made_of_what_its_context_has(compose: dict[str, Any]) -> None:
+    """What `.dockerignore` leaves out cannot be copied."""
+    sent = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    lines = re.findall(r"^COPY (?!--from)(.*) \S+$", (ROOT / "Dockerfile").read_text(), re.M)
+    locks = {
+        "requirements.lock",
+        *(each["build"]["args"]["LOCK"] for each in compose["services"].values() if "build" in each),
+    }
+    sources = {lock if name == "${LOCK}" else name for line in lines for name in line.split() for lock in locks}
+    assert len(sources) > 8
+    for name in sources:
+        assert (ROOT / name).exists(), name
+        assert any(name == each or name.startswith(f"{each}/") for each in sent), f"{name} is left out of the context"
+
+
+def test_every_module_can_be_imported() -> None:
+    """As the image does when it is built."""
+    command = [sys.executable, ROOT / "scripts" / "import_all.py"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_unit_sets_what_there_is() -> None:
