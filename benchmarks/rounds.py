@@ -3,10 +3,13 @@
     python -m benchmarks.rounds --count 20
     python -m benchmarks.rounds --count 5 --stops 12
     python -m benchmarks.rounds --count 10 --time 1.5
+    python -m benchmarks.rounds --count 20 --stops 5 --passes 4
 
 A UR5e starts from rest over the table, takes up 2 kg at every other stop, puts it down at the next one, and comes back.
 Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each. Collisions are ignored,
-so that every round has an answer. With `--time`, each round gets so many times the duration of least energy.
+so that every round has an answer. With `--time`, each round gets so many times the duration of least energy. With
+`--passes`, it passes through the first stops without a rest, and carries the part nowhere; then a round that needs more
+than the one that stops there ends the benchmark.
 """
 
 from __future__ import annotations
@@ -44,7 +47,7 @@ def poses(rng: np.random.Generator, count: int) -> list[Pose]:
     return found
 
 
-def rounds(seed: int, count: int, stops: int, deadline: float) -> Iterator[WorkRound]:
+def rounds(seed: int, count: int, stops: int, deadline: float, passes: int = 0) -> Iterator[WorkRound]:
     """The rounds, each with a generator of its own."""
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
     for k in range(count):
@@ -52,12 +55,16 @@ def rounds(seed: int, count: int, stops: int, deadline: float) -> Iterator[WorkR
         yield WorkRound(
             arm=arm,
             start=HOME,
-            stops=[
-                Stop(name=str(j), target=pose, dwell=0.3, payload=NOTHING if j % 2 else PART)
-                for j, pose in enumerate(targets)
-            ],
+            stops=[_stop(j, pose, passes) for j, pose in enumerate(targets)],
             deadline=deadline,
         )
+
+
+def _stop(number: int, pose: Pose, passes: int) -> Stop:
+    if passes:
+        passed = number < passes
+        return Stop(name=str(number), target=pose, dwell=0.0 if passed else 0.3, passed=passed)
+    return Stop(name=str(number), target=pose, dwell=0.3, payload=NOTHING if number % 2 else PART)
 
 
 def in_time(asked: WorkRound, factor: float) -> WorkRound:
@@ -72,6 +79,7 @@ def main() -> None:
     arguments.add_argument("--count", type=int, default=20, help="rounds (%(default)s)")
     arguments.add_argument("--stops", type=int, default=6, help="stops of a round (%(default)s)")
     arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a round [s] (%(default)s)")
+    arguments.add_argument("--passes", type=int, default=0, help="stops that are passed (%(default)s)")
     arguments.add_argument("--time", type=float, help="give each round so many times its own duration")
     given = arguments.parse_args()
     on_one_core()
@@ -79,10 +87,12 @@ def main() -> None:
     optimize_round(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
     found: dict[str, list[float]] = {}
     optimal = 0
-    for own in rounds(given.seed, given.count, given.stops, given.deadline):
+    for own in rounds(given.seed, given.count, given.stops, given.deadline, given.passes):
         asked = own if given.time is None else in_time(own, given.time)
         began = time.perf_counter()
         answer = optimize_round(asked)
+        if any(each.name == "stopping" and each.saving < 0 for each in answer.baselines):
+            raise SystemExit("passing needs more than stopping")
         row = {f"saved against {each.name}": each.saving for each in answer.baselines}
         row["gap"] = 1 - answer.lower_bound / answer.energy.electrical.total
         row["time [s]"] = time.perf_counter() - began

@@ -31,6 +31,7 @@ from optimizer.problem.tool_cone import ToolCone
 from optimizer.problem.tool_path import ToolPath
 from optimizer.solution import Certificate, Energy
 from optimizer.trajectories.limit_ratios import limit_ratios
+from optimizer.trajectories.passing import deviations
 from optimizer.trajectories.quadrature import grid, simpson_weights
 from optimizer.trajectories.spline import Spline
 
@@ -63,6 +64,7 @@ def certify(problem: Problem, spline: Spline, q_start: Array, q_goal: Array, rep
         start_error=replay.end_error(single(problem.start), q_start, replay.q[0]),
         goal_error=replay.end_error(single(problem.goal), q_goal, replay.q[-1]),
         rest_error=replay.rest_error,
+        pass_error=float(deviations(spline.curve, np.array(problem.passes)).max()) if problem.passes else 0.0,
         energy_error=_worst(
             relative_error(energy.electrical.total, reported.electrical.total),
             relative_error(energy.mechanical.total, reported.mechanical.total),

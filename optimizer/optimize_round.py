@@ -4,15 +4,19 @@ stops that need the least energy together."""
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded
+from optimizer.energy.interval import Known
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
+from optimizer.sequence.against_stopping import SHARE, Rested, Wait, as_passed, start_from, stopping_baselines
 from optimizer.sequence.divided_paths import with_divided_paths
 from optimizer.sequence.order_search import OrderSearch
+from optimizer.sequence.passing_leg import passes_of
 from optimizer.sequence.proven_bound import proven_bound
 from optimizer.sequence.rests import rest_sensitivity
 from optimizer.sequence.round_baselines import (
@@ -24,8 +28,8 @@ from optimizer.sequence.round_baselines import (
     same_factor,
 )
 from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
-from optimizer.sequence.round_solution import Move, RoundSolution, known_of
-from optimizer.sequence.timed_round import Timed, TimedSearch
+from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution, known_of
+from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Solution
 
 
@@ -83,63 +87,120 @@ def _tell_found(tell: Tell, found: RoundSolution) -> None:
 
 
 def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
-    """The round of least energy over the stops in their order."""
+    """The round of least energy over the stops in their order, no worse than with rests where it passes."""
+    if not asked.passes:
+        return _searched(asked, clock, tell)
+    began, stopping = clock(), None
+    # where there is none with rests, there may be one without: it takes less time
+    with suppress(JoulepathError):
+        stopping = _searched(replace(asked, stopping=True, deadline=SHARE * asked.deadline), clock, nobody)
+    left = max(asked.deadline - (clock() - began), LEAST_TIME)
+    return _searched(replace(asked, deadline=left), clock, tell, stopping)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The moves of a chain, the price of time [W], and the bound [J] that holds for any time; `timing` is the search in
+    a given time, if there was one, and `shared`: its time is shared so that no chain can be better. `greedy` is the
+    chain of `move_by_move`."""
+
+    nodes: list[int]
+    moves: list[Move]
+    price: float
+    bound: float
+    timing: TimedSearch | None = None
+    shared: bool = True
+    greedy: list[int] | None = None
+
+
+def _searched(asked: WorkRound, clock: Clock, tell: Tell, stopping: RoundSolution | None = None) -> RoundSolution:
+    """The round of least energy; `stopping` is that with rests at the stops that it passes."""
     search = RoundSearch(asked, clock, tell=tell)
-    nodes = search.run()
-    greedy = move_by_move(search, nodes[0])
-    if greedy is not None and search.cost(greedy) < search.cost(nodes):
-        # by what the search could not tell apart: motions that were not yet optimised to the end
-        nodes = greedy
-    moving = [search.solutions[each] for each in search.pairs(nodes)]
-    own = sum(each.duration for each in moving) + asked.dwelling
-    duration, price = asked.nearest_duration(own), 0.0
-    bound, timed, timing = proven_bound(asked, search.legs, search.end), None, None
-    if duration != own:
-        timing = TimedSearch(search, duration)
-        timed = timing.run(nodes)
-        nodes = timed.nodes
-        shares = zip(search.pairs(nodes), timed.shared.lengths, strict=True)
-        moving = [search.solve_in(*each, length) for each, length in shares]
-        # energies of nearly fastest moves are flat: rounding must not turn the price's sign
-        price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
-    moves = _moves(search, nodes, moving, timed)
-    ours = known_of(moves)
-    compared = [
-        None if greedy is None else of_chain(search, greedy, "move_by_move", ours),
-        controller_default(search, nodes[0], ours),
-    ]
-    if timing is not None:
-        bound = max(bound, timing.bound(price, ours.energy))
-        compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
-    complete = all(leg.goal.complete and leg.start.complete for leg in search.legs)
+    rested = None if stopping is None else start_from(search, stopping)
+    try:
+        found = _best_of(search)
+        if rested is not None and rested.nodes and rested.known.energy < known_of(found.moves).energy:
+            found = replace(_as_stopping(search, rested), timing=found.timing)
+    except JoulepathError:
+        if rested is None or not rested.nodes:
+            raise
+        found = _as_stopping(search, rested, better=False)
+    ours, bound = known_of(found.moves), found.bound
+    if found.timing is not None:
+        bound = max(bound, found.timing.bound(found.price, ours.energy))
+    complete = all(layer.complete for leg in search.legs for layer in leg.layers)
     # a path may be divided at other places
     divided = any(move.tool_path is not None and move.tool_path.section is not None for move in asked.moves)
-    done = _is_done(search, timing, timed, moves) and complete and not divided
     return RoundSolution(
-        status="optimal" if done else "feasible",
-        moves=moves,
+        status="optimal" if complete and not divided and _is_done(search, found) else "feasible",
+        moves=found.moves,
         lower_bound=bound,
-        price_of_time=price,
-        baselines=[each for each in compared if each is not None],
+        price_of_time=found.price,
+        baselines=_baselines(search, found, ours) if rested is None else stopping_baselines(asked, rested, ours),
         complete=complete,
         wall_time=0.0,
     )
 
 
-def _is_done(search: RoundSearch, timing: TimedSearch | None, timed: Timed | None, moves: list[Move]) -> bool:
+def _best_of(search: RoundSearch) -> _Found:
+    """The best chain that the search finds, in the time that is asked for."""
+    asked, nodes = search.asked, search.run()
+    # what passes has the round with rests instead
+    greedy = None if asked.passes else move_by_move(search, nodes[0])
+    if greedy is not None and search.cost(greedy) < search.cost(nodes):
+        # by what the search could not tell apart: motions that were not yet optimised to the end
+        nodes = greedy
+    moving = [search.solutions[each] for each in search.pairs(nodes)]
+    own = sum(each.duration for each in moving) + asked.dwelling
+    duration, bound = asked.nearest_duration(own), proven_bound(asked, search.legs, search.end)
+    if duration == own:
+        return _Found(nodes, _moves(search, nodes, moving, {}), 0.0, bound, greedy=greedy)
+    timing = TimedSearch(search, duration)
+    timed = timing.run(nodes)
+    shares = zip(search.pairs(timed.nodes), timed.shared.lengths, strict=True)
+    moving = [search.solve_in(*each, length) for each, length in shares]
+    # energies of nearly fastest moves are flat: rounding must not turn the price's sign
+    price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
+    waits = {timed.at: (timed.shared.waited, timed.wait_energy)}
+    moves = _moves(search, timed.nodes, moving, waits)
+    return _Found(timed.nodes, moves, price, bound, timing, timing.exact and timed.shared.exact, greedy)
+
+
+def _as_stopping(search: RoundSearch, rested: Rested, better: bool = True) -> _Found:
+    """The chain of the round with rests, `better` where it passes if the search finds that."""
+    moves = _moves(search, rested.nodes, *as_passed(search, rested, better))
+    bound = proven_bound(search.asked, search.legs, search.end)
+    return _Found(rested.nodes, moves, rested.solution.price_of_time, bound, shared=False)
+
+
+def _baselines(search: RoundSearch, found: _Found, ours: Known) -> list[RoundBaseline]:
+    """The round in other ways, as far as they are known."""
+    if search.asked.passes:
+        return []
+    nodes, timing = found.nodes, found.timing
+    compared = [
+        None if found.greedy is None else of_chain(search, found.greedy, "move_by_move", ours),
+        controller_default(search, nodes[0], ours),
+    ]
+    if timing is not None:
+        compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
+    return [each for each in compared if each is not None]
+
+
+def _is_done(search: RoundSearch, found: _Found) -> bool:
     """Whether no other chain can be better, and every move converged."""
-    sampled = any(leg.goal.sampled or leg.start.sampled for leg in search.legs)
-    shared = timing is None or (timing.exact and timed is not None and timed.shared.exact)
-    converged = all(move.solution.status == "optimal" for move in moves)
-    return converged and shared and not (sampled or search.cut_short or search.failed)
+    sampled = any(layer.sampled for leg in search.legs for layer in leg.layers)
+    converged = all(move.solution.status == "optimal" for move in found.moves)
+    open_ = sampled or search.cut_short or search.failed or search.leaves_routes
+    return converged and found.shared and not open_
 
 
-def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: Timed | None) -> list[Move]:
-    """The moves of a chain, in their order."""
+def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], waits: dict[int, Wait]) -> list[Move]:
+    """The moves of a chain, in their order, with the waits after some of them."""
     asked, t0, moves = search.asked, 0.0, list[Move]()
-    for (k, _, g), solution in zip(search.pairs(nodes), found, strict=True):
+    for (k, s, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
-        wait, wait_energy = (0.0, 0.0) if timed is None or timed.at != k else (timed.shared.waited, timed.wait_energy)
+        wait, wait_energy = waits.get(k, (0.0, 0.0))
         rest = asked.moves[k].dwell + wait
         moves.append(
             Move(
@@ -153,6 +214,7 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], timed: 
                 kinds=len(leg.pair),
                 solved=len(leg.solved),
                 sensitivity=solution.sensitivity + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
+                passes=passes_of(leg, s, g, solution.trajectory.spline),
             )
         )
         t0 += moves[-1].duration

@@ -266,14 +266,16 @@ class Certificate:
     proven over continuous time, None if no bodies are compared; `close_pass` is the least distance without margins,
     None unless it may be below 2 mm. `start_error` and `goal_error` are (position [m], rotation [rad]) of the TCP
     against the pose asked for (or the forward kinematics of the joints asked for). `rest_error` is the worst
-    |v| / v_max and |a| / a_max at the two ends. `energy_error` is |fine quadrature - reported| / reported,
-    `balance_error` |sum of parts - total| / total.
+    |v| / v_max and |a| / a_max at the two ends. `pass_error` is the largest deviation [rad] of a joint from the joint
+    positions that the motion passes through, 0 if there are none. `energy_error` is |fine quadrature - reported| /
+    reported, `balance_error` |sum of parts - total| / total.
     """
 
     worst_ratio: dict[str, float]
     start_error: tuple[float, float]
     goal_error: tuple[float, float]
     rest_error: float
+    pass_error: float
     energy_error: float
     balance_error: float
     clearance: Clearance | None
@@ -286,11 +288,15 @@ class Certificate:
 
     @property
     def valid(self) -> bool:
-        """Whether the motion is within every limit, at rest at its ends, and of the reported energy. NaN is invalid."""
+        """Whether the motion is within every limit, at rest at its ends, on its passes, and of the reported energy.
+
+        NaN is invalid.
+        """
         return (
             all(ratio <= 1 + RATIO_TOLERANCE for ratio in self.worst_ratio.values())
             and all(error <= self.POSITION_TOLERANCE for error in self.start_error + self.goal_error)
             and self.rest_error <= self.REST_TOLERANCE
+            and self.pass_error <= self.POSITION_TOLERANCE
             and self.energy_error <= self.ENERGY_TOLERANCE
             and self.balance_error <= self.ENERGY_TOLERANCE
             and (self.clearance is None or self.clearance.min_clearance >= 0)

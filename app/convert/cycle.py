@@ -30,6 +30,8 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_solution import Move, RoundSolution
 from optimizer.solution import Solution
 
+_PLACE = ("label", "q", "target")
+
 
 def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
     """The round of a request, of whose time `deadline` [s] is left.
@@ -84,6 +86,7 @@ def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
         retreat=_to_line(f"stops.{k}.retreat", stop.retreat, robot),
         path=_to_path(k, stop.path, robot),
         obstacles_ignored=stop.obstacles_ignored,
+        passed=stop.pass_,
     )
 
 
@@ -140,6 +143,7 @@ def to_cycle_response(
         "certificate": {
             "worst_ratio": _worst_ratio(found),
             "joins": found.joins,
+            "pass_error": max(move.solution.certificate.pass_error for move in found.moves),
             "energy_error": max(move.solution.certificate.energy_error for move in found.moves),
             "balance_error": abs(electrical.parts_sum - electrical.total) / abs(electrical.total or 1.0),
             "clearance": _clearance(found),
@@ -180,13 +184,14 @@ def _divided(found: RoundSolution) -> list[tuple[str, float]]:
 def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
     """The entries of a move, and of the dwell and the wait after it."""
     solution = move.solution
-    start = {**fields(solution.start, "label", "q", "target"), "stop": move.planned.start}
-    goal = {**fields(solution.goal, "label", "q", "target"), "stop": move.planned.goal}
+    start = {**fields(solution.start, *_PLACE), "stop": move.planned.start}
+    goal = {**fields(solution.goal, *_PLACE), "stop": move.planned.goal}
     legs: list[dict[str, Any]] = [
         {
             "kind": move.planned.kind,
             "start": start,
             "goal": goal,
+            "passes": [{**fields(each.at, *_PLACE), **fields(each, "stop", "t")} for each in move.passes],
             "t0": move.t0,
             "duration": solution.duration,
             "electrical": solution.energy.electrical.total,
@@ -207,6 +212,7 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
                     "kind": kind,
                     "start": goal,
                     "goal": goal,
+                    "passes": [],
                     "t0": t0,
                     "duration": length,
                     "electrical": energy,

@@ -91,7 +91,7 @@ def _models(model: type[RequestModel]) -> set[type[RequestModel]]:
 
 @cache
 def _field_names() -> set[str]:
-    return {name for model in _models(RequestModel) for name in model.model_fields} | {
+    return {field.alias or name for model in _models(RequestModel) for name, field in model.model_fields.items()} | {
         "body",
         "path",
         "query",

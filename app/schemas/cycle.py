@@ -161,8 +161,8 @@ class RoundEnergy(MotionEnergy):
     """Energy of the round: the moves, and dwells and waiting in `electrical.dwell`."""
 
     lower_bound: float = described(
-        "Lower bound of the electrical energy: no round that rests at these stops, of any configurations, shapes and "
-        "durations, draws less.",
+        "Lower bound of the electrical energy: no round that rests at these stops, or goes through those with `pass`, "
+        "of any configurations, shapes and durations, draws less.",
         "J",
         536.1,
     )
@@ -180,6 +180,12 @@ class StopConfiguration(Configuration):
     )
 
 
+class Passed(StopConfiguration):
+    """A stop that a move passes through, and in which arm configuration."""
+
+    t: float = described("When it passes, from the start of the move.", "s", 0.61)
+
+
 class CycleLeg(Response):
     """A move from one place to the next, the dwell at a stop, or a wait."""
 
@@ -191,6 +197,7 @@ class CycleLeg(Response):
     )
     start: StopConfiguration = part("Where it begins.")
     goal: StopConfiguration = part("Where it ends; of a dwell and a wait, where it began.")
+    passes: list[Passed] = part("Stops that the move passes through, in their order.")
     t0: float = described("When it begins, from the start of the round.", "s", 1.42)
     duration: float = described("How long it takes.", "s", 0.91)
     electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
@@ -207,7 +214,10 @@ class CycleLeg(Response):
 class CycleBaseline(Response):
     """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked for."""
 
-    name: Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"] = described(
+    name: Literal[
+        "stopping", "move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"
+    ] = described(
+        "`stopping`: the best round that rests at the stops with `pass`, too; the others then rest there as well. "
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
         "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
@@ -238,6 +248,9 @@ class RoundCertificate(Response):
 
     worst_ratio: WorstRatio = part("Largest value / limit over all moves, for each limit.")
     joins: float = described("Largest jump of a joint from the end of a move to the start of the next.", "rad", 0.0)
+    pass_error: float = described(
+        "Largest deviation of a joint from the configuration of a stop that a move passes through.", "rad", 0.0
+    )
     energy_error: float = described("Largest `energy_error` of a move: see `POST /optimize`.", "1", 1e-6)
     balance_error: float = described(
         "Relative difference of the sum of the electrical parts of the round and the total.", "1", 1e-6

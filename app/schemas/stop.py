@@ -19,8 +19,8 @@ PlainName = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=
 
 
 class StopRequest(Request):
-    """A stop: the arm comes to rest at the target, or at the end of a path, and may take up or put down a payload. It
-    has exactly one of `target` and `path`."""
+    """A stop: the arm comes to rest at the target, or at the end of a path, and may take up or put down a payload; or
+    it passes through the target. It has exactly one of `target` and `path`."""
 
     name: PlainName | None = described(
         "Name of the stop, different from those of the others. Null: its number, from 1.", None, "pick", default=None
@@ -42,6 +42,15 @@ class StopRequest(Request):
             "speed": 0.1,
         },
         default=None,
+    )
+    pass_: bool = described(
+        "Whether the arm passes through the target without a rest, on its way to the next stop at which it rests. Then "
+        "the stop has no `dwell`, `payload`, `path`, lines or `obstacles_ignored`, and the limits of all stops of this "
+        "motion hold for all of it.",
+        None,
+        False,
+        default=False,
+        alias="pass",
     )
     dwell: float = described(
         "Time at rest at the stop; with a path, at its end.", "s", 0.4, default=0.0, ge=0, le=LONGEST_DURATION

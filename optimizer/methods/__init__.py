@@ -8,6 +8,7 @@ from optimizer.methods.duration_intervals import DurationInterval
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.lagrange import Lagrange
 from optimizer.methods.method import Method
+from optimizer.methods.passing_spline import PassingSpline
 from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.methods.time_scaling import TimeScaling
 from optimizer.methods.tool_path_motion import ToolPathMotion
@@ -25,7 +26,9 @@ METHODS: dict[MethodName, type[Method]] = {
 
 
 def method_of(problem: Problem) -> type[Method]:
-    """The method of a problem; along a tool path there is one way."""
+    """The method of a problem; along a tool path, and through passes, there is one way."""
+    if problem.passes:
+        return PassingSpline
     return METHODS[problem.method] if problem.tool_path is None else ToolPathMotion
 
 

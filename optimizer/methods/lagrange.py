@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-
 from models.robot import Array
+from optimizer.methods.limit_repair import sampled_overshoot
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import no_polynomial_around
 from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
@@ -24,12 +23,6 @@ from optimizer.trajectories.time_scalings import quintic
 # degree 15. Two more nodes save a UR5e some 0.15 % of the energy and take a fifth more time, at all degrees from 9 to
 # 19; Bernstein's coefficients lose a digit with every three nodes
 NODES = 10
-# points at which positions are compared with their limits
-POSITION_POINTS = 512
-# nodes are moved inwards by this multiple of the excess between them
-POSITION_REPAIR = 1.5
-# greatest excess by rounding of a joint that starts or ends on its limit [rad]
-ROUNDING = 1e-9
 
 
 class Lagrange(SqpMethod):
@@ -74,12 +67,4 @@ class Lagrange(SqpMethod):
 
     def overshoot(self, spline: Spline) -> tuple[Array, Array]:
         """Excess (nq,) [rad] below and above the position limits: values at nodes do not bound a polynomial between."""
-        q = spline.curve(np.linspace(0.0, spline.duration, POSITION_POINTS))
-        limits = self.prepared.problem.arm.active_limits
-        below, above = limits.q_min - q.min(axis=0), q.max(axis=0) - limits.q_max
-        return _repair(below), _repair(above)
-
-
-def _repair(excess: Array) -> Array:
-    """How far position limits move inwards for an excess (nq,) [rad]."""
-    return np.where(excess > ROUNDING, POSITION_REPAIR * excess, 0.0)
+        return sampled_overshoot(self.prepared, spline)

@@ -28,6 +28,9 @@ REPAIR_MARGIN = 2e-4
 WITHIN = 1 - REPAIR_MARGIN / 4
 # torque is tightened by this multiple of its excess: a peak lowered between two nodes rises beside them
 TORQUE_REPAIR = 1.5
+# points at which positions are compared with their limits where the control points do not bound them, the multiple of
+# an excess by which these are moved inwards, and the greatest excess by rounding of a joint that is on its limit [rad]
+POSITION_POINTS, POSITION_REPAIR, ROUNDING = 512, 1.5, 1e-9
 # the greatest time scale that replaces another solve
 MOST_TIME_SCALE = 1 + 5e-4
 # points per panel of a knot span at which torque is checked between the nodes
@@ -97,6 +100,15 @@ def repair_factors(prepared: PreparedProblem, spline: Spline, overshoot: tuple[A
     excess = {name: np.where(ratio > WITHIN, ratio + REPAIR_MARGIN, 1.0) for name, ratio in ratios.items()}
     excess["tau_max"] = 1 + TORQUE_REPAIR * (excess["tau_max"] - 1)
     return Limits(q_min=below, q_max=above, **{name: 1 / factor for name, factor in excess.items()})
+
+
+def sampled_overshoot(prepared: PreparedProblem, spline: Spline) -> tuple[Array, Array]:
+    """How far (nq,) [rad] the position limits below and above move inwards for the excess of a motion at samples."""
+    q = spline.curve(np.linspace(0.0, spline.duration, POSITION_POINTS))
+    limits = prepared.problem.arm.active_limits
+    excess = limits.q_min - q.min(axis=0), q.max(axis=0) - limits.q_max
+    below, above = (np.where(each > ROUNDING, POSITION_REPAIR * each, 0.0) for each in excess)
+    return below, above
 
 
 def tightened(limits: Limits, factors: Limits) -> Limits:

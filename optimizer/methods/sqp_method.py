@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -81,10 +82,18 @@ class _Stage:
 class SqpMethod(Method):
     """A method whose motions form a linear space; the SQP optimises them."""
 
+    # whether the deadline may well end a solve: then what it has so far counts
+    takes_long: ClassVar[bool] = False
+
     @cached_property
     def coordinates(self) -> Coordinates:
         """The coordinates of the spline, with limits tightened by MARGIN."""
         return self._coordinates(self.prepared.problem.arm.active_limits.scaled(1 - MARGIN))
+
+    @property
+    def passes(self) -> Array:
+        """Configurations (k, nq) [rad] that the motion passes through, in their order."""
+        return np.zeros((0, len(self.q_start)))
 
     def improve(self, guess: Guess, deadline: Deadline | None = None) -> SolveResult:
         """Optimise from a guess. While the motion exceeds a limit between the nodes, tighten the limit and repeat.
@@ -103,7 +112,7 @@ class SqpMethod(Method):
         iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):
             # while no motion is known, one that is not yet optimal is better than none
-            needed = len(stage.pairs) > 0 and np.isinf(self.best_known)
+            needed = self.takes_long or (len(stage.pairs) > 0 and np.isinf(self.best_known))
             until = deadline.earlier_by(CHECKING) if needed else deadline
             progress = max(guess.progress, ROUGH_PROGRESS) if guess.rough and len(stage.pairs) else guess.progress
             result = solve(stage.program, stage.free, stage.duration, stage.multiplier, until, progress)
@@ -183,6 +192,7 @@ class SqpMethod(Method):
             interval.constant,
             path=path,
             path_bounds=initial_bounds(path),
+            passes=self.passes if len(self.passes) else None,
         )
         free = guess.points[guess.space.free]
         limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)

@@ -53,7 +53,8 @@ class NonlinearProgram:
     `p` is the packed parameter vector of the kernel. The duration lies in [t_min, t_max] [s]; equal bounds fix it.
     `constant` [J] is a part of the cost that no variable changes: it keeps relative changes of the cost in proportion.
     With `goal_constraints` the goal is a decision variable too: the last row of the free control points. Every ratio
-    of `path` is bounded by `path_bounds` (c,), 1 or a little less.
+    of `path` is bounded by `path_bounds` (c,), 1 or a little less. The spline passes through the configurations
+    `passes` (k, r), in their order, at times that are free.
     """
 
     kernel: Kernel
@@ -66,6 +67,7 @@ class NonlinearProgram:
     goal_constraints: GoalConstraints | None = None
     path: PathConstraints | None = None
     path_bounds: Array = field(default_factory=lambda: np.zeros(0))
+    passes: Array | None = None
 
     @property
     def r(self) -> int:

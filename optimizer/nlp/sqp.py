@@ -16,6 +16,7 @@ from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
 from optimizer.nlp.active_path_constraints import PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
+from optimizer.nlp.passing import Passes, Passing
 from optimizer.nlp.working_set_qp import MOST_ROUNDS, QP_ROUNDS, QPInputs, QPStep, WorkingSetQP
 
 # relative decrease of the cost that a further step must promise
@@ -72,7 +73,7 @@ class _Point:
     """An iterate: free control points, duration, derivatives of s on the grid, path constraints, and violations.
 
     `violation` (3 r + nq + c,) is the largest excess as a ratio of the limit: per derivative and coordinate, joint
-    torque, and path constraint.
+    torque, and path constraint. `passing` says where it passes the program's passes, if it has any.
     """
 
     free: Array
@@ -80,6 +81,7 @@ class _Point:
     kinematics: Array
     path_values: PathConstraintValues
     violation: Array
+    passing: Passing | None
 
 
 class _Multipliers:
@@ -88,6 +90,8 @@ class _Multipliers:
     def __init__(self, torque: Array, path: Array, violations: int) -> None:
         self.torque = torque
         self.path = path
+        # gradient (n,) of all constraints, weighed by their multipliers, by the scaled variables
+        self.limits: Array | float = 0.0
         # second derivative of the kinematic constraints by T, in the scale of the QP's cost
         self.curvature = 0.0
         self.penalty = np.full(violations, FIRST_PENALTY)
@@ -99,6 +103,7 @@ class _Multipliers:
         np.add.at(self.torque, step.nodes, step.signs * step.torque / p.limits.tau_max[step.nodes[1]] / cost_scale)
         self.path = np.zeros_like(self.path)
         self.path[step.passed] = step.path / cost_scale
+        self.limits = step.pull
         d = step.places[0]
         self.curvature = -float((step.kinematic * (d + 1) * d).sum()) / (T * T)
         if not step.relaxed:
@@ -130,9 +135,12 @@ class _Solver:
             self.scale[-1] = T
         if multiplier is None:
             multiplier = np.zeros((len(program.basis.nodes), program.kernel.nq))
+        self.passes, passing = None if program.passes is None else Passes(program, program.passes), None
+        if self.passes is not None:
+            free, passing = self.passes.put(free)
         self.line, kinematics = program.derivatives(free, T, multiplier), program.kinematics(free)
         self.cost_scale = 1.0 / max(abs(self.line.cost), 1e-9)
-        self.at = self._point(free, T, kinematics, self.line.tau)
+        self.at = self._point(free, T, kinematics, self.line.tau, passing)
         path = np.zeros_like(self.at.path_values.ratios.value)
         self.multipliers = _Multipliers(multiplier, path, len(self.at.violation))
         if program.has_clearance:
@@ -184,14 +192,14 @@ class _Solver:
         self.multipliers.update(step, self.p, self.at.T, self.cost_scale)
         return self._line_search(step.x, float(qp.gradient @ step.x))
 
-    def _point(self, free: Array, T: float, kinematics: Array, tau: Array) -> _Point:
+    def _point(self, free: Array, T: float, kinematics: Array, tau: Array, passing: Passing | None) -> _Point:
         """The iterate, from its limited torques (N, nq)."""
         path_values = self.p.path_rows.values(self.p.points(free), T)
         largest = np.maximum(kinematics.max(axis=2), -kinematics.min(axis=2)) / self.qp.rates(T)
         torque = np.abs(tau).max(axis=0) / self.p.limits.tau_max
         path = path_values.ratios.value.max(axis=0, initial=0.0) - self.p.path_bounds + 1
         violation = np.maximum(np.concatenate([largest.ravel(), torque, path]) - 1, 0.0)
-        return _Point(free, T, kinematics, path_values, violation)
+        return _Point(free, T, kinematics, path_values, violation, passing)
 
     def _qp_inputs(self) -> QPInputs:
         """The QP at the iterate: the Lagrangian's Hessian made positive definite, and the cost's gradient, scaled."""
@@ -200,7 +208,14 @@ class _Solver:
         bent = self.p.path_rows.hessian(at.path_values, at.T, self.multipliers.path)
         H = (self.line.hessian + bent) * self.cost_scale
         H[-1, -1] += self.multipliers.curvature
-        H, whitening = _convex(H[:n, :n] * np.outer(self.scale, self.scale))
+        H = H[:n, :n] * np.outer(self.scale, self.scale)
+        if at.passing is None:
+            H, whitening = _convex(H)
+        else:
+            pull = (g + self.multipliers.limits)[: self.qp.count].reshape(at.free.shape)
+            kept = at.passing.null_space(n)
+            H, whitening = _convex(kept.T @ (H + at.passing.curvature(pull, n)) @ kept)
+            H, whitening = kept @ H @ kept.T, kept @ whitening
         ratio = at.kinematics / self.qp.rates(at.T)[:, :, None]
         return QPInputs(H, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
 
@@ -217,8 +232,11 @@ class _Solver:
             free = at.free + alpha * dx[: self.qp.count].reshape(at.free.shape)
             T = at.T + alpha * float(dx[-1]) * self.qp.time_scale if self.qp.free_time else at.T
             T = min(max(T, self.p.t_min), self.p.t_max)  # rounding must not leave the bounds
+            passing = at.passing
+            if self.passes is not None and passing is not None:
+                free, passing = self.passes.put(free, passing.times)
             cost, tau = self.p.value(free, T)
-            trial = self._point(free, T, self.p.kinematics(free), tau)
+            trial = self._point(free, T, self.p.kinematics(free), tau, passing)
             trial_merit = cost * self.cost_scale + float(penalty @ trial.violation)
             if trial_merit <= merit + ARMIJO * alpha * descent + ROUNDING:
                 return trial

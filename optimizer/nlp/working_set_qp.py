@@ -52,8 +52,8 @@ _INFINITE = 1e30
 class QPInputs:
     """What the QP is made of at one iterate.
 
-    `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n, n) makes it
-    the identity, Wᵀ H W = 1. `ratio` (3, r, M) holds speed, acceleration and jerk over their limits on the grid.
+    `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n, k) makes it
+    the identity, Wᵀ H W = 1, for steps that keep the passes. `ratio` (3, r, M): rates over their limits on the grid.
     """
 
     hessian: Array
@@ -72,7 +72,7 @@ class QPStep:
 
     `relaxed`: the QP was infeasible, and x breaks its constraints as little as possible. `kinematic` are the
     multipliers at `places`, `torque` those at `nodes` (node, joint) of torques with `signs`, `path` those at `passed`
-    (path point, column).
+    (path point, column). `pull` (n,) is the sum of all constraints' gradients times their multipliers.
     """
 
     x: Array
@@ -84,6 +84,7 @@ class QPStep:
     torque: Array
     passed: tuple[Index, Index]
     path: Array
+    pull: Array
 
 
 @dataclass(frozen=True)
@@ -114,18 +115,19 @@ class _Rows:
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
         self.whitening, n = whitening, len(whitening)
-        self.A, self.least, self.most = np.zeros((0, n)), np.zeros(0), np.zeros(0)
+        self.gradients, self.A = np.zeros((0, n)), np.zeros((0, whitening.shape[1]))
+        self.least, self.most = np.zeros(0), np.zeros(0)
         self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
         self.chosen, self.bounded = np.zeros(grid, dtype=bool), np.zeros((2, n), dtype=bool)
         none = np.zeros(0, dtype=int)
         self.places: Places = (none, none, none)
-        self.kinematic: Index = none
         self.sides: tuple[Index, Index] = (none, none)
-        self.bounds: Index = none
+        self.kinematic, self.bounds = none, none
 
     def add(self, gradients: Array, most: Array, least: Array | None = None, hard: bool = False) -> Index:
         """Add rows with gradients (rows, n) by the scaled variables, and return their numbers."""
         first, count = len(self.most), len(most)
+        self.gradients = np.concatenate([self.gradients, gradients])
         self.A = np.concatenate([self.A, gradients @ self.whitening])
         self.least = np.concatenate([self.least, np.full(count, -_INFINITE) if least is None else least])
         self.most = np.concatenate([self.most, most])
@@ -221,10 +223,9 @@ class WorkingSetQP:
         kinds = np.cumsum([len(goal.least), len(path.slack), len(torque.slack)])
         _, mu_path, mu_torque, _ = np.split(mu, kinds)
         self._keep(rows, mu)
-        passed = path.points, path.columns
         return QPStep(
             _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
-            torque.nodes, torque.signs, mu_torque, passed, mu_path,
+            torque.nodes, torque.signs, mu_torque, (path.points, path.columns), mu_path, multipliers @ rows.gradients,
         )  # fmt: skip
 
     def _keep(self, rows: _Rows, mu: Array) -> None:

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
@@ -38,6 +39,9 @@ class Problem:
     With a `tool_path` the TCP goes along it from `start` to `goal`, which are a pose or joint positions each: only the
     branch and the timing are free, and `method` and `windings` do not matter.
 
+    With `passes`, joint positions (nq,) [rad], the motion passes through them in their order, at times that are free;
+    then start and goal are joint positions, too, and `method` does not matter.
+
     `branch` restricts the inverse kinematics branches of start and goal. With `windings` the goal may also be a full
     turn of a joint away. With the `bound` "tight" more time goes into the lower bounds of what could still beat the
     answer. `sample_period` [s] is that of the returned samples. After `deadline` [s] of wall time the best verified
@@ -55,6 +59,7 @@ class Problem:
     duration_max: float | None = None
     cycle: Cycle | None = None
     tool_path: ToolPath | None = None
+    passes: Sequence[Array] = ()
     branch: BranchFilter | None = None
     windings: bool = True
     bound: BoundEffort = "normal"
@@ -75,6 +80,10 @@ class Problem:
                 if isinstance(getattr(self, name), AnyOf | ConeOrientedPose):
                     raise InvalidProblem(name, f"With a path, {name} must be one pose or joint positions.")
             self.tool_path.check_speed(self.arm.tcp_speed)
+        passed = tuple(validated(self.arm, f"passes.{k}", q) for k, q in enumerate(self.passes))
+        object.__setattr__(self, "passes", passed)
+        if passed and not all(isinstance(q, np.ndarray) for q in (self.start, self.goal, *passed)):
+            raise InvalidProblem("passes", "With passes, start, goal and passes must be joint positions.")
         if self.cycle is not None:
             if self.duration_min is not None and self.duration_min > self.cycle.time:
                 raise InvalidProblem("duration", "The shortest duration must not exceed cycle.time.")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -33,6 +35,9 @@ class Stop:
     The TCP moves along the line `approach` into the stop and along `retreat` out of it, and rests at their outer ends.
     At the stop it follows a `path`, from the target to where the path ends; there it dwells, and the payload changes.
     At the stop, on its lines and its path the obstacles named in `obstacles_ignored` do not count.
+
+    If `passed`, the arm passes through the target without a rest, on its way to the next stop at which it rests. The
+    limits of all stops of such a motion hold for all of it.
     """
 
     name: str
@@ -47,6 +52,7 @@ class Stop:
     retreat: Line | None = None
     path: StopPath | None = None
     obstacles_ignored: Sequence[str] = ()
+    passed: bool = False
 
     @property
     def entry(self) -> str:
@@ -69,7 +75,8 @@ class Stop:
 class PlannedMove:
     """A move of a round from one place to another, by their names, with `arm`; along a `tool_path` if there is one.
 
-    After it `arm_after` rests, for `dwell` [s]. `at_stop`: the goal is a stop, and neither an outer end nor the start.
+    It passes `through` stops in their order. After it `arm_after` rests, for `dwell` [s]. `at_stop`: the goal is a
+    stop, and neither an outer end nor the start.
     """
 
     start: str
@@ -80,6 +87,19 @@ class PlannedMove:
     kind: MoveKind = "move"
     tool_path: ToolPath | None = None
     at_stop: bool = False
+    through: tuple[str, ...] = ()
+
+    @property
+    def parts(self) -> list[PlannedMove]:
+        """The moves from rest to rest if the arm stops where it passes through."""
+        places = [self.start, *self.through]
+        stopping = [PlannedMove(a, b, self.arm, self.arm, at_stop=True) for a, b in pairwise(places)]
+        return [*stopping, replace(self, start=places[-1], through=())]
+
+
+def passing(move: PlannedMove, stops: Sequence[Stop]) -> PlannedMove:
+    """The move that passes through stops on its way, within the limits of all of them."""
+    return replace(move, arm=reduce(_within, stops, move.arm), through=tuple(stop.name for stop in stops))
 
 
 def moves_over(stop: Stop, place: str, before: Arm, after: Arm) -> list[PlannedMove]:

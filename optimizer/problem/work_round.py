@@ -18,10 +18,12 @@ from optimizer.problem.names import check_name, first_repeated
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import LONGEST_DURATION, MethodName
 from optimizer.problem.stop_path import StopPath, at_stop
-from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over
+from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
 from optimizer.problem.targets import Target, members, validated
 
 MOST_STOPS = 100
+# stops that one motion passes through: the effort of its nonlinear program grows with their square and more
+MOST_PASSES = 12
 # longest duration of a round [s]
 LONGEST_ROUND = 36_000.0
 # name of the configuration from which the round starts, and of a closed round's end
@@ -40,6 +42,8 @@ class WorkRound:
     say how the arm dwells and waits, as in `Cycle`; it waits at `wait`, a stop or the start (None: where that costs
     least).
 
+    With `stopping` the arm rests at the stops that it would pass through, too: what passing is compared with.
+
     Orientations are given in full. Raises InvalidProblem or OutsideLimits, with the field named.
     """
 
@@ -57,6 +61,7 @@ class WorkRound:
     brake_delay: float = 0.0
     brake_power: float | None = None
     wait: str | None = None
+    stopping: bool = False
     sample_period: float = 0.008
     deadline: float = 60.0
 
@@ -79,6 +84,8 @@ class WorkRound:
             self._check_limits(k, stop)
             if stop.path is not None:
                 self._check_speed(k, stop, stop.path)
+            if stop.passed:
+                self._check_passed(k, stop)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
         if self.arm.bus.mode == "storage":
@@ -88,6 +95,7 @@ class WorkRound:
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
         if self.order is not None:
             check_order(self.order, self.stops, self.arm.payload)
+        self._check_passes()
         self._check_holding()
         self._check_wait()
         self._check_duration()
@@ -115,6 +123,41 @@ class WorkRound:
             path.path.check_speed(most)
         except InvalidProblem as error:
             raise at_stop(k, error) from None
+
+    def _check_passed(self, k: int, stop: Stop) -> None:
+        given = {
+            "dwell": stop.dwell > 0,
+            "payload": stop.payload is not None,
+            "path": stop.path is not None,
+            "approach": stop.approach is not None,
+            "retreat": stop.retreat is not None,
+            "obstacles_ignored": bool(stop.obstacles_ignored),
+        }
+        for field in (field for field, there in given.items() if there):
+            raise InvalidProblem(
+                f"stops.{k}.{field}",
+                f"The arm passes through stop {stop.name!r} without a rest: leave out its {field}, or set its pass to "
+                "false.",
+            )
+        if self.order is not None:
+            raise InvalidProblem(
+                f"stops.{k}.pass",
+                "With a free order the arm rests at every stop: give the order, or set pass to false.",
+            )
+        if not self.closed and k == len(self.stops) - 1:
+            raise InvalidProblem(
+                f"stops.{k}.pass", "A round that is not closed ends at rest at its last stop: set its pass to false."
+            )
+
+    def _check_passes(self) -> None:
+        passed = 0
+        for k, stop in enumerate(self.stops):
+            passed = passed + 1 if stop.passed else 0
+            if passed > MOST_PASSES:
+                raise InvalidProblem(
+                    f"stops.{k}.pass",
+                    f"The arm passes through at most {MOST_PASSES} stops between two rests: set pass to false here.",
+                )
 
     def _check_limits(self, k: int, stop: Stop) -> None:
         given = {name: getattr(stop, name) for name in ("limits", "tcp_speed", "elbow_speed")}
@@ -160,13 +203,27 @@ class WorkRound:
     @cached_property
     def moves(self) -> list[PlannedMove]:
         """The moves of the round in their order, those along lines and paths included."""
-        moves, place = list[PlannedMove](), START
+        moves, place, passed = list[PlannedMove](), START, list[Stop]()
         for stop, before, after in zip(self.stops, self.arms, self.arms[1:], strict=False):
-            moves += moves_over(stop, place, before, after)
-            place = moves[-1].goal
+            if stop.passed:
+                passed.append(stop)
+                continue
+            first, *others = moves_over(stop, place, before, after)
+            moves += [passing(first, passed), *others]
+            place, passed = moves[-1].goal, []
         if self.closed:
-            moves.append(PlannedMove(place, START, self.arms[-1], self.arms[-1]))
-        return moves
+            moves.append(passing(PlannedMove(place, START, self.arms[-1], self.arms[-1]), passed))
+        return [part for move in moves for part in move.parts] if self.stopping else moves
+
+    @cached_property
+    def passes(self) -> bool:
+        """Whether the arm passes through some stop without a rest."""
+        return any(move.through for move in self.moves)
+
+    def may_wait_after(self, move: PlannedMove) -> bool:
+        """Whether time that is left over may be waited out after a move: not at a stop that the arm passes through."""
+        at_pass = any(stop.passed and stop.name == move.goal for stop in self.stops)
+        return self.wait in (None, move.goal) and not at_pass
 
     @property
     def any_time(self) -> bool:

@@ -20,6 +20,7 @@ from optimizer.search.end_feasibility import check_configurations, raise_if_none
 from optimizer.search.ends import EndConfiguration
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.search.mechanical_bound import mechanical_bounds
+from optimizer.search.passing import bound_through
 from optimizer.solution import CandidateReport, CandidateStatus
 from optimizer.trajectories.spline import Spline
 
@@ -185,6 +186,8 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
         q_start = np.array([candidate.q_start for candidate in candidates])
         levels = np.array([[potential[id(candidate.start)], potential[id(candidate.goal)]] for candidate in candidates])
         bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_start + displacement, levels))
+    if prepared.problem.passes:
+        bounds = np.maximum(bounds, bound_through(prepared, candidates[0].q_start, candidates[0].q_goal))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
         for name in ("start", "goal"):

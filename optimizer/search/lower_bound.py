@@ -18,6 +18,8 @@ from optimizer.trajectories.seven_segment import shortest_duration
 
 # max over x ≥ 0 of x - x² / sqrt(x² + 1), rounded up: what spreading Coulomb friction's jump takes from |v|, in knees
 _KNEE_DEFICIT = 0.3003
+# duration of a part of a motion [s] that stands for none
+SHORTEST_PART = 1e-12
 # halvings of the interval that holds the best duration: its width falls below a millionth of itself
 _BISECTIONS = 24
 
@@ -64,6 +66,32 @@ def priced_bounds(
     t_max, waiting = np.full_like(shortest, longest), np.full_like(shortest, -price)
     bound = _least_drawn(prepared, displacement, potential_gain, shortest, t_max, waiting)
     return np.where(shortest > longest, np.inf, bound)
+
+
+def travel_bounds(
+    prepared: PreparedProblem,
+    displacement: Array,
+    potential_gain: Array,
+    price: float = 0.0,
+    longest: float = LONGEST_DURATION,
+) -> Array:
+    """Bounds (P,) [J] on energy + price · duration of parts of a motion that may begin and end at any speed.
+
+    displacement (P, nq) [rad] and potential_gain (P,) [J] are those of the parts; `price` [W] of time, no part longer
+    than `longest` [s]. What a part draws may be less than its bound, by the kinetic energy that it begins with. But the
+    sum over the parts of a motion from rest to rest is a bound on this motion: its kinetic energy adds up to zero, and
+    ∫ P_net dt is bounded as in `electrical`, with three changes. A joint may have any speed at once, so the share of
+    friction that grows with speed is at least that of even speed, T g(|displacement| / T), as g is convex (Jensen). The
+    least duration is that of the speed limits alone. And the bound by the drawn power, which is never negative, is left
+    out: it holds for each part, but the greater of the two bounds in each part does not, since a part may draw less for
+    what another one has put into speed.
+    """
+    distance, limits = np.abs(displacement), prepared.arm.active_limits
+    t_min = np.maximum((distance / limits.v_max).max(axis=-1), SHORTEST_PART)
+    cruise = _Even(distance, prepared.arm.friction_law, limits)
+    waiting = np.full_like(t_min, -price)
+    bound = _net_energy(prepared, cruise, potential_gain, t_min, np.full_like(t_min, longest), waiting)
+    return np.where(t_min > longest, np.inf, bound)
 
 
 @dataclass(frozen=True)
@@ -136,21 +164,25 @@ def electrical(
     This is the value of a linear program whose right-hand side is linear in T, so it is convex in T, with slope
     g(c) - c g'(c). Bisection on the slope finds the least sum in [t_min, t_max].
     """
-    problem = prepared.problem
-    friction, drives = problem.arm.friction_law, problem.arm.drives
-    base = problem.arm.base_power + float(drives.inverter_constant.sum())
+    cruise = _Cruise(np.abs(displacement), prepared.arm.friction_law, prepared.arm.active_limits)
+    return _net_energy(prepared, cruise, potential_gain, t_min, t_max, waiting)
+
+
+def _net_energy(
+    prepared: PreparedProblem, cruise: _Cruise, potential_gain: Array, t_min: Array, t_max: Array, waiting: Array
+) -> Array:
+    """The bound of `electrical`, with the least loss of `cruise`."""
+    friction, drives = prepared.arm.friction_law, prepared.arm.drives
+    base = prepared.arm.base_power + float(drives.inverter_constant.sum())
     base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
     rate = base - waiting
-    distance = np.abs(displacement)
-    cruise = _Cruise(distance, friction, problem.arm.active_limits)
-
     low, high = t_min.copy(), np.maximum(t_max, t_min)
     for _ in range(_BISECTIONS):
         middle = np.sqrt(low * high)
         rising = rate + cruise.slope(middle) > 0
         high, low = np.where(rising, middle, high), np.where(rising, low, middle)
     # convex: the tangent at the lower end stays below the curve up to the upper end
-    value = rate * low + potential_gain + distance @ friction.coulomb + cruise.loss(low)
+    value = rate * low + potential_gain + cruise.distance @ friction.coulomb + cruise.loss(low)
     return np.asarray(value + np.minimum(rate + cruise.slope(low), 0.0) * (high - low))
 
 
@@ -195,3 +227,16 @@ class _Cruise:
         law, s = self.friction, self.friction.speed
         curved = (v * v / 2 + s * s / 4) * np.arcsinh(v / s) - v * np.hypot(v, s) / 4
         return np.asarray(law.curved * curved + law.viscous * v**3 / 3)
+
+
+class _Even(_Cruise):
+    """The least loss without acceleration limits: every joint moves at an even speed."""
+
+    def speed(self, T: Array) -> tuple[Array, Array]:
+        """The even speeds (P, nq) for durations T (P,); no jerk ramps."""
+        even = self.distance / T[:, None]
+        return even, np.zeros_like(even)
+
+    def loss(self, T: Array) -> Array:
+        """The loss (P,) [J]."""
+        return np.asarray(T * self._g(self.speed(T)[0]).sum(axis=-1))

@@ -12,6 +12,7 @@ from optimizer.search.attempts import solve_from
 from optimizer.search.baselines import baselines, guesses, nearest
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
+from optimizer.search.passing import stopping_baselines
 from optimizer.search.path_baselines import path_baselines
 from optimizer.search.sharpening import sharpen
 from optimizer.solution import Baseline, BaselineName
@@ -70,6 +71,9 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
     """
     if incumbent.problem.tool_path is not None:
         return path_baselines(incumbent, best)
+    if incumbent.problem.passes:
+        assert best.energy is not None
+        return stopping_baselines(incumbent.prepared, best.spline, best.energy)
     for last, fine in ((False, False), (False, True), (True, True)):
         table, q_nearest = _table(incumbent, best)
         usable = incumbent.method.accepted_baselines if last else incumbent.method.guess_baselines

@@ -98,6 +98,20 @@ class Run:
             self.warm_start(spline)
         return self.search()
 
+    def as_it_is(self, spline: Spline) -> Solution:
+        """The solution that a known motion is, without any search. Raises NoTrajectory if it is not certified."""
+        self.prepare()
+        incumbent = self.incumbent
+        candidate = between(incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]])
+        result = SolveResult(SolveStatus.SOLVED, "a known motion", spline=spline)
+        incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
+        incumbent.cut_short = True
+        answer = self.answer(candidate, compare_with_baselines(incumbent, candidate))
+        if answer is None:
+            incumbent.reject(candidate)
+            raise self.no_trajectory()
+        return answer
+
     def search(self) -> Solution:
         """The solution, from candidates that are prepared, and of which some may be solved. Raises as `solution`."""
         incumbent = self.incumbent

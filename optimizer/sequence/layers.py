@@ -80,7 +80,9 @@ def arms_at(asked: WorkRound, place: str) -> list[Arm]:
     arms = [
         arm
         for move in asked.moves
-        for arm in ([move.arm] * (place in (move.start, move.goal)) + [move.arm_after] * (place == move.goal))
+        for arm in (
+            [move.arm] * (place in (move.start, *move.through, move.goal)) + [move.arm_after] * (place == move.goal)
+        )
     ]
     return list({id(arm): arm for arm in arms}.values())
 

@@ -48,7 +48,7 @@ class LazySearch(ABC):
         tried, too: the first one has a value of its own then.
         """
         leg = self.legs[k]
-        kind = int(leg.kind[s, g])
+        kind, before = int(leg.kind[s, g]), float(leg.cost[s, g])
         value = self.attempt(k, s, g)
         centre_s, centre_g = leg.pair[kind].tolist()
         if value is not None and (s, g) != (centre_s, centre_g) and leg.is_near_a_limit(self.motion(k, s, g)):
@@ -57,6 +57,9 @@ class LazySearch(ABC):
             value = self.attempt(k, centre_s, centre_g)
         if value is not None:
             leg.set_kind(kind, value)
+        # a leg with passes weighs more than its bound before it is solved
+        if leg.cost[s, g] < before:
+            self._chain.lower(before - float(leg.cost[s, g]))
 
     def late(self) -> float | None:
         """What a leg for which the time was too short is worth: without its share of it, no other is tried."""
@@ -101,12 +104,7 @@ class LazySearch(ABC):
 
     def _least_solved(self) -> list[int]:
         """The least chain of pairs that are all solved; no nodes if there is none."""
-        costs = []
-        for leg in self.legs:
-            known = np.isin(leg.kind, list(leg.solved))
-            for pair in leg.exact:
-                known[pair] = True
-            costs.append(np.where(known, leg.cost, np.inf))
+        costs = [np.where(leg.is_solved, leg.cost, np.inf) for leg in self.legs]
         return LeastChain(costs, self.closed).find()[1]
 
     def _no_chain(self) -> JoulepathError:

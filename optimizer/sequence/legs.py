@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.prepared_problem import PreparedProblem
@@ -65,7 +65,7 @@ class Leg:
                 f"From {start.name} to {goal.name} there are {len(start.q) * len(goal.q)} pairs of arm configurations, "
                 f"of at most {MOST_PAIRS}: give fewer targets, a `branch`, or `windings` false.",
             )
-        return cls._between(prepared, start, goal, *_kinds(start, goal, prepared), dwell)
+        return cls._between(prepared, start, goal, *kinds_of(start, goal, prepared), dwell)
 
     @classmethod
     def of_way(cls, prepared: PreparedProblem, start: Layer, goal: Layer, dwell: Array) -> Leg:
@@ -94,7 +94,7 @@ class Leg:
         potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
         gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
         displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
-        bound = _bounds(lambda x, gain: lower_bounds(prepared, x, gain)[0], displacement, gain)
+        bound = bounds_of(lambda x, gain: lower_bounds(prepared, x, gain)[0], displacement, gain)
         return cls(prepared, start, goal, kind, pair, displacement, gain, bound, dwell, _costs(bound, kind, dwell))
 
     def priced(self, price: float, longest: float) -> Leg:
@@ -102,7 +102,7 @@ class Leg:
 
         `price` [W]; dwells last as long as they do.
         """
-        bound = _bounds(
+        bound = bounds_of(
             lambda x, gain: priced_bounds(self.prepared, x, gain, price, longest), self.displacement, self.gain
         )
         return replace(self, bound=bound, cost=_costs(bound, self.kind, self.dwell), solved={}, exact={})
@@ -130,9 +130,31 @@ class Leg:
         limits, points = self.prepared.arm.active_limits, motion.control_points
         return bool((points < limits.q_min + NEAR_LIMIT).any() or (points > limits.q_max - NEAR_LIMIT).any())
 
+    @property
+    def layers(self) -> list[Layer]:
+        """The layers of all places of its motions, in their order."""
+        return [self.start, self.goal]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the configurations of all its layers are known: none is a sample of others, none may be missing."""
+        return all(layer.complete and not layer.sampled for layer in self.layers)
+
+    def passes(self, s: int, g: int) -> list[Array]:
+        """Joint positions (nq,) [rad] that the motion of a pair passes through."""
+        return []
+
     def known(self, s: int, g: int) -> bool:
         """Whether the pair, or another one of its kind, is solved."""
         return (s, g) in self.exact or int(self.kind[s, g]) in self.solved
+
+    @property
+    def is_solved(self) -> Mask:
+        """Whether each pair (s, g), or another one of its kind, is solved."""
+        known = np.isin(self.kind, list(self.solved))
+        for pair in self.exact:
+            known[pair] = True
+        return known
 
     def set_kind(self, kind: int, energy: float) -> None:
         """The energy [J] of a motion of this kind; inf if there is none."""
@@ -148,7 +170,7 @@ class Leg:
         self.cost[s, g] = energy + self.dwell[g]
 
 
-def _kinds(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def kinds_of(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """The kind (s, g) of each pair, and of each kind the pair (k, 2) that is farthest from the limits."""
     lowest, highest = (f(np.vstack([start.turns, goal.turns]), axis=0) for f in (np.min, np.max))
     base = 2 * (highest - lowest) + 1
@@ -171,7 +193,7 @@ def _costs(of_kind: Array, kind: npt.NDArray[np.intp], dwell: Array) -> Array:
     return np.where(kind < 0, np.inf, of_kind[kind] + dwell)
 
 
-def _bounds(bound: Callable[[Array, Array], Array], displacement: Array, gain: Array) -> Array:
+def bounds_of(bound: Callable[[Array, Array], Array], displacement: Array, gain: Array) -> Array:
     """Proven lower bounds (k,) [J] of the kinds, by a `bound` on joint displacements and gains of potential energy."""
     bounds = []
     for low in range(0, len(gain), KINDS_PER_CHECK):

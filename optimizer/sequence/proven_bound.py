@@ -18,6 +18,7 @@ from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.layers import Layer
 from optimizer.sequence.legs import Leg
+from optimizer.sequence.passing_leg import PassingLeg
 from optimizer.sequence.rests import least_holding_power, rest_energy
 
 
@@ -38,6 +39,11 @@ def bounded_costs(asked: WorkRound, move: PlannedMove, leg: Leg, deadline: Deadl
     That node comes last.
     """
     costs = leg.least_costs
+    if isinstance(leg, PassingLeg) and leg.direct is not None:
+        if not all(layer.complete and not layer.sampled for layer in leg.between):
+            # the bound of the travel is that of the known passes
+            costs = leg.direct.least_costs
+        leg = leg.direct
     open_start, open_goal = (layer.sampled or not layer.complete for layer in (leg.start, leg.goal))
     if not open_start and not open_goal:
         return costs

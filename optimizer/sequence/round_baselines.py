@@ -93,7 +93,7 @@ def _in_time(
             held = all(search.confirms(*pair, spline) for pair, spline in pairs)
     except DeadlinePassed:
         return None
-    return _compared(search, name, timing.time + timing.asked.dwelling, theirs, held, ours)
+    return compared(search.asked, name, timing.time + timing.asked.dwelling, theirs, held, ours)
 
 
 def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock) -> RoundBaseline | None:
@@ -123,7 +123,7 @@ def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, our
         return None
     sensitivity = reduce(add, [move.sensitivity for move in moves]) + resting(search, nodes)
     known = Known(theirs, sensitivity, sum(move.duration for move in moves))
-    return _compared(search, name, duration, known, True, ours)
+    return compared(search.asked, name, duration, known, True, ours)
 
 
 def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBaseline | None:
@@ -166,15 +166,15 @@ def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBas
     if search.asked.nearest_duration(duration) != duration:
         return None
     theirs = Known(total, reduce(add, sensitivities) + resting(search, nodes), duration - search.asked.dwelling)
-    return _compared(search, "controller_default", duration, theirs, held, ours)
+    return compared(search.asked, "controller_default", duration, theirs, held, ours)
 
 
-def _compared(
-    search: RoundSearch, name: RoundBaselineName, duration: float, theirs: Known, held: bool, ours: Known
+def compared(
+    asked: WorkRound, name: RoundBaselineName, duration: float, theirs: Known, held: bool, ours: Known
 ) -> RoundBaseline:
-    """The baseline of a round that takes `duration` [s], rests included."""
-    interval = saving_interval(ours, theirs, search.asked.arm)
-    return RoundBaseline(name, duration, theirs.energy, held, saving(ours.energy, theirs.energy), interval)
+    """The baseline of a round that takes `duration` [s], rests included, and needs `theirs`."""
+    interval = saving_interval(ours, theirs, asked.arm)
+    return RoundBaseline(name, duration, theirs.energy, held, saving(ours.energy, theirs.energy), interval, theirs)
 
 
 def resting(search: RoundSearch, nodes: list[int], at: int = -1, waited: float = 0.0) -> Sensitivity:

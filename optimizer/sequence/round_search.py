@@ -3,9 +3,10 @@ certified, as `optimize` does it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from itertools import accumulate
+from itertools import accumulate, chain
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from optimizer.problem.work_round import START, WorkRound
 from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
+from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.layers import Layer, layer_of
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
+from optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
 from optimizer.sequence.rests import dwell_energies
 from optimizer.sequence.ways import layers_of_stop
 from optimizer.solution import CandidateStatus, Solution
@@ -31,6 +34,8 @@ from optimizer.trajectories.spline import Spline
 
 # share of the deadline that the search leaves to the motions of its answer, and least time for one of these [s]
 RESERVED, LEAST_TIME = 0.3, 1e-3
+# routes through passes that are tried for a pair at most
+MOST_ROUTES = 3
 # J: a chain is no better than another one by less
 SAME = 1e-9
 
@@ -53,21 +58,27 @@ class RoundSearch(LazySearch):
         try:
             with watch(self.end):
                 layers = layers_of(asked)
-                legs = [self._leg(move, layers[move.start], layers[move.goal]) for move in self.moves]
+                legs = [self._leg(move, layers) for move in self.moves]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
+        # motions that rest at the passes of a pair, along one of its routes
+        self.stopping: dict[tuple[int, int, int], tuple[Route, Spline]] = {}
+        # whether a route has a bound below the motion found of its pair
+        self.routes_left = False
         super().__init__(legs, asked.closed, self.end.earlier_by(RESERVED * asked.deadline))
         self._tell = tell
         self._first = [0, *accumulate(len(leg.pair) for leg in legs)]
         tell(CandidatesFound(self._first[-1]))
-        known = all(layer.complete and not layer.sampled for leg in legs for layer in (leg.start, leg.goal))
-        # before any leg is solved: the costs are proven bounds
-        self._proven = self._chain.find()[0] if known and tell is not nobody else None
+        known = all(leg.closed for leg in legs) and tell is not nobody
+        self._proven = LeastChain([leg.least_costs for leg in legs], asked.closed).find()[0] if known else None
 
-    def _leg(self, move: PlannedMove, start: Layer, goal: Layer) -> Leg:
+    def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
+        start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
         prepared = PreparedProblem.of(self._problem(move, start.q[0], goal.q[0], self.asked.deadline))
-        make = Leg.of if move.tool_path is None else Leg.of_way
-        return make(prepared, start, goal, dwell_energies(self.asked, move, goal))
+        dwells = dwell_energies(self.asked, move, goal)
+        if between:
+            return PassingLeg.through(prepared, [start, *between, goal], dwells)
+        return (Leg.of if move.tool_path is None else Leg.of_way)(prepared, start, goal, dwells)
 
     def run(self) -> list[int]:
         """The nodes of the chain of least energy, whose motions are all in `solutions`.
@@ -87,7 +98,8 @@ class RoundSearch(LazySearch):
 
         None once the time is up.
         """
-        energy = self._attempt(k, s, g)
+        leg = self.legs[k]
+        energy = self._attempt_routes(leg, k, s, g) if isinstance(leg, PassingLeg) else self._attempt(k, s, g)
         if energy is not None:
             kind, solved = int(self.legs[k].kind[s, g]), bool(np.isfinite(energy))
             self._tell(
@@ -114,12 +126,42 @@ class RoundSearch(LazySearch):
         ):
             self._tell(Improved(energy, own, self._proven))
 
+    def _attempt_routes(self, leg: PassingLeg, k: int, s: int, g: int) -> float | None:
+        """The least of `_attempt` over the likeliest routes of a pair, first the one along which a motion is known."""
+        key, best, kept = (k, s, g), None, None
+        first = [(-np.inf, self.stopping[key][0])] if key in self.stopping else []
+        others = (each for each in leg.best_routes(s, g) if not first or each[1] != first[0][1])
+        for tried, (bound, route) in enumerate(chain(first, others)):
+            if best is not None and np.isfinite(best):
+                if bound >= best:
+                    break
+                if tried >= MOST_ROUTES or LIKELY * bound >= best:
+                    self.routes_left = True
+                    break
+            leg.routes[s, g] = route
+            energy = self._attempt(*key)
+            if energy is None:
+                self.routes_left = True
+                break
+            if best is None or energy < best:
+                best, kept = energy, (route, self._runs.pop(key, None))
+            if self.search_end.passed:
+                self.routes_left = True
+                break
+        if kept is not None:
+            leg.routes[s, g] = kept[0]
+            if kept[1] is not None:
+                self._runs[key] = kept[1]
+        return best
+
     def _attempt(self, k: int, s: int, g: int) -> float | None:
-        leg = self.legs[k]
-        time = SHARE_OF_A_LEG * self.search_end.left
-        run = Run(self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], time), clock=self.clock)
+        first = isinstance(self.legs[k], PassingLeg) and not self.legs[k].solved
+        time = self._shared(k, self.search_end).left if first else SHARE_OF_A_LEG * self.search_end.left
+        run = Run(self._problem_of(k, s, g, time), clock=self.clock)
         try:
             run.prepare()
+            for spline in self._known(k, s, g):
+                run.warm_start(spline)
         except DeadlineExceeded:
             return self.late()
         except JoulepathError:
@@ -127,16 +169,25 @@ class RoundSearch(LazySearch):
         incumbent, (candidate,) = run.incumbent, run.incumbent.candidates
         if candidate.status is CandidateStatus.INFEASIBLE:
             return np.inf
-        candidate.attempt = result = solve(incumbent, candidate)
-        if result.status is SolveStatus.OUT_OF_TIME:
-            return self.late()
-        self.failed |= result.spline is None
-        if settled(incumbent, candidate, result, result.reason) is None:
-            return np.inf
+        if candidate.energy is None:
+            candidate.attempt = result = solve(incumbent, candidate)
+            if result.status is SolveStatus.OUT_OF_TIME:
+                return self.late()
+            self.failed |= result.spline is None
+            if settled(incumbent, candidate, result, result.reason) is None:
+                return np.inf
         self._runs[k, s, g] = run
         incumbent.end = self.end
         assert candidate.energy is not None
         return candidate.energy
+
+    @property
+    def leaves_routes(self) -> bool:
+        """Whether some chain through passes has a bound below the best one: such legs weigh more than their bounds."""
+        if not self.asked.passes or self.routes_left:
+            return self.routes_left
+        costs = [np.where(leg.is_solved, leg.cost, leg.least_costs) for leg in self.legs]
+        return LeastChain(costs, self.closed).find()[0] < self._chain.find()[0] - SAME
 
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         """The first motion of a pair; None if there is none."""
@@ -146,33 +197,32 @@ class RoundSearch(LazySearch):
     def confirms(self, k: int, s: int, g: int, spline: Spline) -> bool:
         """Whether the certificate confirms a motion of a pair."""
         leg = self.legs[k]
-        q_start, q_goal = leg.start.q[s], leg.goal.q[g]
-        problem = self._problem(self.moves[k], q_start, q_goal, self.asked.deadline)
-        return certify(problem, spline, q_start, q_goal, leg.prepared.energy(spline)).valid
+        problem = self._problem_of(k, s, g, self.asked.deadline)
+        return certify(problem, spline, leg.start.q[s], leg.goal.q[g], leg.prepared.energy(spline)).valid
 
     def solve_in(self, k: int, s: int, g: int, duration: float) -> Solution:
         """The certified motion of a pair in a given duration [s]. Raises the errors of `optimize`."""
-        leg = self.legs[k]
-        if self.end.passed:
-            raise DeadlineExceeded([])
-        problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], self.end.left)
+        problem = self._problem_of(k, s, g, self._end_of(k).left)
         fixed = replace(problem, duration_min=duration, duration_max=duration)
-        own = self.solutions.get((k, s, g))
-        # a path that is followed as fast as it can be is not followed so fast again without a guess
-        known = [own.trajectory.spline] if own is not None and self.moves[k].tool_path is not None else []
+        own, known = self.solutions.get((k, s, g)), self._known(k, s, g)
+        if own is not None and self.moves[k].tool_path is not None:
+            # a path that is followed as fast as it can be is not followed so fast again without a guess
+            known.append(own.trajectory.spline)
         return Run(fixed, known, self.clock).solution()
 
     def finish(self, k: int, s: int, g: int) -> None:
         """Optimise the motion of a pair to the end, and certify it. Raises DeadlineExceeded if no time is left."""
-        leg, before = self.legs[k], float(self.legs[k].cost[s, g])
-        if self.end.passed:
-            raise DeadlineExceeded([])
+        leg, before, end = self.legs[k], float(self.legs[k].cost[s, g]), self._end_of(k)
         run = self._runs.pop((k, s, g), None)
         try:
             if run is None:
-                problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], self.end.left)
-                found = Run(problem, clock=self.clock).solution()
+                found = Run(self._problem_of(k, s, g, end.left), self._known(k, s, g), self.clock).solution()
             else:
+                run.incumbent.end = end
+                if run.incumbent.cut_short and (known := self._known(k, s, g)):
+                    # its share of the search's time was too short
+                    run.incumbent.cut_short = False
+                    run.warm_start(known[0])
                 found = run.search()
         except NoTrajectory:
             self.failed = True
@@ -181,6 +231,46 @@ class RoundSearch(LazySearch):
         self.solutions[k, s, g] = found
         leg.set_pair(s, g, found.energy.electrical.total)
         self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
+
+    def _end_of(self, k: int) -> Deadline:
+        """The deadline of the motion of a leg. Raises DeadlineExceeded if no time is left."""
+        if self.end.passed:
+            raise DeadlineExceeded([])
+        return self._shared(k, self.end) if isinstance(self.legs[k], PassingLeg) else self.end
+
+    def _shared(self, k: int, end: Deadline) -> Deadline:
+        """The end of what a leg through passes may take of the time until `end`: it may take all that it gets.
+
+        It leaves as much for each that comes after it, and for the other legs.
+        """
+        return end.within(end.left / (1 + sum(isinstance(leg, PassingLeg) for leg in self.legs[k:])))
+
+    def _known(self, k: int, s: int, g: int) -> list[Spline]:
+        """The motion that rests at the passes of a pair, if one is known along its route."""
+        leg = self.legs[k]
+        if not isinstance(leg, PassingLeg) or (k, s, g) not in self.stopping:
+            return []
+        route, spline = self.stopping[k, s, g]
+        return [spline] if leg.route(s, g) == route else []
+
+    def as_stopping(self, k: int, s: int, g: int, better: bool) -> Solution:
+        """The motion of a pair that rests at its passes; a `better` one of the same duration if there is one.
+
+        Raises the errors of `optimize`.
+        """
+        leg = self.legs[k]
+        assert isinstance(leg, PassingLeg)
+        leg.routes[s, g], motion = self.stopping[k, s, g]
+        if better:
+            with suppress(DeadlineExceeded):
+                return self.solve_in(k, s, g, motion.duration)
+        return Run(self._problem_of(k, s, g, self.end.left), clock=self.clock).as_it_is(motion)
+
+    def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:
+        """The problem of a pair, with `time` [s] for it."""
+        leg = self.legs[k]
+        problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], time)
+        return replace(problem, passes=leg.passes(s, g))
 
     def _problem(self, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
         asked = self.asked

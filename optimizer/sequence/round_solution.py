@@ -14,6 +14,7 @@ import numpy as np
 from optimizer.energy.interval import Known, with_interval
 from optimizer.problem.stops import PlannedMove
 from optimizer.solution import (
+    Branch,
     ElectricalEnergy,
     Energy,
     JointEnergy,
@@ -25,8 +26,17 @@ from optimizer.solution import (
 
 
 @dataclass(frozen=True)
+class Pass:
+    """Where a move passes through a `stop`, in which configuration, and when: `t` [s] after the move began."""
+
+    stop: str
+    at: Branch
+    t: float
+
+
+@dataclass(frozen=True)
 class Move:
-    """One move as it was `planned`, with its `solution`.
+    """One move as it was `planned`, with its `solution` and its `passes` through stops.
 
     It begins at `t0` [s] of the round. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
     draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
@@ -43,6 +53,7 @@ class Move:
     kinds: int
     solved: int
     sensitivity: Sensitivity = field(repr=False)
+    passes: list[Pass]
 
     @property
     def duration(self) -> float:
@@ -55,13 +66,15 @@ class Move:
         return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
 
 
-RoundBaselineName = Literal["move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"]
+RoundBaselineName = Literal[
+    "stopping", "move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"
+]
 
 
 @dataclass(frozen=True)
 class RoundBaseline:
     """Another way to go round: its duration [s], electrical energy [J], our saving 1 - ours / theirs, and how well that
-    is known."""
+    is known; `known` is that energy, and how it hangs on the arm's figures."""
 
     name: RoundBaselineName
     duration: float
@@ -69,12 +82,13 @@ class RoundBaseline:
     within_limits: bool
     saving: float
     saving_interval: SavingInterval
+    known: Known = field(repr=False)
 
 
 @dataclass(frozen=True)
 class RoundSolution:
-    """The round of least energy. No round over these stops, of any configurations and shapes, with rests at the stops,
-    needs less than `lower_bound` [J].
+    """The round of least energy. No round over these stops, of any configurations and shapes, with rests at the stops
+    that it does not pass, needs less than `lower_bound` [J].
 
     `status` is `optimal` if no chain of configurations has a bound below what was found, and every move converged.
     `price_of_time` [W] is what one more second would save; negative where time is left over.
@@ -109,7 +123,11 @@ class RoundSolution:
     @property
     def order(self) -> list[str]:
         """Names of the stops, as they are visited."""
-        return [move.planned.goal for move in self.moves if move.planned.at_stop]
+        return [
+            name
+            for move in self.moves
+            for name in (*move.planned.through, *([move.planned.goal] if move.planned.at_stop else []))
+        ]
 
     @property
     def joins(self) -> float:

@@ -52,9 +52,10 @@ class TimedSearch:
         self.search, self.asked, self.legs = search, search.asked, search.legs
         self.time = duration - self.asked.dwelling
         self.longest = _longest_move(self.time)
-        self.exact = True
+        # of the routes through passes, only those found in the round's own time are followed
+        self.exact = not self.asked.passes
         # moves after which it may wait
-        self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.wait in (None, move.goal)]
+        self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)]
         self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
 
     def run(self, nodes: list[int]) -> Timed:
@@ -146,7 +147,7 @@ class TimedSearch:
         At a price below 0 it holds for every longer time, too, and above 0 for every shorter one. -inf where some
         configurations are not known.
         """
-        if any(layer.sampled or not layer.complete for leg in self.legs for layer in (leg.start, leg.goal)):
+        if not all(leg.closed for leg in self.legs):
             return -np.inf
         # neither a wait on motors nor one on brakes may gain by the price
         powers = [
@@ -174,7 +175,7 @@ class TimedSearch:
 
     def _least(self, price: float, longest: float) -> float:
         """Least sum [J] of bounds on energy + price · duration of a chain's moves, each of at most `longest` [s]."""
-        costs = [leg.priced(price, longest).cost for leg in self.legs]
+        costs = [leg.priced(price, longest).least_costs for leg in self.legs]
         return LeastChain(costs, self.asked.closed).find()[0]
 
 

@@ -278,7 +278,7 @@ def test_nothing_undefined_passes(energy: Energy, broken: str) -> None:
 def test_a_certificate_with_nan_is_not_valid(name: str) -> None:
     ratios = dict.fromkeys(["position", "velocity", "acceleration", "jerk", "torque"], 0.5)
     clearance = Clearance(0.01, 0.01, ("base", "tool"), 0.0)
-    good = Certificate(ratios, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, clearance, close_pass=None)
+    good = Certificate(ratios, (0.0, 0.0), (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, clearance, close_pass=None)
     assert good.valid
     assert not replace(good, worst_ratio=ratios | {name: math.nan}).valid
     assert not replace(good, goal_error=(0.0, math.nan)).valid

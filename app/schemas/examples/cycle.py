@@ -58,6 +58,27 @@ CYCLE_EXAMPLES: dict[str, Example] = {
             "hold": {"hold": "brakes", "brake_delay": 0.5, "brake_power": 12.0},
         },
     },
+    "past_a_scanner": {
+        "summary": "Past a scanner without a rest, and over a wall",
+        "description": "The arm takes up a part, moves it past a scanner and puts it down; on its way back it passes "
+        "over a rinsing bowl. It does not rest there: each way from rest to rest is one motion.",
+        "value": {
+            "start": {"q": HOME},
+            "stops": [
+                {"name": "pick", "target": _down(0.45, -0.3, 0.15), "dwell": 0.3, "payload": PART},
+                {"name": "scanner", "target": _down(0.45, 0.05, 0.35), "pass": True},
+                {"name": "place", "target": _down(0.1, 0.5, 0.2), "dwell": 0.3, "payload": None},
+                {"name": "bowl", "target": _down(0.4, 0.25, 0.3), "pass": True},
+            ],
+            "windings": False,
+            "scene": {
+                "obstacles": [
+                    {"name": "table", "shape": "box", "size": [1.6, 1.6, 0.1], "pose": at(0.0, 0.0, -0.1)},
+                    {"name": "wall", "shape": "box", "size": [0.3, 0.03, 0.2], "pose": at(0.5, -0.12, 0.05)},
+                ]
+            },
+        },
+    },
     "out_of_a_tray": {
         "summary": "Out of a tray, with lines into and out of the stops",
         "description": "The gripper goes straight down to the part and lifts it straight up; the part itself is no "

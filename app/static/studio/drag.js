@@ -68,8 +68,8 @@ const endIn = (request, name) => (name.startsWith("stop ") ? [request.stops[name
 function answeredAt(name) {
   const { answer, round, request } = state;
   const [stop] = endIn(request, name);
-  const leg = round?.legs.find(({ goal }) => goal.stop === stopName(stop, Number(name.slice(5))));
-  return (leg?.goal ?? answer.branch[name] ?? answer.branch.start).q;
+  const places = round?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal]);
+  return (places?.find((place) => place.stop === stopName(stop, Number(name.slice(5)))) ?? answer.branch[name] ?? answer.branch.start).q;
 }
 
 async function choose(chosen) {

@@ -56,7 +56,7 @@ function resting({ duration, start, electrical }) {
   return { t, q: of(start.q), v: of(still), a: of(still), tau: of(still), tau_motor: of(still), power: of(electrical / (duration || 1)) };
 }
 
-const legName = ({ kind, start, goal }) => (kind === "move" ? `${start.stop} → ${goal.stop}` : `${kind} at ${goal.stop}`);
+const legName = ({ kind, start, passes, goal }) => (kind === "move" ? [start, ...(passes ?? []), goal].map(({ stop }) => stop).join(" → ") : `${kind} at ${goal.stop}`);
 
 /** What the arm carries from each leg on, and the obstacles that do not count then: as the moves' answers say. */
 function loadsOf(legs, moves, { payload = null, scene }) {

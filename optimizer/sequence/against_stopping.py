@@ -1,0 +1,96 @@
+"""The same round with a rest at every stop that it passes: what passing starts from, and what it is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.energy.interval import Known
+from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.layers import Layer
+from optimizer.sequence.passing_leg import PassingLeg
+from optimizer.sequence.round_baselines import compared
+from optimizer.sequence.round_search import RoundSearch
+from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
+from optimizer.solution import Solution
+from optimizer.trajectories.joined import joined
+
+# length [s] and energy [J] of a wait
+Wait = tuple[float, float]
+# share of the deadline that the round with rests may take
+SHARE = 0.4
+# rad: joint positions of one node
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Rested:
+    """The round with rests, `solution`, and its `nodes` in a search of the round that passes: none if it goes over
+    other configurations. `known` is its energy, motions that stand for one that passes taken as one: as ours are."""
+
+    solution: RoundSolution
+    nodes: list[int]
+    known: Known
+
+
+def moves_between_rests(asked: WorkRound, stopping: RoundSolution) -> Iterator[list[Move]]:
+    """For each move of the round, the moves of the round with rests that stand for it."""
+    moves = iter(stopping.moves)
+    for planned in asked.moves:
+        yield [next(moves) for _ in planned.parts]
+
+
+def start_from(search: RoundSearch, stopping: RoundSolution) -> Rested:
+    """Solve the pairs of the round with rests first, those with passes from its motions."""
+    chain, energy = list[int](), stopping.known.energy
+    for k, moves in enumerate(moves_between_rests(search.asked, stopping)):
+        leg = search.legs[k]
+        q = [moves[0].solution.start.q, *(move.solution.goal.q for move in moves)]
+        nodes = [_node(layer, each) for layer, each in zip(leg.layers, q, strict=True)]
+        if any(node is None for node in nodes):
+            return Rested(stopping, [], stopping.known)
+        s, *route, g = (node for node in nodes if node is not None)
+        chain += [s, g] if not chain else [g]
+        if isinstance(leg, PassingLeg):
+            motion = joined([move.solution.trajectory.spline for move in moves])
+            search.stopping[k, s, g] = tuple(route), motion
+            energy += leg.prepared.energy(motion).electrical.total
+            energy -= sum(move.solution.energy.electrical.total for move in moves)
+        if not search.search_end.passed and not leg.known(s, g):
+            search.try_kind(k, s, g)
+    return Rested(stopping, chain, replace(stopping.known, energy=energy))
+
+
+def as_passed(search: RoundSearch, rested: Rested, better: bool = True) -> tuple[list[Solution], dict[int, Wait]]:
+    """The motions of the round with rests, `better` ones where they pass if there are any, and its waits after moves.
+
+    Raises the errors of `optimize`.
+    """
+    found, waits = list[Solution](), dict[int, Wait]()
+    groups = moves_between_rests(search.asked, rested.solution)
+    for key, moves in zip(search.pairs(rested.nodes), groups, strict=True):
+        found.append(search.as_stopping(*key, better) if key in search.stopping else moves[0].solution)
+        if moves[-1].wait > 0:
+            waits[key[0]] = moves[-1].wait, moves[-1].wait_energy
+    return found, waits
+
+
+def _node(layer: Layer, q: Array) -> int | None:
+    found = np.flatnonzero(np.abs(layer.q - q).max(axis=1) < SAME)
+    return int(found[0]) if len(found) else None
+
+
+def stopping_baselines(asked: WorkRound, rested: Rested, ours: Known) -> list[RoundBaseline]:
+    """The round with rests, and its own baselines, compared with ours."""
+    solution = rested.solution
+    theirs = compared(asked, "stopping", solution.duration, rested.known, True, ours)
+    others = [
+        # the same round by another name has the same energy
+        compared(asked, each.name, each.duration, rested.known if same else each.known, each.within_limits, ours)
+        for each in solution.baselines
+        for same in [bool(np.isclose(each.electrical, solution.known.energy, rtol=SAME, atol=0))]
+    ]
+    return [theirs, *others]

@@ -1,0 +1,100 @@
+"""Passes of an NLP: every iterate is on them, and their curvature is that of the curves that stay on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from models.robot import Array
+from optimizer.nlp.coordinates import Coordinates
+from optimizer.nlp.nonlinear_program import NonlinearProgram
+from optimizer.nlp.passing import Passes
+from optimizer.nlp.sqp import SqpStatus, solve
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.trajectories import bspline
+from optimizer.trajectories.passing import deviations
+from optimizer.trajectories.spline import spline_of
+from tests.optimizer.moves import GOAL, ROBOT, START, problem
+
+ROUNDING = 1e-12
+# relative; of second differences with steps of 1e-3
+DIFFERENCES = 2e-3
+PASSES = np.array([START + 0.4 * (GOAL - START) + [0.1, -0.2, 0.1, 0, 0.1, 0], START + 0.7 * (GOAL - START)])
+
+
+def program(count: int = 20) -> NonlinearProgram:
+    prepared = PreparedProblem.of(problem())
+    coordinates = Coordinates.joints(START, GOAL, ROBOT.limits)
+    space = bspline.uniform(count)
+    return NonlinearProgram(
+        prepared.kernel, space, prepared.objective_parameters, coordinates, 0.01, 600.0, passes=PASSES
+    )
+
+
+def straight(own: NonlinearProgram) -> Array:
+    points = START + np.outer(own.basis.quintic, GOAL - START)
+    return points[own.basis.free]
+
+
+def test_a_curve_is_put_on_its_passes_by_a_small_change() -> None:
+    own = program()
+    passes = Passes(own, PASSES)
+    free, at = passes.put(straight(own))
+    motion = spline_of(own.basis, own.joint_points(free), 1.0)
+    assert np.abs(motion.curve(at.times) - PASSES).max() < ROUNDING
+    assert (np.diff(at.times) > 0).all()
+    again, still = passes.put(free, at.times)
+    assert np.abs(again - free).max() < ROUNDING and np.abs(still.times - at.times).max() < 1e-6
+
+
+def test_steps_in_the_null_space_keep_the_passes_to_second_order() -> None:
+    own, rng = program(), np.random.default_rng(0)
+    passes = Passes(own, PASSES)
+    free, at = passes.put(straight(own))
+    kept = at.null_space(free.size)
+    assert kept.shape == (free.size, free.size - len(PASSES) * 5)
+    step = (kept @ rng.normal(size=kept.shape[1])).reshape(free.shape)
+    missed = []
+    for size in (1e-2, 1e-3):
+        motion = spline_of(own.basis, own.joint_points(free + size * step), 1.0)
+        missed.append(deviations(motion.curve, PASSES).max())
+    assert missed[1] < 0.02 * missed[0]
+    across = rng.normal(size=free.shape)
+    motion = spline_of(own.basis, own.joint_points(free + 1e-3 * across), 1.0)
+    assert deviations(motion.curve, PASSES).max() > 100 * missed[1]
+
+
+def test_the_curvature_is_that_of_the_cost_along_the_curves_that_pass() -> None:
+    """Second differences of the cost of curves that are put back on the passes after each step."""
+    own, rng, T = program(), np.random.default_rng(1), 2.0
+    passes = Passes(own, PASSES)
+    free, at = passes.put(straight(own))
+    none = np.zeros((len(own.basis.nodes), 6))
+    line = own.derivatives(free, T, none)
+    gradient = line.gradient[:-1].reshape(free.shape)
+    # a cost whose gradient along the passes is zero: else how a step is put back counts, too
+    hessian = line.hessian[:-1, :-1] + at.curvature(gradient, free.size)
+    kept = at.null_space(free.size)
+    for _ in range(5):
+        y = rng.normal(size=kept.shape[1])
+        step = (kept @ (y / np.linalg.norm(y))).reshape(free.shape)
+        h = 1e-3
+        sides = [passes.put(free + sign * h * step, at.times)[0] for sign in (-1, 1)]
+        # what the putting back adds along the passes is a first-order change of the cost
+        drift = sum(sides) - 2 * free
+        along = kept @ (kept.T @ drift.ravel())
+        second = sum(own.value(each, T)[0] for each in sides) - 2 * line.cost - gradient.ravel() @ along
+        exact = float(step.ravel() @ hessian @ step.ravel()) * h * h
+        assert second == pytest.approx(exact, rel=DIFFERENCES, abs=1e-9 * abs(line.cost))
+
+
+def test_the_solver_ends_on_the_passes_and_slides_along_them() -> None:
+    own = program()
+    start, at = Passes(own, PASSES).put(straight(own))
+    found = solve(own, straight(own), 2.0)
+    assert found.status is SqpStatus.SOLVED and found.feasible
+    motion = spline_of(own.basis, own.joint_points(found.free), found.duration)
+    assert deviations(motion.curve, PASSES).max() < ROUNDING
+    assert found.cost < own.value(start, 2.0)[0]
+    fixed = Passes(own, PASSES).put(found.free)[1].times
+    assert np.abs(fixed - at.times).max() > 1e-3
