@@ -113,6 +113,14 @@ class RedundantCurve:
         return boxes_of(self.pose, self.cells(np.asarray(parameter, dtype=float), np.asarray(half, dtype=float)))
 
 
+def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> list[Array]:
+    """The configurations (n, 7) [rad] of each of the curves of one pose at its parameters (n,) on its arcs."""
+    counts = [len(at) for at in parameters]
+    q7 = np.concatenate([curve.last_angle(at) for curve, at in zip(curves, parameters, strict=True)])
+    sheet = np.repeat([curve.sheet for curve in curves], counts, axis=0)
+    return np.split(curves[0].pose.configurations(q7, sheet), np.cumsum(counts)[:-1])
+
+
 def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list[RedundantCurve]:
     """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every member that is.
 

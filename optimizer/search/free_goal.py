@@ -1,9 +1,9 @@
-"""Goals whose orientation is free in part: how the best samples are refined.
+"""Goals that infinitely many configurations reach: how the best samples are refined.
 
-The configurations of such a goal form a manifold. From the best solved samples, the goal configuration becomes a
-decision variable of the nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics
-projects the new goal onto the manifold, and the motion is solved again with this goal fixed, until the energy no longer
-decreases.
+The configurations of a goal whose orientation is free in part, or that is held on a self-motion, form a manifold. From
+the best solved samples, the goal configuration becomes a decision variable of the nonlinear program, restricted to the
+tangent space of the goal manifold. Inverse kinematics projects the new goal onto the manifold, and the motion is solved
+again with this goal fixed, until the energy no longer decreases.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
 # relative decrease of the energy below which no further round follows
 GAIN = 2e-4
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
+REFINED = "converged; refined along the self-motion that holds the pose"
 # instants at which a motion of another method is sampled
 FIT_SAMPLES = 201
 # sides of the polygon that stands for a cone's circle
@@ -59,7 +60,7 @@ def refine_goals(incumbent: Incumbent) -> list[Candidate]:
 def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
     """The candidate with its goal moved over the goal set while the energy decreases; itself if it never does.
 
-    The candidate must be solved, and its goal's orientation free in part.
+    The candidate must be solved, and its goal a sample.
     """
     best, radius = candidate, RADIUS
     for _ in range(ROUNDS):
@@ -97,22 +98,25 @@ def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Gu
     guess.points[-REST_POINTS:] = q_goal
     # the guess is a motion of the free spline's own kind; other methods only take its goal
     result = incumbent.add_effort(solver.improve(guess) if type(solver) is FreeSpline else solver.solve())
-    return settled(incumbent, fresh, result, REFINED_GOAL)
+    return settled(incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED)
 
 
 def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Guess | None:
     """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away."""
-    assert candidate.goal.tolerance is not None
     prepared, spline = incumbent.prepared, candidate.spline
     space = bspline.uniform(COARSE)
-    if spline.degree == space.degree and len(spline.control_points) == COARSE:
-        points = spline.control_points
+    if incumbent.method is FreeSpline and spline.degree == space.degree:
+        space, points = bspline.Basis.of(spline.knots), spline.control_points
     else:
         at = np.linspace(0.0, 1.0, FIT_SAMPLES)
         points = space.fit(sample(spline, at * spline.duration)[0], at)
     coordinates = Coordinates.joints(candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits)
     interval = _interval_of(prepared, candidate.q_goal, spline.duration)
-    allowed = goal_constraints(prepared, candidate.goal.tolerance, candidate.q_goal, radius)
+    pose = candidate.goal.tolerance
+    if pose is None:
+        allowed = held_pose(prepared, candidate.q_goal, radius)
+    else:
+        allowed = goal_constraints(prepared, pose, candidate.q_goal, radius)
     program = NonlinearProgram(
         prepared.kernel, space, interval.p, coordinates, interval.t_min, interval.t_max, interval.constant, allowed
     )
@@ -129,6 +133,11 @@ def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> D
     return min(
         duration_intervals(prepared, q_goal), key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0)
     )
+
+
+def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalConstraints:
+    """To first order, how the goal (nq,) may change while the TCP keeps its pose: along the self-motion."""
+    return GoalConstraints(tcp_jacobian(prepared.problem.arm, q_goal), np.zeros(6), np.zeros(6), radius)
 
 
 def goal_constraints(
