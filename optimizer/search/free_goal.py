@@ -33,8 +33,13 @@ from optimizer.trajectories.spline import sample
 
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
-# relative decrease of the energy below which no further round follows
-GAIN = 2e-4
+# relative decrease of the energy below which no further round follows, and that a step to a proposal must promise: the
+# motion to it is solved again
+GAIN, PROGRESS = 2e-4, 5e-4
+# relative decrease of the energy that is worth another solve
+LEAST_GAIN = 1e-4
+# shares of the way to a proposed goal that are tried
+SHARES = (1.0, 0.9, 0.5)
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
 REFINED = "converged; refined along the self-motion that holds the pose"
 # instants at which a motion of another method is sampled
@@ -57,13 +62,13 @@ def refine_goals(incumbent: Incumbent) -> list[Candidate]:
     )
 
 
-def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
+def refine_goal(incumbent: Incumbent, candidate: Candidate, rounds: int = ROUNDS) -> Candidate:
     """The candidate with its goal moved over the goal set while the energy decreases; itself if it never does.
 
     The candidate must be solved, and its goal a sample.
     """
     best, radius = candidate, RADIUS
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         if incumbent.deadline.passed or radius < LEAST_RADIUS:
             break
         try:
@@ -83,9 +88,16 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
 
 def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> Candidate | None:
     """The candidate with its goal moved by at most `radius` [rad] in each joint, solved; None if it has no motion."""
-    guess = _proposal(incumbent, candidate, radius)
-    q_goal = None if guess is None else nearest_configuration(incumbent.prepared, candidate.goal, guess.points[-1])
-    return None if guess is None or q_goal is None else _solved(incumbent, candidate, q_goal, guess)
+    guess, promised = _proposal(incumbent, candidate, radius)
+    if guess is None or promised > (1 - LEAST_GAIN) * (candidate.energy or 0.0):
+        return None
+    for share in SHARES:
+        # where the set bends, its configuration next to the proposed one may be outside of a limit that this one is on
+        asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
+        q_goal = nearest_configuration(incumbent.prepared, candidate.goal, asked)
+        if q_goal is not None:
+            return _solved(incumbent, candidate, q_goal, guess)
+    return None
 
 
 def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Guess) -> Candidate | None:
@@ -101,8 +113,9 @@ def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Gu
     return settled(incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED)
 
 
-def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Guess | None:
-    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away."""
+def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[Guess | None, float]:
+    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away, and its
+    energy [J]; inf without a motion."""
     prepared, spline = incumbent.prepared, candidate.spline
     space = bspline.uniform(COARSE)
     if incumbent.method is FreeSpline and spline.degree == space.degree:
@@ -121,11 +134,11 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Gues
         prepared.kernel, space, interval.p, coordinates, interval.t_min, interval.t_max, interval.constant, allowed
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
-    result = solve(program, free, spline.duration, None, incumbent.deadline)
+    result = solve(program, free, spline.duration, None, incumbent.deadline, PROGRESS)
     incumbent.add_effort(SolveResult(SolveStatus.FAILED, "a proposal", result.iterations, 1))
     if not result.feasible:
-        return None
-    return Guess(space, program.points(result.free), result.duration)
+        return None, np.inf
+    return Guess(space, program.points(result.free), result.duration), result.cost
 
 
 def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:

@@ -26,7 +26,9 @@ from optimizer.search.sampled_ends import nearest_configuration, refine_best, wi
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
 # of the energy, the least share that a coarse motion is taken to lose by refinement; coarse motions that are refined
 # because they may then be better than the best one
-SAVED, RIVALS = 0.01, 3
+SAVED, RIVALS = 0.01, 1
+# rounds that move the goal of the refined motion
+POSTURE_ROUNDS = 2
 
 Side = Literal["start", "goal"]
 
@@ -53,14 +55,14 @@ def polish(incumbent: Incumbent, best: Candidate, coarse: float) -> None:
     """
     if incumbent.method is not FreeSpline or best.energy is None or not _sides(best):
         return
-    kept = 1 - max(SAVED, 1 - best.energy / coarse)
+    kept = 1 - max(SAVED, 2 * (1 - best.energy / coarse))
     others = [each for each in incumbent.candidates if each.energy is not None and each is not best and _sides(each)]
     for rival in sorted(others, key=lambda each: each.energy or 0.0)[:RIVALS]:
         if (rival.energy or 0.0) * kept < best.energy and not incumbent.deadline.passed:
             refine_motion(incumbent, rival)
     best = incumbent.best() or best
     if best.goal.self_motion is not None:
-        fresh = refine_goal(incumbent, best)
+        fresh = refine_goal(incumbent, best, POSTURE_ROUNDS)
         if fresh is not best:
             incumbent.candidates.append(fresh)
             incumbent.tell_best()
