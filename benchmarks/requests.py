@@ -16,7 +16,7 @@ import threading
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from benchmarks.checks import balance_error, errors_found, objective
@@ -184,11 +184,14 @@ def main() -> int:
     arguments.add_argument("--count", type=int, default=300, help="requests (%(default)s)")
     arguments.add_argument("--clients", type=int, default=1, help="simultaneous requests (%(default)s)")
     arguments.add_argument("--robot", choices=robot_names(), default="ur5e", help="(%(default)s)")
+    arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
     arguments.add_argument("--line-every", type=int, default=5, help="compare every n-th task with time scaling")
     arguments.add_argument("--varied", action="store_true", help="random other fields; some requests are infeasible")
     given = arguments.parse_args()
     tasks = list(request_tasks(given.seed, given.count, given.kind, given.varied, given.robot))
+    if given.deadline is not None:
+        tasks = [replace(task, body={**task.body, "deadline": given.deadline}) for task in tasks]
     with running() as service:
         outcomes = send_all(service, tasks, given.clients, 0 if given.varied else given.line_every)
     results = summary(outcomes)

@@ -25,6 +25,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.attempts import settled, solver_of
 from optimizer.search.candidates import Candidate
+from optimizer.search.ends import EndConfiguration
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from optimizer.trajectories import bspline
@@ -94,16 +95,35 @@ def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> Candida
     for share in SHARES:
         # where the set bends, its configuration next to the proposed one may be outside of a limit that this one is on
         asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
-        q_goal = nearest_configuration(incumbent.prepared, candidate.goal, asked)
-        if q_goal is not None:
-            return _solved(incumbent, candidate, q_goal, guess)
+        found = _nearest_goal(incumbent, candidate, asked)
+        if found is not None:
+            return _solved(incumbent, candidate, *found, guess)
     return None
 
 
-def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Guess) -> Candidate | None:
-    """The candidate with another goal (nq,) [rad], solved; None if it has no motion."""
+def _nearest_goal(incumbent: Incumbent, candidate: Candidate, q: Array) -> tuple[EndConfiguration, Array] | None:
+    """The configuration (nq,) of the candidate's goal that is nearest to q (nq,), with its end; None if none is within
+    the limits.
+
+    Where two curves of a redundant arm meet, it may be on the other one.
+    """
+    ends = {id(candidate.goal.self_motion): candidate.goal}
+    if candidate.goal.self_motion is not None:
+        for each in incumbent.candidates:
+            if each.goal.self_motion is not None and each.goal.target == candidate.goal.target:
+                ends.setdefault(id(each.goal.self_motion), each.goal)
+    near = [(end, nearest_configuration(incumbent.prepared, end, q)) for end in ends.values()]
+    held = [(end, at) for end, at in near if at is not None]
+    return min(held, key=lambda each: float(np.abs(each[1] - q).max()), default=None)
+
+
+def _solved(
+    incumbent: Incumbent, candidate: Candidate, end: EndConfiguration, q_goal: Array, guess: Guess
+) -> Candidate | None:
+    """The candidate with another goal (nq,) [rad] of this end, solved; None if it has no motion."""
     prepared = incumbent.prepared
-    fresh = with_ends(prepared, candidate, candidate.q_start, q_goal)
+    to_end = Candidate(candidate.start, end, candidate.q_start, candidate.q_goal)
+    fresh = with_ends(prepared, to_end, candidate.q_start, q_goal)
     if fresh is None:
         return None
     solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))

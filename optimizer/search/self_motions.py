@@ -14,13 +14,15 @@ import numpy as np
 
 from optimizer.kinematics.angles import nearest_turn
 from optimizer.methods.free_spline import FreeSpline
-from optimizer.search.attempts import settled, solve
+from optimizer.search.attempts import settled, solve, solve_from
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import MEMBERS
 from optimizer.search.free_goal import REFINED, refine_goal
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.refinement import is_tight
 from optimizer.search.refinement import refine as refine_motion
 from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
+from optimizer.trajectories.spline import sampled
 
 # first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
@@ -66,6 +68,10 @@ def polish(incumbent: Incumbent, best: Candidate, coarse: float) -> None:
         if fresh is not best:
             incumbent.candidates.append(fresh)
             incumbent.tell_best()
+        best = fresh
+    if not incumbent.deadline.passed:
+        # with knots at the switches of jerk in a motion of this duration
+        solve_from(incumbent, best, sampled(best.spline), fine=is_tight(incumbent, best))
 
 
 def _moved_along(incumbent: Incumbent, candidate: Candidate) -> Candidate:
