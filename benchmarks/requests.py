@@ -1,6 +1,7 @@
 """Random requests to the service over HTTP. Every answer is checked; the exit code is 1 if a requirement fails.
 
     python -m benchmarks.requests --count 300 --seed 0
+    python -m benchmarks.requests --count 200 --robot panda --kind "joint to pose"
 
 Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in turn. The certificate
 of each answer is checked, its spline is replayed here, and baselines, energy balance and lower bound are compared. Some
@@ -15,7 +16,7 @@ import threading
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from benchmarks.checks import balance_error, errors_found, objective
@@ -23,6 +24,7 @@ from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Client, Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import KINDS, RequestTask, request_tasks
+from models.registry import robot_names
 
 ANSWERED = 0.99  # least fraction of valid answers
 MOST_EXCESS = 1e-2  # largest relative excess of the energy over that of the time-scaled motion
@@ -181,11 +183,15 @@ def main() -> int:
     arguments = parser(__doc__)
     arguments.add_argument("--count", type=int, default=300, help="requests (%(default)s)")
     arguments.add_argument("--clients", type=int, default=1, help="simultaneous requests (%(default)s)")
+    arguments.add_argument("--robot", choices=robot_names(), default="ur5e", help="(%(default)s)")
+    arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
     arguments.add_argument("--line-every", type=int, default=5, help="compare every n-th task with time scaling")
     arguments.add_argument("--varied", action="store_true", help="random other fields; some requests are infeasible")
     given = arguments.parse_args()
-    tasks = list(request_tasks(given.seed, given.count, given.kind, given.varied))
+    tasks = list(request_tasks(given.seed, given.count, given.kind, given.varied, given.robot))
+    if given.deadline is not None:
+        tasks = [replace(task, body={**task.body, "deadline": given.deadline}) for task in tasks]
     with running() as service:
         outcomes = send_all(service, tasks, given.clients, 0 if given.varied else given.line_every)
     results = summary(outcomes)

@@ -59,22 +59,24 @@ def moves(seed: int, count: int, robot: Robot | None = None) -> Iterator[Move]:
     return (move(seed, index, robot) for index in range(count))
 
 
-def request_task(seed: int, index: int, kind: Kind | None = None, varied: bool = False) -> RequestTask:
+def request_task(
+    seed: int, index: int, kind: Kind | None = None, varied: bool = False, robot: str = "ur5e"
+) -> RequestTask:
     """Task `index` of a seed: a request with default settings between reachable targets.
 
     A target is the pose, or the joint positions, of a configuration that is uniform over the joint ranges and without
     self-collision. The kinds alternate if `kind` is None. `varied` adds other fields at random: payload, mounting,
     tighter limits, another objective, a duration, no full-turn alternatives. Such a request can be infeasible.
     """
-    robot = load_robot("ur5e")
+    arm = load_robot(robot)
     rng = np.random.default_rng([seed, index])
     kind = KINDS[index % len(KINDS)] if kind is None else kind
-    q_start, q_goal = collision_free(rng, robot), collision_free(rng, robot)
-    T_start, T_goal = flange(robot, q_start), flange(robot, q_goal)
+    q_start, q_goal = collision_free(rng, arm), collision_free(rng, arm)
+    T_start, T_goal = flange(arm, q_start), flange(arm, q_goal)
     start = {"q": q_start.tolist()} if kind == "joint to pose" else {"pose": as_pose(T_start)}
-    body: dict[str, Any] = {"robot": robot.name, "start": start, "goal": {"pose": as_pose(T_goal)}}
+    body: dict[str, Any] = {"robot": robot, "start": start, "goal": {"pose": as_pose(T_goal)}}
     if varied:
-        body |= _variation(rng, robot)
+        body |= _variation(rng, arm)
     return RequestTask(seed, index, kind, body, T_start, T_goal)
 
 
@@ -87,9 +89,11 @@ def collision_free(rng: np.random.Generator, robot: Robot) -> Array:
             return np.asarray(q)
 
 
-def request_tasks(seed: int, count: int, kind: Kind | None = None, varied: bool = False) -> Iterator[RequestTask]:
+def request_tasks(
+    seed: int, count: int, kind: Kind | None = None, varied: bool = False, robot: str = "ur5e"
+) -> Iterator[RequestTask]:
     """The first `count` requests of a seed, all of one kind if `kind` is given."""
-    return (request_task(seed, index, kind, varied) for index in range(count))
+    return (request_task(seed, index, kind, varied, robot) for index in range(count))
 
 
 def flange(robot: Robot, q: Array) -> Array:

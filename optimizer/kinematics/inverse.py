@@ -13,25 +13,28 @@ For any other arm it returns None: such an arm takes joint positions as targets,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from itertools import groupby, product
 from math import ceil, floor, tau
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from models.robot import MOST_ROBOTS, Array, Limits, Robot
+from models.robot import MOST_ROBOTS, Array, Limits, Mask, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
+from optimizer.kinematics import redundant_curve, traced_curve
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.decomposition import DecomposedArm
 from optimizer.kinematics.isolated import distinct
 from optimizer.kinematics.multi_start import MultiStart
 from optimizer.kinematics.redundant_arm import RedundantArm
+from optimizer.kinematics.redundant_curve import RedundantCurve
 from optimizer.kinematics.self_motion import SelfMotion, is_point, spread
 from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.traced_arm import TracedArm
+from optimizer.kinematics.traced_curve import TracedCurve
 from optimizer.kinematics.ur_closed_form import ROUNDING, URClosedForm
 from optimizer.problem.branches import BranchLabel
 
@@ -200,9 +203,10 @@ class ClosedFormInverseKinematics:
         found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
         motions = self._form.self_motions(T, limits)
         each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // max(len(motions), 1)))
-        for motion in motions:
+        configurations = _members(motions, [spread(motion, each) for motion in motions])
+        for motion, of_motion in zip(motions, configurations, strict=True):
             curve = None if is_point(motion) else motion
-            found += [(q, motion.label, curve) for q in motion.at(spread(motion, each))]
+            found += [(q, motion.label, curve) for q in of_motion]
         if not found:
             return []
         q = np.array([each for each, _, _ in found])
@@ -242,12 +246,13 @@ class ClosedFormInverseKinematics:
         if not reachable:
             raise self._out_of_reach(T, target)
         solutions = []
-        for branch in branches:
-            choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
-            if not all(choices):
+        nearest, held = _nearest_turns(np.array([each.q for each in branches]), limits)
+        for k, branch in enumerate(branches):
+            if not held[k]:
                 continue
             every_turn = windings and branch.self_motion is None
-            wound = np.array(list(product(*choices)) if every_turn else [[joint[0] for joint in choices]])
+            choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max) if every_turn else None
+            wound = nearest[k][None] if choices is None else np.array(list(product(*choices)))
             wound.setflags(write=False)
             distances = np.minimum(wound - limits.q_min, limits.q_max - wound).min(axis=1).tolist()
             rest = branch.smallest_singular_value, branch.singular, branch.self_motion
@@ -295,6 +300,33 @@ def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[fl
         inside = (min(max(angle + tau * k, lower), upper) for k in range(least, most + 1))
         choices.append(sorted(inside, key=abs))
     return choices
+
+
+def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list[Array]:
+    """Configurations (n, nq) [rad] of each of the self-motions of one pose at its parameters (n,)."""
+    found = list[Array]()
+    for kind, group in groupby(zip(motions, parameters, strict=True), key=lambda each: type(each[0])):
+        alike, at = zip(*group, strict=True)
+        together = _TOGETHER.get(kind)
+        found += together(alike, at) if together else [motion.at(u) for motion, u in zip(alike, at, strict=True)]
+    return found
+
+
+# kinds of self-motions whose members are computed together, of all that hold one pose
+_TOGETHER: dict[type, Callable[[Any, Sequence[Array]], list[Array]]] = {
+    RedundantCurve: redundant_curve.members,
+    TracedCurve: traced_curve.members,
+}
+
+
+def _nearest_turns(q: Array, limits: Limits) -> tuple[Array, Mask]:
+    """The first of `full_turn_alternatives` of every joint of q (n, nq) [rad] in [-π, π], and which rows (n,) have
+    all."""
+    q = q.reshape(-1, len(limits.q_min))
+    least = np.ceil((limits.q_min - ROUNDING - q) / tau)
+    most = np.floor((limits.q_max + ROUNDING - q) / tau)
+    near = np.clip(q + tau * np.clip(0.0, least, np.maximum(most, least)), limits.q_min, limits.q_max)
+    return np.asarray(near), np.asarray((least <= most).all(axis=1))
 
 
 def _orthonormal(T: Array) -> Array:

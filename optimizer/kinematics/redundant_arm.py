@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
+from math import atan2, cos, sin
 
 import numpy as np
 import pinocchio as pin
@@ -38,12 +40,12 @@ class RedundantArm:
 
     def label(self, q: Array) -> Label:
         """The branch of a configuration (7,): see `label_of`."""
-        return label_of(np.where(np.array([np.sin(each) for each in self._angles(q)]) < 0, -1.0, 1.0))
+        return label_of(np.where(np.sin(self._angles(q)) < 0, -1.0, 1.0))
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """The parts of the label that are singular at a configuration (7,)."""
         parts = zip(("shoulder", "elbow", "wrist"), self._angles(q), strict=True)
-        return tuple(part for part, angle in parts if abs(np.sin(angle)) < SINGULAR)
+        return tuple(part for part, angle in parts if abs(sin(angle)) < SINGULAR)
 
     def solve(self, T: Array) -> tuple[Array, list[Label]]:
         """No configuration: all are on self-motions."""
@@ -95,15 +97,21 @@ class RedundantArm:
 
     def _angles(self, q: Array) -> tuple[float, float, float]:
         """χ, θ and ψ [rad] of a configuration (7,)."""
-        form, P = self.form, self.form.placements
-        chi = form.lean(q[1])
-        theta = form.q4_at_zero - q[3]
-        x, y, z = form.shoulder_about_fifth(np.array([theta]))[0]
-        c, s = np.cos(q[4]), np.sin(q[4])
-        seen = P[5][:3, :3].T @ [c * x + s * y, c * y - s * x, z]
+        form, wave = self.form, self._label_waves
+        theta = form.q4_at_zero - float(q[3])
+        ct, st, c, s = cos(theta), sin(theta), cos(q[4]), sin(q[4])
+        # S turned by the fifth joint: its part along that axis, across, and at right angles to both
+        x, y, z = (still + ct * cosine + st * sine for still, cosine, sine in wave[:3])
+        along, ahead = c * x + s * y, c * y - s * x
+        u, v = (a * along + b * ahead + d * z for a, b, d in wave[3:])
         # the azimuth of v, turned by the sixth angle, from that of the fifth axis
-        psi = np.arctan2(seen[1], seen[0]) - np.arctan2(form.fifth_in_6[1], form.fifth_in_6[0])
-        return float(chi), float(theta), float(psi)
+        return form.lean_at_zero + float(q[1]), theta, atan2(v, u) - form.fifth_azimuth
+
+    @cached_property
+    def _label_waves(self) -> list[list[float]]:
+        """Coefficients of 1, cos θ and sin θ in S about the fifth axis, three rows; then the first two axes of joint 6
+        in the frame of link 5."""
+        return [*self.form.shoulder_waves.T.tolist(), *self.form.placements[5][:3, :2].T.tolist()]
 
 
 def label_of(sheet: Array) -> Label:

@@ -20,9 +20,9 @@ from optimizer.problem.branches import Label
 
 # parts that a curve is cut into to find where it is within the limits, then parts of what is not decided, and again
 PARTS = (32, 4, 4)
-# a configuration is sought along the tangent if it is farther than NEAREST from the member with its last angle, and
-# nearer than FAR [rad]; steps, and the difference of parameters for the tangent
-NEAREST, FAR, STEPS, STEP = 1e-9, 1e-2, 3, 1e-6
+# a configuration is sought along the tangent if it is farther than NEAREST from the member with its last angle [rad],
+# and first among MEMBERS of each arc if it is farther than FAR; steps, and the difference of parameters for the tangent
+NEAREST, FAR, MEMBERS, STEPS, STEP = 1e-9, 1e-2, 16, 3, 1e-6
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
 
@@ -65,7 +65,8 @@ class RedundantCurve:
     def parameter(self, q: Array) -> float:
         """The parameter of the member nearest to q (7,), nearly: that with its last angle, then on along the tangent.
 
-        Next to a singularity the other angles change by far more than the last one.
+        Next to a singularity, and where two sheets meet, the other angles change by far more than the last one. Of a
+        configuration that is not on the curve, the nearest of some members comes first.
         """
         a, b = self.interval
         u = float(nearest_turn(np.asarray(q[6]), np.asarray((a + b) / 2)))
@@ -73,8 +74,13 @@ class RedundantCurve:
             u = float(np.arccos(np.clip(((a + b) / 2 - u) / max((b - a) / 2, 1e-300), -1.0, 1.0)))
         u = self.clipped(u)
         gap = wrapped(q - self.at(np.array([u]))[0])
+        if np.abs(gap).max() > FAR:
+            tried = np.append(np.concatenate([np.linspace(*arc, MEMBERS) for arc in self.arcs]), u)
+            away = wrapped(q - self.at(tried))
+            nearest = int(np.abs(away).max(axis=1).argmin())
+            u, gap = float(tried[nearest]), away[nearest]
         for _ in range(STEPS):
-            if not NEAREST < np.abs(gap).max() < FAR:
+            if np.abs(gap).max() < NEAREST:
                 break
             tangent = wrapped(np.diff(self.at(np.array([u - STEP, u + STEP])), axis=0)[0]) / (2 * STEP)
             near = self.clipped(u + float(tangent @ gap / max(float(tangent @ tangent), 1e-300)))
@@ -111,6 +117,14 @@ class RedundantCurve:
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion` and `redundant_boxes`."""
         return boxes_of(self.pose, self.cells(np.asarray(parameter, dtype=float), np.asarray(half, dtype=float)))
+
+
+def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> list[Array]:
+    """The configurations (n, 7) [rad] of each of the curves of one pose at its parameters (n,) on its arcs."""
+    counts = [len(at) for at in parameters]
+    q7 = np.concatenate([curve.last_angle(at) for curve, at in zip(curves, parameters, strict=True)])
+    sheet = np.repeat([curve.sheet for curve in curves], counts, axis=0)
+    return np.split(curves[0].pose.configurations(q7, sheet), np.cumsum(counts)[:-1])
 
 
 def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list[RedundantCurve]:

@@ -134,10 +134,20 @@ class SphericalShoulder:
         T7[:3, 3] = T[:3, 3] - T7[:3, :3] @ p
         return T7
 
-    def lean(self, q2: Array) -> Array:
-        """χ (n,) [rad], the angle of the third axis from the first, at the second angle q2 (n,)."""
+    @cached_property
+    def lean_at_zero(self) -> float:
+        """χ [rad], the angle of the third axis from the first, at a second angle of zero."""
         first, third = self.placements[1][2], self.placements[2][:, 2]
-        return np.asarray(q2 + np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0]))
+        return float(np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0]))
+
+    def lean(self, q2: Array) -> Array:
+        """χ (n,) [rad] at the second angle q2 (n,)."""
+        return np.asarray(q2 + self.lean_at_zero)
+
+    @cached_property
+    def fifth_azimuth(self) -> float:
+        """Azimuth [rad] of the fifth axis in the frame of link 6 at q6 = 0."""
+        return float(np.arctan2(self.fifth_in_6[1], self.fifth_in_6[0]))
 
     @cached_property
     def aligned(self) -> tuple[float, ...]:
@@ -157,11 +167,17 @@ class SphericalShoulder:
 
     def shoulder_about_fifth(self, theta: Array) -> Array:
         """S (n, 3) [m] from W, in the frame of joint 5 at q5 = 0, at θ (n,) [rad]."""
+        still, cosine, sine = self.shoulder_waves
+        return np.asarray(still + np.cos(theta)[:, None] * cosine + np.sin(theta)[:, None] * sine)
+
+    @cached_property
+    def shoulder_waves(self) -> Array:
+        """Coefficients (3, 3) [m] of 1, cos θ and sin θ in `shoulder_about_fifth`."""
         n = self._wrist_in_4
-        turned = theta + np.arctan2(n[1], n[0])
-        height = np.full_like(turned, self._shoulder_in_3[2])
-        S = np.stack([self.rho * np.cos(turned), self.rho * np.sin(turned), height], axis=-1)
-        return np.asarray((S - n) @ self.placements[4][:3, :3])
+        towards = np.arctan2(n[1], n[0])
+        c, s = self.rho * np.cos(towards), self.rho * np.sin(towards)
+        waves = np.array([[-n[0], -n[1], self._shoulder_in_3[2] - n[2]], [c, s, 0.0], [-s, c, 0.0]])
+        return np.asarray(waves @ self.placements[4][:3, :3])
 
 
 def _meeting(P: Array) -> tuple[float, float] | None:

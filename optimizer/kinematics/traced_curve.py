@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -65,7 +66,11 @@ class TracedCurve:
 
     def at(self, parameter: Array) -> Array:
         """The configurations (n, nq) [rad] at parameters (n,) on the arcs."""
-        q = self._between(np.asarray(parameter, dtype=float))
+        return self.onto(self.nearly(np.asarray(parameter, dtype=float)))
+
+    def onto(self, q: Array) -> Array:
+        """Configurations (n, nq) [rad] that hold the pose, nearest to such as nearly do."""
+        q = q.copy()
         rows = np.arange(len(q))
         for _ in range(CORRECTIONS):
             T_reached, jacobian = self.chain.flange_and_jacobian(q[rows])
@@ -79,8 +84,8 @@ class TracedCurve:
             q[rows] += (across @ np.linalg.solve(square, error[:, :, None]))[:, :, 0]
         return np.clip(wrapped(q), -np.pi, np.pi)
 
-    def _between(self, u: Array) -> Array:
-        """The curve (n, nq) [rad] at parameters (n,), nearly."""
+    def nearly(self, u: Array) -> Array:
+        """The curve (n, nq) [rad] at parameters (n,), without Newton's method."""
         if len(self.knots) == 1:
             return np.repeat(self.nodes, len(u), axis=0)
         if self.closed:
@@ -113,7 +118,7 @@ class TracedCurve:
 
     def passes(self, q: Array) -> bool:
         """Whether a configuration (nq,) [rad] that holds the pose is a member."""
-        nearly = self._between(np.array([self._nearest(q)]))[0]
+        nearly = self.nearly(np.array([self._nearest(q)]))[0]
         if np.abs(wrapped(nearly - q)).max() > BESIDE:
             return False
         return bool(np.abs(wrapped(self.at(np.array([self.parameter(q)]))[0] - q)).max() < SAME)
@@ -153,7 +158,7 @@ class TracedCurve:
     def within(self, q_min: Array, q_max: Array) -> TracedCurve | None:
         """The curve, cut to where it is within limits (nq,) [rad] but for full turns; None if it is nowhere."""
         u = self._sampled
-        excess = self._excess(self._between(u), q_min, q_max)
+        excess = self._excess(self.nearly(u), q_min, q_max)
         inside = excess <= 0
         if inside.all():
             return self
@@ -202,3 +207,9 @@ class TracedCurve:
             if (np.abs(f) < ROUNDING / 2).all():
                 break
         return np.where(inside, low, high)
+
+
+def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[Array]:
+    """The configurations (n, nq) [rad] of each of the curves of one pose at its parameters (n,)."""
+    near = [curve.nearly(at) for curve, at in zip(curves, parameters, strict=True)]
+    return np.split(curves[0].onto(np.vstack(near)), np.cumsum([len(each) for each in near])[:-1])

@@ -1,9 +1,9 @@
-"""Goals whose orientation is free in part: how the best samples are refined.
+"""Goals that infinitely many configurations reach: how the best samples are refined.
 
-The configurations of such a goal form a manifold. From the best solved samples, the goal configuration becomes a
-decision variable of the nonlinear program, restricted to the tangent space of the goal manifold. Inverse kinematics
-projects the new goal onto the manifold, and the motion is solved again with this goal fixed, until the energy no longer
-decreases.
+The configurations of a goal whose orientation is free in part, or that is held on a self-motion, form a manifold. From
+the best solved samples, the goal configuration becomes a decision variable of the nonlinear program, restricted to the
+tangent space of the goal manifold. Inverse kinematics projects the new goal onto the manifold, and the motion is solved
+again with this goal fixed, until the energy no longer decreases.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.attempts import settled, solver_of
 from optimizer.search.candidates import Candidate
+from optimizer.search.ends import EndConfiguration
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
 from optimizer.trajectories import bspline
@@ -33,9 +34,15 @@ from optimizer.trajectories.spline import sample
 
 # rounds of refinement, the trust region of a goal joint in one of them [rad], and the least one
 ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
-# relative decrease of the energy below which no further round follows
-GAIN = 2e-4
+# relative decrease of the energy below which no further round follows, and that a step to a proposal must promise: the
+# motion to it is solved again
+GAIN, PROGRESS = 2e-4, 5e-4
+# relative decrease of the energy that is worth another solve
+LEAST_GAIN = 1e-4
+# shares of the way to a proposed goal that are tried
+SHARES = (1.0, 0.9, 0.5)
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
+REFINED = "converged; refined along the self-motion that holds the pose"
 # instants at which a motion of another method is sampled
 FIT_SAMPLES = 201
 # sides of the polygon that stands for a cone's circle
@@ -56,13 +63,13 @@ def refine_goals(incumbent: Incumbent) -> list[Candidate]:
     )
 
 
-def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
+def refine_goal(incumbent: Incumbent, candidate: Candidate, rounds: int = ROUNDS) -> Candidate:
     """The candidate with its goal moved over the goal set while the energy decreases; itself if it never does.
 
-    The candidate must be solved, and its goal's orientation free in part.
+    The candidate must be solved, and its goal a sample.
     """
     best, radius = candidate, RADIUS
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         if incumbent.deadline.passed or radius < LEAST_RADIUS:
             break
         try:
@@ -82,46 +89,76 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate) -> Candidate:
 
 def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> Candidate | None:
     """The candidate with its goal moved by at most `radius` [rad] in each joint, solved; None if it has no motion."""
-    guess = _proposal(incumbent, candidate, radius)
-    q_goal = None if guess is None else nearest_configuration(incumbent.prepared, candidate.goal, guess.points[-1])
-    return None if guess is None or q_goal is None else _solved(incumbent, candidate, q_goal, guess)
+    guess, promised = _proposal(incumbent, candidate, radius)
+    if guess is None or promised > (1 - LEAST_GAIN) * (candidate.energy or 0.0):
+        return None
+    for share in SHARES:
+        # where the set bends, its configuration next to the proposed one may be outside of a limit that this one is on
+        asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
+        found = _nearest_goal(incumbent, candidate, asked)
+        if found is not None:
+            return _solved(incumbent, candidate, *found, guess)
+    return None
 
 
-def _solved(incumbent: Incumbent, candidate: Candidate, q_goal: Array, guess: Guess) -> Candidate | None:
-    """The candidate with another goal (nq,) [rad], solved; None if it has no motion."""
+def _nearest_goal(incumbent: Incumbent, candidate: Candidate, q: Array) -> tuple[EndConfiguration, Array] | None:
+    """The configuration (nq,) of the candidate's goal that is nearest to q (nq,), with its end; None if none is within
+    the limits.
+
+    Where two curves of a redundant arm meet, it may be on the other one.
+    """
+    ends = {id(candidate.goal.self_motion): candidate.goal}
+    if candidate.goal.self_motion is not None:
+        for each in incumbent.candidates:
+            if each.goal.self_motion is not None and each.goal.target == candidate.goal.target:
+                ends.setdefault(id(each.goal.self_motion), each.goal)
+    near = [(end, nearest_configuration(incumbent.prepared, end, q)) for end in ends.values()]
+    held = [(end, at) for end, at in near if at is not None]
+    return min(held, key=lambda each: float(np.abs(each[1] - q).max()), default=None)
+
+
+def _solved(
+    incumbent: Incumbent, candidate: Candidate, end: EndConfiguration, q_goal: Array, guess: Guess
+) -> Candidate | None:
+    """The candidate with another goal (nq,) [rad] of this end, solved; None if it has no motion."""
     prepared = incumbent.prepared
-    fresh = with_ends(prepared, candidate, candidate.q_start, q_goal)
+    to_end = Candidate(candidate.start, end, candidate.q_start, candidate.q_goal)
+    fresh = with_ends(prepared, to_end, candidate.q_start, q_goal)
     if fresh is None:
         return None
     solver = solver_of(incumbent, fresh, _interval_of(prepared, q_goal, guess.duration))
     guess.points[-REST_POINTS:] = q_goal
     # the guess is a motion of the free spline's own kind; other methods only take its goal
     result = incumbent.add_effort(solver.improve(guess) if type(solver) is FreeSpline else solver.solve())
-    return settled(incumbent, fresh, result, REFINED_GOAL)
+    return settled(incumbent, fresh, result, REFINED_GOAL if candidate.goal.self_motion is None else REFINED)
 
 
-def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> Guess | None:
-    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away."""
-    assert candidate.goal.tolerance is not None
+def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[Guess | None, float]:
+    """The motion of least energy to any goal in the tangent space of the goal set, at most `radius` [rad] away, and its
+    energy [J]; inf without a motion."""
     prepared, spline = incumbent.prepared, candidate.spline
     space = bspline.uniform(COARSE)
-    if spline.degree == space.degree and len(spline.control_points) == COARSE:
-        points = spline.control_points
+    if incumbent.method is FreeSpline and spline.degree == space.degree:
+        space, points = bspline.Basis.of(spline.knots), spline.control_points
     else:
         at = np.linspace(0.0, 1.0, FIT_SAMPLES)
         points = space.fit(sample(spline, at * spline.duration)[0], at)
     coordinates = Coordinates.joints(candidate.q_start, candidate.q_goal, prepared.problem.arm.active_limits)
     interval = _interval_of(prepared, candidate.q_goal, spline.duration)
-    allowed = goal_constraints(prepared, candidate.goal.tolerance, candidate.q_goal, radius)
+    pose = candidate.goal.tolerance
+    if pose is None:
+        allowed = held_pose(prepared, candidate.q_goal, radius)
+    else:
+        allowed = goal_constraints(prepared, pose, candidate.q_goal, radius)
     program = NonlinearProgram(
         prepared.kernel, space, interval.p, coordinates, interval.t_min, interval.t_max, interval.constant, allowed
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
-    result = solve(program, free, spline.duration, None, incumbent.deadline)
+    result = solve(program, free, spline.duration, None, incumbent.deadline, PROGRESS)
     incumbent.add_effort(SolveResult(SolveStatus.FAILED, "a proposal", result.iterations, 1))
     if not result.feasible:
-        return None
-    return Guess(space, program.points(result.free), result.duration)
+        return None, np.inf
+    return Guess(space, program.points(result.free), result.duration), result.cost
 
 
 def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> DurationInterval:
@@ -129,6 +166,11 @@ def _interval_of(prepared: PreparedProblem, q_goal: Array, duration: float) -> D
     return min(
         duration_intervals(prepared, q_goal), key=lambda each: max(each.t_min - duration, duration - each.t_max, 0.0)
     )
+
+
+def held_pose(prepared: PreparedProblem, q_goal: Array, radius: float) -> GoalConstraints:
+    """To first order, how the goal (nq,) may change while the TCP keeps its pose: along the self-motion."""
+    return GoalConstraints(tcp_jacobian(prepared.problem.arm, q_goal), np.zeros(6), np.zeros(6), radius)
 
 
 def goal_constraints(

@@ -21,7 +21,6 @@ import numpy as np
 from models.robot import Array, Mask
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.pose_boxes import PoseBoxes
 from optimizer.kinematics.wrist_boxes import WristBoxes
 from optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGeometry, potential_rates
@@ -30,6 +29,7 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.targets import AnyOf
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import within_cone
+from optimizer.search.least_displacement import least_displacement
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves
 
@@ -66,7 +66,7 @@ def family_bound_of(
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
     rounds = (TIGHT_ROUNDS if prepared.problem.bound == "tight" else ROUNDS) // len(poses)
-    return min(family_bound(prepared, pose, starts, rounds, deadline, half, enough) for pose in poses)
+    return min(family_bound(prepared, pose, starts, rounds, deadline, half, enough, curves.given) for pose in poses)
 
 
 def family_bound(
@@ -77,13 +77,15 @@ def family_bound(
     deadline: Deadline = NEVER,
     half: Array | None = None,
     enough: float = np.inf,
+    given: bool = False,
 ) -> float:
     """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration of `pose`.
 
+    Starts that are `given` stand as they are, others with any full turn that the limits allow.
     With `half` (s, nq) [rad] the starts are boxes, `starts` their middles and `half` their half sides. Fewer rounds, or
     a deadline, give a weaker bound; the search ends once it reaches `enough` [J].
     """
-    return _BoxSearch(_Family(prepared, pose), starts, half).run(rounds, deadline, enough)
+    return _BoxSearch(_Family(prepared, pose, given), starts, half).run(rounds, deadline, enough)
 
 
 def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array | None) -> Array:
@@ -178,10 +180,11 @@ class _BoxSearch:
 
 @dataclass(frozen=True)
 class _Family:
-    """The configurations that reach a pose with any orientation that it allows."""
+    """The configurations that reach a pose with any orientation that it allows. `given`: see `EndCurves`."""
 
     prepared: PreparedProblem
     pose: ConeOrientedPose
+    given: bool
 
     @cached_property
     def _boxes(self) -> PoseBoxes:
@@ -237,9 +240,10 @@ class _Family:
     def bounds(self, starts: Array, start_halves: Array, potentials: Array, centres: Array, halves: Array) -> Array:
         """Bounds (b,) [J] on motions from boxes around starts (b, nq), of potential energy at most (b,) [J], into boxes
         (b, nq)."""
-        displacement = np.maximum(np.abs(wrapped(starts - centres)) - halves - start_halves, 0.0)
+        limits = self.prepared.arm.active_limits
+        displacement, possible = least_displacement(limits, starts, start_halves, centres, halves, self.given)
         lowest = np.maximum(self._boxes.least_potential(centres, halves), self._hanging(centres, halves))
-        return self._bound.of(displacement, lowest - potentials)
+        return np.where(possible, self._bound.of(displacement, lowest - potentials), np.inf)
 
     def _hanging(self, centres: Array, halves: Array) -> Array:
         """Bound (b,) [J] on the potential energy in boxes, whatever the wrist does: it hangs from the inner joints, and

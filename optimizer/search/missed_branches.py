@@ -43,7 +43,7 @@ def bound_of_others(prepared: PreparedProblem, candidates: Sequence[Candidate], 
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
     rounds = max(1, (TIGHT_ROUNDS if problem.bound == "tight" else ROUNDS) // len(poses))
-    return min(family_bound(prepared, pose, starts, rounds, deadline, half) for pose in poses)
+    return min(family_bound(prepared, pose, starts, rounds, deadline, half, given=curves.given) for pose in poses)
 
 
 def _bound_of_any(prepared: PreparedProblem) -> float:

@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import EndConfiguration
+from optimizer.search.least_displacement import least_displacement
 from optimizer.search.lower_bound import LeastBound
 
 # half side of the first cells, and of cells that are not halved again [rad]; pairs halved in a round, rounds
-FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-3, 64, 40
+FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-4, 64, 60
 
 
 def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
@@ -70,10 +70,14 @@ class Cells:
 
 @dataclass(frozen=True)
 class EndCurves:
-    """What reaches the targets at one end: isolated configurations of so many `joints`, and self-motions."""
+    """What reaches the targets at one end: isolated configurations of so many `joints`, and self-motions.
+
+    `given`: all are joint positions that a target gives, without other full turns.
+    """
 
     joints: int
     curves: list[Array | SelfMotion]
+    given: bool
 
     @staticmethod
     def of(ends: Sequence[EndConfiguration]) -> EndCurves:
@@ -82,7 +86,7 @@ class EndCurves:
         for end in ends:
             curve = end.q if end.self_motion is None else end.self_motion
             curves[id(curve)] = curve
-        return EndCurves(len(ends[0].q), list(curves.values()))
+        return EndCurves(len(ends[0].q), list(curves.values()), all(end.fixed for end in ends))
 
     def first(self) -> Cells:
         """Cells that cover every curve; one without extent for an isolated configuration."""
@@ -116,6 +120,7 @@ class _CellSearch:
         self.prepared, self.start, self.goal = prepared, start, goal
         self.bound = LeastBound(prepared)
         self.rates = potential_rates(prepared.model, prepared.arm.gravity)
+        self.limits = prepared.arm.active_limits
 
     def run(self, deadline: Deadline) -> float:
         """The least bound [J] of any pair after at most ROUNDS rounds of halving."""
@@ -124,7 +129,11 @@ class _CellSearch:
         for _ in range(ROUNDS):
             order = np.argsort(value, kind="stable")
             lowest, rest = order[:SPLIT], order[SPLIT:]
-            if deadline.passed or max(starts.half[order[0]], goals.half[order[0]]) < LAST_HALF:
+            if (
+                deadline.passed
+                or not np.isfinite(value[order[0]])
+                or max(starts.half[order[0]], goals.half[order[0]]) < LAST_HALF
+            ):
                 break
             at_start = starts.half[lowest] > goals.half[lowest]
             (s0, s1), (g0, g1) = starts[lowest].halved(at_start), goals[lowest].halved(~at_start)
@@ -147,8 +156,8 @@ class _CellSearch:
     def bounds(self, starts: Cells, goals: Cells) -> Array:
         """Bounds (n,) [J] on motions from the cells of one end to those of the other."""
         (q_start, start_half), (q_goal, goal_half) = self.start.boxes(starts), self.goal.boxes(goals)
-        half = start_half + goal_half
         # a full turn of a joint changes neither the pose nor the potential energy
-        away = wrapped(q_goal - q_start)
+        away, possible = least_displacement(self.limits, q_start, start_half, q_goal, goal_half, self.start.given)
         potentials = [np.array([self.prepared.potential(q) for q in each]) for each in (q_start, q_goal)]
-        return self.bound.of(np.maximum(np.abs(away) - half, 0.0), potentials[1] - potentials[0] - half @ self.rates)
+        gain = potentials[1] - potentials[0] - (start_half + goal_half) @ self.rates
+        return np.where(possible, self.bound.of(away, gain), np.inf)

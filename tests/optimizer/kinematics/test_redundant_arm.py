@@ -26,6 +26,8 @@ FOUND_BY_NEWTON = 1e-5
 # rad²: a pose rounded to double precision leaves angles next to a singularity open by this over the distance from it;
 # more where the elbow is nearly folded, too: the xArm's may be
 ROUNDED = {"panda": 1e-14, "iiwa14": 1e-14, "xarm7": 3e-14}
+# how much farther a member that counts as nearest may be
+ROUGHLY = 1.5
 # rad: arcs reach beyond the limits by no more than the last box that is not decided
 BEYOND = 0.15
 # relative
@@ -111,6 +113,18 @@ def test_what_newtons_method_finds_is_on_a_curve(robot: Robot, arm: RedundantArm
                 found += 1
                 assert away(curves, other) < FOUND_BY_NEWTON
     assert found > 20
+
+
+def test_the_nearest_member_is_found_of_what_is_not_on_the_curve(robot: Robot, arm: RedundantArm) -> None:
+    """Also where two sheets meet, and the last angle says nothing."""
+    rng = np.random.default_rng(47)
+    for q in configurations(robot, 6):
+        for curve in arm.self_motions(forward(robot, q), robot.limits):
+            lower = curve.arcs[0][0]
+            beside = curve.at(np.array([lower]))[0] + rng.normal(scale=0.1, size=7)
+            members = curve.at(np.concatenate([np.linspace(*arc, 2000) for arc in curve.arcs]))
+            least = np.abs(wrapped(members - beside)).max(axis=1).min()
+            assert away([curve], beside) < ROUGHLY * least
 
 
 def test_boxes_hold_what_they_say(robot: Robot, arm: RedundantArm) -> None:
@@ -220,8 +234,10 @@ def test_boxes_hold_what_turns_freely_on_a_singularity(robot: Robot, arm: Redund
         for curve in arm.self_motions(T):
             if isinstance(curve, FreeTurn):
                 continue
-            u = curve.parameter(q)
-            centre, sides = curve.boxes(np.array([u]), np.array([1e-4]))
+            # where the curve has the last angle of q
+            u = np.linspace(*curve.arcs[0], 20_001)
+            u = u[[np.abs(wrapped(curve.last_angle(u) - q[6])).argmin()]]
+            centre, sides = curve.boxes(u, np.array([2e-4]))
             held |= bool((np.abs(wrapped(turned - centre[0])) <= sides[0]).all())
         assert held
 

@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.inverse import full_turn_alternatives, inverse_kinematics_for
 from optimizer.kinematics.orientation_tolerance import sample_orientations
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
@@ -35,15 +34,20 @@ CONDITIONS: dict[str, dict[str, Any]] = {
 def bound_of_samples(task: Problem, pose: ConeOrientedPose, count: int) -> float:
     """The least `lower_bounds` of any branch of many orientations, joints as near to the start as full turns allow."""
     made, kinematics = PreparedProblem.of(task), inverse_kinematics_for(ROBOT)
-    start = np.asarray(task.start)
+    start, limits = np.asarray(task.start), task.arm.active_limits
+    choices = [
+        full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
+        for R in sample_orientations(pose, count)
+        for branch in kinematics.branches(pose.with_orientation(R).T @ np.linalg.inv(task.arm.T_flange_tcp))
+    ]
     q = np.array(
         [
-            branch.q
-            for R in sample_orientations(pose, count)
-            for branch in kinematics.branches(pose.with_orientation(R).T @ np.linalg.inv(task.arm.T_flange_tcp))
+            [min(turns, key=lambda angle, at=at: abs(angle - at)) for turns, at in zip(each, start, strict=True)]
+            for each in choices
+            if all(each)
         ]
     )
-    displacement = wrapped(q - start)
+    displacement = q - start
     potential_gain = np.array([made.potential(each) for each in q]) - made.potential(start)
     return float(lower_bounds(made, displacement, potential_gain)[0].min())
 
@@ -81,7 +85,8 @@ def test_the_bound_holds_for_any_chain(nq: int, given: dict[str, Any]) -> None:
         pin.framesForwardKinematics(robot.model, data, goal)
         T = data.oMf[robot.model.getFrameId("flange")].homogeneous
         pose = ConeOrientedPose(T[:3, 3], [0, 1, 1], T[:3, :3] @ np.array([0, 1, 1]), half_angle)
-        displacement = wrapped(goal - start)
+        # the chain's ranges are less than a turn
+        displacement = goal - start
         gain = np.array([made.potential(goal) - made.potential(start)])
         value = family_bound(made, pose, start[None], 5)
         assert np.isfinite(value) and value <= lower_bounds(made, displacement[None], gain)[0][0]
