@@ -41,6 +41,7 @@ from optimizer.problem.tool_path import ToolPath
 from optimizer.search.baselines import motion_energy
 from optimizer.search.path_baselines import along
 from optimizer.solution import Solution
+from optimizer.trajectories import ramped
 from optimizer.trajectories.quadrature import lobatto_nodes
 from optimizer.trajectories.spline import Spline
 from optimizer.trajectories.time_scalings import SampledMotion, even_speed
@@ -103,11 +104,7 @@ def smooth(path: Spline, duration: float, ramp: float) -> SampledMotion:
     edges = [np.linspace(a, b, PANELS + 1) for a, b in ((0.0, ramp), (ramp, 1 - ramp), (1 - ramp, 1.0))]
     tau, weights = lobatto_nodes(np.unique(np.concatenate(edges)))
     x, speed = np.minimum(np.minimum(tau, 1 - tau) / ramp, 1.0), 1 / (1 - ramp)
-    way = (
-        speed * np.where(tau < 0.5, 1, -1) * (ramp * (x**3 - x**4 / 2) + np.maximum(np.minimum(tau, 1 - tau) - ramp, 0))
-    )
-    rising = np.where(tau < 0.5, 1, -1) * (x < 1)
-    s = np.where(tau < 0.5, way, 1 + way)
+    s, rising = ramped.fraction(tau, ramp), np.where(tau < 0.5, 1, -1) * (x < 1)
     r1, r2, r3 = (
         speed * (3 * x**2 - 2 * x**3),
         speed * rising * 6 * (x - x**2) / ramp,
