@@ -149,7 +149,7 @@ def test_progress_is_shown_and_cancelled(page: Page, service: Server) -> None:
     assert service.post("/optimize", move()).status_code == 200
 
 
-def test_a_round_is_played_as_one(page: Page) -> None:
+def test_a_round_is_played_as_one(browser: Browser, service: Server, page: Page) -> None:
     show(page, "json")
     page.locator("#json").fill((ROOT / "examples" / "cycle" / "press_tending.json").read_text())
     page.locator("#json").blur()
@@ -166,6 +166,14 @@ def test_a_round_is_played_as_one(page: Page) -> None:
         assert state(page, "time") == pytest.approx(leg["t0"])
         assert page.evaluate(CARRIED) == (1 if leg["payload_mass"] else 0), "what it carries on this leg is drawn"
     expect(page.locator(".label.stop", has_text="finished")).to_be_visible()
+    kept = state(page, "round.answer").removeprefix("/answers/")
+    with opened(browser, f"{service.url}/studio#answer={kept}") as other:
+        until(other, SHOWN)
+        assert other.locator("#timeline .leg").count() == len(legs)
+        expect(other.locator("#optimise")).to_be_disabled()
+        other.locator("#share").click()
+        expect(other.locator("#status")).not_to_be_empty()
+        assert other.url.endswith(f"#answer={kept}"), "its request is not known"
 
 
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:

@@ -17,9 +17,7 @@ export const get = (path) => call(path, { method: "GET" });
 /** JSON of the answer to a POST. Throws Problem, or AbortError. */
 export const post = (path, body, options = {}) => call(path, posting(body, options));
 
-function posting(body, { signal, headers = {} } = {}) {
-  return { method: "POST", body: JSON.stringify(body), signal, headers: { "Content-Type": "application/json", ...headers } };
-}
+const posting = (body, { signal, headers = {} } = {}) => ({ method: "POST", body: JSON.stringify(body), signal, headers: { "Content-Type": "application/json", ...headers } });
 
 /** The response to a request that was accepted. It asks for the key where one is needed. Throws Problem. */
 export async function send(path, options) {

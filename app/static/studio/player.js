@@ -30,9 +30,7 @@ export function createPlayer(view) {
 /** Sets the time, and holds the motion there. */
 export const goTo = (time) => set({ playing: false, time: Math.max(0, Math.min(state.duration, time)) });
 
-export function toggle() {
-  state.playing ? set({ playing: false }) : play();
-}
+const toggle = () => (state.playing ? set({ playing: false }) : play());
 
 /** Plays from where the clock is; from the start, if it is at the end. */
 export function play() {

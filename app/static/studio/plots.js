@@ -80,9 +80,7 @@ function draw(id, series, data, extra = {}) {
 
 const seek = (plot, event) => goTo(plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x"));
 
-function moveCursor(plot) {
-  plot.line.style.transform = `translateX(${plot.valToPos(state.time, "x")}px)`;
-}
+const moveCursor = (plot) => { plot.line.style.transform = `translateX(${plot.valToPos(state.time, "x")}px)`; };
 
 function drawPower() {
   const { t, power } = state.answer.trajectory;

@@ -16,6 +16,7 @@ export function createRequest() {
   $("cancel").onclick = () => running?.abort();
   $("json").onchange = readJson;
   follow("request", () => {
+    $("optimise").disabled = !state.request;
     const text = JSON.stringify(state.request, null, 1);
     if ($("json").value !== text) $("json").value = text;
     if (state.request !== example) $("examples").selectedIndex = -1;

@@ -56,13 +56,14 @@ export function csv({ t, q, v, a, tau, tau_motor, power }) {
 
 async function share() {
   const address = new URL(location.href);
-  address.hash = `r=${await packed(JSON.stringify(state.asked ?? state.request))}`;
+  const asked = state.asked ?? state.request;
+  address.hash = asked ? `r=${await packed(JSON.stringify(asked))}` : `answer=${state.answer.answer.split("/").at(-1)}`;
   history.replaceState(null, "", address);
   try {
     await navigator.clipboard.writeText(address.href);
-    $("status").textContent = "The link is copied. It holds the whole request, and is the address of this page now.";
+    $("status").textContent = "The link is copied. It is the address of this page now.";
   } catch {
-    $("status").textContent = "The address of this page holds the whole request now: copy it.";
+    $("status").textContent = "The address of this page is the link now: copy it.";
   }
 }
 

@@ -20,9 +20,7 @@ export const state = {
 const followers = [];
 
 /** Calls `then(state)` whenever one of the names was set. */
-export function follow(names, then) {
-  followers.push({ names: new Set(names.split(" ")), then });
-}
+export const follow = (names, then) => void followers.push({ names: new Set(names.split(" ")), then });
 
 /** Sets some of the state, then calls those who follow it. */
 export function set(changes) {

@@ -113,10 +113,10 @@ class View {
     this.pose();
   }
 
-  /** The stops of a round, those that it passes included, by their names. */
+  /** The stops of a round, by their names. */
   nameStops(round) {
     const places = new Map(); // several stops may be at one of them
-    for (const [name, q] of new Map(round?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal]).map(({ stop, q }) => [stop, q]))) {
+    for (const [name, q] of new Map(round?.legs.flatMap(({ passes, goal }) => [...(passes ?? []), goal].map(({ stop, q }) => [stop, q])))) {
       const T = this.chain.tcp(q, state.cell.tcp);
       const at = [T[3], T[7], T[11]].map((value) => value.toFixed(3)).join();
       if (!name.includes("/")) places.set(at, [...(places.get(at) ?? []), name]);
