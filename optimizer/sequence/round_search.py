@@ -34,8 +34,8 @@ from optimizer.trajectories.spline import Spline
 
 # share of the deadline that the search leaves to the motions of its answer, and least time for one of these [s]
 RESERVED, LEAST_TIME = 0.3, 1e-3
-# routes through passes that are tried for a pair at most
-MOST_ROUTES = 3
+# routes through passes that are tried for a pair at most, and while none has a motion
+MOST_ROUTES, MOST_FAILED = 3, 10
 # J: a chain is no better than another one by less
 SAME = 1e-9
 
@@ -132,12 +132,12 @@ class RoundSearch(LazySearch):
         first = [(-np.inf, self.stopping[key][0])] if key in self.stopping else []
         others = (each for each in leg.best_routes(s, g) if not first or each[1] != first[0][1])
         for tried, (bound, route) in enumerate(chain(first, others)):
-            if best is not None and np.isfinite(best):
-                if bound >= best:
-                    break
-                if tried >= MOST_ROUTES or LIKELY * bound >= best:
-                    self.routes_left = True
-                    break
+            known = np.inf if best is None else best
+            if np.isfinite(known) and bound >= known:
+                break
+            if tried >= (MOST_ROUTES if np.isfinite(known) else MOST_FAILED) or LIKELY * bound >= known:
+                self.routes_left = True
+                break
             leg.routes[s, g] = route
             energy = self._attempt(*key)
             if energy is None:
