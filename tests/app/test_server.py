@@ -235,6 +235,7 @@ def test_sigterm_while_the_workers_warm_up() -> None:
         until(lambda: not any(alive(pid) for pid in everyone))
 
 
+@pytest.mark.long
 def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()
@@ -249,6 +250,7 @@ def test_ctrl_c_in_a_terminal_ends_cleanly() -> None:
         assert not [entry for entry in server.logged() if entry["level"] == "error"]
 
 
+@pytest.mark.long
 def test_workers_do_not_outlive_a_killed_parent() -> None:
     with serving(workers=1) as server, ThreadPoolExecutor() as pool:
         everyone = server.descendants()

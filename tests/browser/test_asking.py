@@ -176,6 +176,7 @@ def test_a_round_is_played_as_one(browser: Browser, service: Server, page: Page)
         assert other.url.endswith(f"#answer={kept}"), "its request is not known"
 
 
+@pytest.mark.long
 def test_what_does_not_count_at_a_stop_is_faint(page: Page) -> None:
     """The part that is grasped: at its stop and on the lines in and out of it."""
     ask(page, json.loads((ROOT / "examples" / "cycle" / "out_of_a_tray.json").read_text()))
