@@ -59,7 +59,7 @@ class Heap:
         self._filled.set()
 
     def put_back(self, held: Iterable[Held]) -> None:
-        """Adds requests that were taken in vain at the begin."""
+        """Adds requests that were taken, but not worked on, at the beginning."""
         self.ready.extendleft(reversed(list(held)))
         self._filled.set()
 

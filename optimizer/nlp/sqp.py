@@ -128,7 +128,7 @@ class _Solver:
     ) -> None:
         self.p, self.deadline, self.progress = program, deadline, progress
         self.qp = WorkingSetQP(program, time_scale=T)
-        # among obstacles the linear model is worst: a step that breaks limits besides leads nowhere
+        # among obstacles, steps of fewer rounds stall
         self.rounds = MOST_ROUNDS if program.has_clearance else QP_ROUNDS
         self.scale = np.ones(self.qp.n)
         if self.qp.free_time:
@@ -185,7 +185,7 @@ class _Solver:
         return Result(status, at.free, at.T, cost, iterations, violation, stationarity, multiplier)
 
     def _exact_step(self, qp: QPInputs) -> _Point | None:
-        """The point that a step leads to which breaks no constraint of the QP; None if that leads to none."""
+        """The next iterate from a QP of MOST_ROUNDS, after the line search has failed; None if it fails again."""
         step = self.qp.solve(qp, MOST_ROUNDS)
         if step is None:
             return None

@@ -27,8 +27,8 @@ NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
 # no coordinate of a control point moves further in one step [rad]
 STEP = 1.5
-# times that the QP is solved, each time with the constraints that the step before would break. What the last breaks
-# is near its limit at the next iterate: more rounds cost more than they save in iterations, if the step is of any use
+# solves of a QP, each with the constraints that the step before would break. What the last one breaks enters the QP of
+# the next iterate: more rounds take more time than they save, unless the line search fails
 QP_ROUNDS, MOST_ROUNDS = 3, 10
 # the same for a relaxed QP with clearance constraints: it has many rows, and none of them was active before
 RELAXED_ROUNDS = 2
@@ -72,7 +72,7 @@ class QPStep:
 
     `relaxed`: the QP was infeasible, and x breaks its constraints as little as possible. `kinematic` are the
     multipliers at `places`, `torque` those at `nodes` (node, joint) of torques with `signs`, `path` those at `passed`
-    (path point, column). `pull` (n,) is the sum of all constraints' gradients times their multipliers.
+    (path point, column). `pull` (n,): sum of the constraints' gradients times multipliers; zero without passes.
     """
 
     x: Array
@@ -115,7 +115,7 @@ class _Rows:
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
         self.whitening, n = whitening, len(whitening)
-        self.gradients, self.A = np.zeros((0, n)), np.zeros((0, whitening.shape[1]))
+        self.gradients, self.A = list[Array](), np.zeros((0, whitening.shape[1]))
         self.least, self.most = np.zeros(0), np.zeros(0)
         self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
         self.chosen, self.bounded = np.zeros(grid, dtype=bool), np.zeros((2, n), dtype=bool)
@@ -127,7 +127,7 @@ class _Rows:
     def add(self, gradients: Array, most: Array, least: Array | None = None, hard: bool = False) -> Index:
         """Add rows with gradients (rows, n) by the scaled variables, and return their numbers."""
         first, count = len(self.most), len(most)
-        self.gradients = np.concatenate([self.gradients, gradients])
+        self.gradients.append(gradients)
         self.A = np.concatenate([self.A, gradients @ self.whitening])
         self.least = np.concatenate([self.least, np.full(count, -_INFINITE) if least is None else least])
         self.most = np.concatenate([self.most, most])
@@ -220,12 +220,12 @@ class WorkingSetQP:
             if attempt >= last or not self._add_broken(rows, at, bounds, x):
                 break
         mu = np.maximum(multipliers, 0.0)
-        kinds = np.cumsum([len(goal.least), len(path.slack), len(torque.slack)])
-        _, mu_path, mu_torque, _ = np.split(mu, kinds)
+        _, mu_path, mu_torque, _ = np.split(mu, np.cumsum([len(goal.least), len(path.slack), len(torque.slack)]))
         self._keep(rows, mu)
+        pull = np.zeros(self.n) if self.p.passes is None else multipliers @ np.concatenate(rows.gradients)
         return QPStep(
             _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
-            torque.nodes, torque.signs, mu_torque, (path.points, path.columns), mu_path, multipliers @ rows.gradients,
+            torque.nodes, torque.signs, mu_torque, (path.points, path.columns), mu_path, pull,
         )  # fmt: skip
 
     def _keep(self, rows: _Rows, mu: Array) -> None:

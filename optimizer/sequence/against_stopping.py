@@ -88,9 +88,13 @@ def stopping_baselines(asked: WorkRound, rested: Rested, ours: Known) -> list[Ro
     solution = rested.solution
     theirs = compared(asked, "stopping", solution.duration, rested.known, True, ours)
     others = [
-        # the same round by another name has the same energy
-        compared(asked, each.name, each.duration, rested.known if same else each.known, each.within_limits, ours)
+        compared(asked, each.name, each.duration, _known(each, rested), each.within_limits, ours)
         for each in solution.baselines
-        for same in [bool(np.isclose(each.electrical, solution.known.energy, rtol=SAME, atol=0))]
     ]
     return [theirs, *others]
+
+
+def _known(baseline: RoundBaseline, rested: Rested) -> Known:
+    """Energy of a baseline: that of the round with rests, if it is this round by another name."""
+    is_same = np.isclose(baseline.electrical, rested.solution.known.energy, rtol=SAME, atol=0)
+    return rested.known if is_same else baseline.known

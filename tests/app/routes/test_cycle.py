@@ -32,13 +32,18 @@ def a_round(**fields: Any) -> dict[str, Any]:
     return {"start": {"q": HOME}, "stops": stops, "windings": False, **PATIENT, **fields}
 
 
-@pytest.fixture(scope="module")
-def answer(client: TestClient) -> dict[str, Any]:
-    reply = client.post("/cycle", json=a_round())
+def answered(client: TestClient, asked: dict[str, Any]) -> dict[str, Any]:
+    """The answer to a round, which keeps to its schema."""
+    reply = client.post("/cycle", json=asked)
     assert reply.status_code == 200, reply.text
     CycleResponse.model_validate_json(reply.content)
     content: dict[str, Any] = reply.json()
     return content
+
+
+@pytest.fixture(scope="module")
+def answer(client: TestClient) -> dict[str, Any]:
+    return answered(client, a_round())
 
 
 def test_the_round_is_kept(client: TestClient, answer: dict[str, Any]) -> None:

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.schemas.cycle import CycleResponse
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, PATIENT
-from tests.app.routes.test_cycle import PART, ROUNDING, down
+from tests.app.routes.test_cycle import PART, ROUNDING, answered, down
 
 
 def a_round(**fields: Any) -> dict[str, Any]:
@@ -27,11 +26,7 @@ def a_round(**fields: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def answer(client: TestClient) -> dict[str, Any]:
-    reply = client.post("/cycle", json=a_round())
-    assert reply.status_code == 200, reply.text
-    CycleResponse.model_validate_json(reply.content)
-    content: dict[str, Any] = reply.json()
-    return content
+    return answered(client, a_round())
 
 
 def test_a_pass_is_part_of_one_leg(answer: dict[str, Any]) -> None:
