@@ -75,6 +75,8 @@ class Method(ABC):
     best_known: float = np.inf
     # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any will do
     other_goals: Sequence[Array] = ()
+    # whether the candidate was postponed: then clearance constraints on its own motion were tried in vain
+    was_postponed: bool = False
 
     def __init__(
         self,

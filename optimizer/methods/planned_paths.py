@@ -49,9 +49,10 @@ def to_goal(method: Method, planned: PlannedPaths) -> list[Array]:
 
 def without_path(failed: SolveResult, planned: PlannedPaths) -> SolveResult:
     """The result where no path leads to the goal: postponed if one leads to another candidate's, else failed."""
-    status = SolveStatus.POSTPONED if planned.paths else SolveStatus.FAILED
+    if planned.paths:
+        return replace(failed, status=SolveStatus.POSTPONED)
     late = planned.end is PlanningEnd.CUT_SHORT
-    return replace(failed, status=status, reason=f"{failed.reason}; {planned.message}", cut_short=late)
+    return replace(failed, status=SolveStatus.FAILED, reason=f"{failed.reason}; {planned.message}", cut_short=late)
 
 
 def no_polynomial_around(failed: SolveResult, degree: int) -> SolveResult:

@@ -41,6 +41,9 @@ ROUGH_PROGRESS = 1e-3
 TIME_SCALES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # time [s] before the deadline at which an optimisation among obstacles stops, to check its motion
 CHECKING = 0.15
+# penetration [m] of the motion without clearance constraints beyond which, once a motion is known, they are added to a
+# planned path alone: what is that deep inside an obstacle seldom gets out of it
+DEEP = 0.09
 STOPPED = "the deadline ended its optimisation"
 NO_BETTER = (
     "not solved further: its motion collides, and even so needs at least as much energy as the best motion found"
@@ -130,9 +133,11 @@ class SqpMethod(Method):
                 return SolveResult(
                     SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity, cut_short=late
                 )
-            unconstrained = collision is not None and not len(stage.pairs)
-            if unconstrained and self.prepared.cost_of(check.spline) >= self.best_known:
-                return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
+            if collision is not None and not len(stage.pairs):
+                if self.prepared.cost_of(check.spline) >= self.best_known:
+                    return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
+                if self.was_postponed or (np.isfinite(self.best_known) and collision.min_clearance < -DEEP):
+                    return _failed("its motion collides", collision, iterations, solves)
             stage = self._repaired(stage, result, check)
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
 

@@ -140,7 +140,7 @@ class _Solver:
             free, passing = self.passes.put(free)
         self.line, kinematics = program.derivatives(free, T, multiplier), program.kinematics(free)
         self.cost_scale = 1.0 / max(abs(self.line.cost), 1e-9)
-        self.at = self._point(free, T, kinematics, self.line.tau, passing)
+        self.at = self._point(free, T, kinematics, self._excess(T, kinematics, self.line.tau), passing)
         path = np.zeros_like(self.at.path_values.ratios.value)
         self.multipliers = _Multipliers(multiplier, path, len(self.at.violation))
         if program.has_clearance:
@@ -192,14 +192,17 @@ class _Solver:
         self.multipliers.update(step, self.p, self.at.T, self.cost_scale)
         return self._line_search(step.x, float(qp.gradient @ step.x))
 
-    def _point(self, free: Array, T: float, kinematics: Array, tau: Array, passing: Passing | None) -> _Point:
-        """The iterate, from its limited torques (N, nq)."""
-        path_values = self.p.path_rows.values(self.p.points(free), T)
+    def _excess(self, T: float, kinematics: Array, tau: Array) -> Array:
+        """The violations (3 r + nq,) of the rates and of the limited torques (N, nq)."""
         largest = np.maximum(kinematics.max(axis=2), -kinematics.min(axis=2)) / self.qp.rates(T)
         torque = np.abs(tau).max(axis=0) / self.p.limits.tau_max
-        path = path_values.ratios.value.max(axis=0, initial=0.0) - self.p.path_bounds + 1
-        violation = np.maximum(np.concatenate([largest.ravel(), torque, path]) - 1, 0.0)
-        return _Point(free, T, kinematics, path_values, violation, passing)
+        return np.asarray(np.maximum(np.concatenate([largest.ravel(), torque]) - 1, 0.0))
+
+    def _point(self, free: Array, T: float, kinematics: Array, excess: Array, passing: Passing | None) -> _Point:
+        """The iterate, from its violations but for those of path constraints."""
+        path_values = self.p.path_rows.values(self.p.points(free), T)
+        beyond = np.maximum(path_values.ratios.value.max(axis=0, initial=0.0) - self.p.path_bounds, 0.0)
+        return _Point(free, T, kinematics, path_values, np.append(excess, beyond), passing)
 
     def _qp_inputs(self) -> QPInputs:
         """The QP at the iterate: the Lagrangian's Hessian made positive definite, and the cost's gradient, scaled."""
@@ -235,11 +238,14 @@ class _Solver:
             passing = at.passing
             if self.passes is not None and passing is not None:
                 free, passing = self.passes.put(free, passing.times)
-            cost, tau = self.p.value(free, T)
-            trial = self._point(free, T, self.p.kinematics(free), tau, passing)
-            trial_merit = cost * self.cost_scale + float(penalty @ trial.violation)
-            if trial_merit <= merit + ARMIJO * alpha * descent + ROUNDING:
-                return trial
+            allowed = merit + ARMIJO * alpha * descent + ROUNDING
+            (cost, tau), kinematics = self.p.value(free, T), self.p.kinematics(free)
+            excess = self._excess(T, kinematics, tau)
+            # path constraints take the longest, and never lower the merit function
+            if cost * self.cost_scale + float(penalty[: len(excess)] @ excess) <= allowed:
+                trial = self._point(free, T, kinematics, excess, passing)
+                if cost * self.cost_scale + float(penalty @ trial.violation) <= allowed:
+                    return trial
             alpha *= 0.5
         return None
 

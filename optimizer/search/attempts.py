@@ -45,8 +45,9 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
         solver = solver_of(incumbent, candidate, interval)
         if best is not None and best.energy is not None:
             solver.best_known = best.energy
-        elif candidate.attempt is None:
+        else:
             solver.other_goals = _other_goals(incumbent, candidate)
+        solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
         results.append(in_time(incumbent, solver.solve))
     solved = [result for result in results if result.spline is not None]
     if len(solved) > 1:
