@@ -23,6 +23,7 @@ from app.http.compression import Compression
 from app.http.content_coding import ContentCoding
 from app.http.gate import Gate
 from app.http.handlers import install_handlers
+from app.http.head import Head
 from app.http.json_body import JsonBody
 from app.http.metrics import Metrics, RouteNote
 from app.http.openapi import install_openapi
@@ -181,6 +182,7 @@ def _add_middleware(app: FastAPI, settings: Settings, keys: KeyRing | None) -> N
     app.add_middleware(Gate, check=known_host(settings.allowed_hosts, settings.host))
     app.add_middleware(Compression)
     app.add_middleware(Answers, in_flight=in_flight)
+    app.add_middleware(Head)
     app.add_middleware(
         RequestContext,
         sender=partial(sender, proxies=settings.trusted_proxies, header=settings.proxy_header),

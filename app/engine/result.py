@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import orjson
@@ -47,7 +47,8 @@ class TaskResult:
     `stored` are complete answers that belong into the database before the document is sent: it refers to them.
     `kept_as` is the id under which the document itself is to be kept; its last field, `answer`, has the path. `figures`
     are what lists show of it.
-    `is_optimal`: no more time would make it better. `age` [s] is that of a document that was computed before.
+    `is_optimal`: no more time would make it better. `age` [s] is that of a document that was computed before. `motions`
+    are those that it used or found of a cell, by their keys: later rounds may have them in common.
     """
 
     document: bytes
@@ -57,6 +58,7 @@ class TaskResult:
     figures: AnswerFigures = AnswerFigures()
     is_optimal: bool = False
     age: int | None = None
+    motions: Mapping[str, bytes] = field(default_factory=dict)
 
     @classmethod
     def of_json(cls, content: Mapping[str, Any], stored: tuple[StoredAnswer, ...] = ()) -> TaskResult:

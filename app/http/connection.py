@@ -19,6 +19,7 @@ from http import HTTPStatus
 from ipaddress import IPv4Network, IPv6Network, ip_address
 from typing import Any, ClassVar
 
+import httptools
 from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 
@@ -127,15 +128,33 @@ class Connection(HttpToolsProtocol):
         if self._head_at is None and self._body_at is None and self._unanswered is None:
             self._head_at = self.loop.time()  # empty lines before a head are part of it
         self._unparsed += len(data)
-        super().data_received(data)
+        self._unset_keepalive_if_required()
+        self._feed(data)
         if self._head_at is None and self._body_at is None:
             self._unparsed = 0
         elif self._unparsed > self.ceilings.head_bytes:
             self._refuse(HeadTooLarge(self.ceilings.head_bytes))
 
-    def send_400_response(self, msg: str) -> None:
-        """Refuses what is no HTTP. `msg` is uvicorn's, for the log."""
-        self._refuse(MalformedHttp())
+    def _feed(self, data: bytes) -> None:
+        """Has bytes parsed. What is no HTTP is refused.
+
+        An offer to speak another protocol, as curl's `--http2` and Java's client make it, is passed over. The parser
+        takes no body after it: the request is parsed again without the offer.
+        """
+        try:
+            self.parser.feed_data(data)
+        except httptools.HttpParserError:
+            self._refuse(MalformedHttp())
+        except httptools.HttpParserUpgrade as offer:
+            method, version = self.parser.get_method(), self.parser.get_http_version().encode()
+            if self._refused_at is not None or method == b"CONNECT":
+                self._refuse(MalformedHttp())
+                return
+            line = b"%s %s HTTP/%s" % (method, self.url, version)
+            kept = [b"%s: %s" % each for each in self.headers if each[0] != b"upgrade"]
+            self.parser = httptools.HttpRequestParser(self)
+            self.parser.set_dangerous_leniencies(lenient_data_after_close=True)  # as uvicorn does
+            self._feed(b"\r\n".join([line, *kept, b"", data[offer.args[0] :]]))
 
     def on_message_begin(self) -> None:
         """A head begins; that of a further request may come before the answer."""
@@ -161,7 +180,7 @@ class Connection(HttpToolsProtocol):
             self._refuse(HeadTooLarge(self.ceilings.head_bytes))
         elif len(self.pipeline) >= _MOST_AHEAD:
             self._refuse(TooManyConnectionsOfClient())
-        if self._refused_at is None:
+        if self._refused_at is None and not self.parser.should_upgrade():
             self._head_at, self._body_at = None, self.loop.time()
             super().on_headers_complete()
 
@@ -173,8 +192,8 @@ class Connection(HttpToolsProtocol):
 
     def on_message_complete(self) -> None:
         """The request has been received."""
-        self._body_at = None
-        if self._refused_at is None:
+        if self._refused_at is None and not self.parser.should_upgrade():
+            self._body_at = None
             super().on_message_complete()
 
     def pause_writing(self) -> None:

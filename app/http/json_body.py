@@ -26,8 +26,8 @@ class JsonBody:
         """Passes the request on."""
         if scope["type"] == "http":
             headers = MutableHeaders(raw=list(scope["headers"]))
-            declared = headers.get("content-type", FORM).partition(";")[0].strip().lower()
-            if declared in (FORM, TEXT) and scope["path"] not in _CSV_PATHS:
+            declared = headers.get("content-type", "").partition(";")[0].strip().lower()
+            if declared in ("", FORM, TEXT) and scope["path"] not in _CSV_PATHS:
                 headers["content-type"] = "application/json"
                 scope = {**scope, "headers": headers.raw}
         await self._app(scope, receive, send)

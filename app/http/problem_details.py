@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import Any
 
 from fastapi.exceptions import RequestValidationError
@@ -155,8 +156,8 @@ def invalid_request(error: ValidationError | RequestValidationError, *where: str
 
     What each says is in `validation_messages`.
     """
-    entries = [entry for each in error.errors()[:MOST_ERRORS] for entry in told(each, where)]
-    return InvalidRequest(entries[:MOST_ERRORS])
+    entries = (entry for each in error.errors()[:MOST_ERRORS] for entry in told(each, where))
+    return InvalidRequest(list(islice(entries, MOST_ERRORS)))
 
 
 def _own_field(error: Exception, name: str) -> Any:

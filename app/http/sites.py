@@ -29,7 +29,9 @@ def known_host(names: Collection[str], own: str) -> Callable[[Request], None]:
 
     def check(request: Request) -> None:
         hosts = request.headers.getlist("host")
-        if EVERYONE in known or request.scope["path"] in PROBES:
+        # HTTP/1.0 has no such header, and no browser speaks it
+        without = not hosts and request.scope["http_version"] == "1.0"
+        if EVERYONE in known or request.scope["path"] in PROBES or without:
             return
         name = _host_name(hosts[0]) if len(hosts) == 1 else None
         if name is None or not (name in known or _is_address(name)):

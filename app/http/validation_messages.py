@@ -13,7 +13,7 @@ from typing import Any, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from app.convert.json_text import EMPTY, PLAIN_NAME
-from app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD
+from app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
 from app.schemas.common import Request as RequestModel
 from app.schemas.own_arm import NAME_PATTERN
 from app.schemas.scene import BASE64
@@ -57,11 +57,12 @@ def told(error: Mapping[str, Any], where: tuple[str, ...]) -> Iterator[dict[str,
         yield {"loc": loc, "msg": EMPTY if empty else _message(error)}
         return
     context = error["ctx"]
-    for name, meant in context["unknown"].items():
+    for name in context["unknown"]:
+        meant = nearest(name, context["known"])
         # a name of any other form may be anything, also something secret: it is not repeated
         plain = PLAIN_NAME.fullmatch(name) is not None
         hint = f"did you mean `{meant}`?" if meant else "leave it out."
-        msg = f"Unknown field{f' `{name}`' if plain else ''}: {hint} Known here: {context['known']}"
+        msg = f"Unknown field{f' `{name}`' if plain else ''}: {hint} Known here: {', '.join(context['known'])}"
         yield {"loc": [*loc, name] if plain else loc, "msg": msg}
 
 

@@ -6,14 +6,16 @@ import asyncio
 import time
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
 from app import __version__
 from app.engine.result import AnswerFigures, TaskResult
+from app.exceptions import StoreUnavailable
 from app.jobs.heap import Held
 from app.jobs.work import request_id_of
-from app.store import cache
+from app.store import cache, known_motions
 from app.store.cache import Asked
 from app.store.leases import Outcome
 from app.store.store import Store
@@ -54,7 +56,17 @@ class Equals:
         found = await self._store.read(partial(cache.find, asked=asked)) if asked else {}
         hits = [(each, found[each.asked]) for each in held if each.asked is not None and each.asked in found]
         known = await asyncio.to_thread(_copies, hits, began) if hits else {}
-        return Sorted([each for each in held if each not in known and not self._follows(each)], known)
+        to_compute = [each for each in held if each not in known and not self._follows(each)]
+        for each in to_compute:
+            await self._recall(each)
+        return Sorted(to_compute, known)
+
+    async def _recall(self, held: Held) -> None:
+        """Gives a round the motions that it may have in common with others."""
+        meaning = held.lease.meaning
+        if meaning is not None and "cell" in meaning:
+            with suppress(StoreUnavailable):
+                held.motions = await self._store.read(partial(known_motions.find, cell=meaning["cell"]))
 
     def ended(self, held: Held, outcome: Outcome) -> list[tuple[Held, Outcome]]:
         """A request has been computed; the outcomes of those that wait for it and fail as it did."""

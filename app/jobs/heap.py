@@ -6,8 +6,8 @@ import asyncio
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 
 from app.engine.work import Ended, Work
 from app.jobs.progress import HEARD, Found
@@ -24,7 +24,7 @@ SMALL = 1 << 12
 class Held:
     """A lease and the work on it. `began` [s] is its start by `perf_counter`; `dropped`: nobody wants it any more.
 
-    `leads`: equal requests may wait for it.
+    `leads`: equal requests may wait for it. `motions` are known ones of the cell of a round.
     """
 
     lease: Lease
@@ -33,6 +33,7 @@ class Held:
     began: float = 0.0
     dropped: bool = False
     asked: Asked | None = None
+    motions: Mapping[str, bytes] = field(default_factory=dict)
     leads: bool = False
 
     def drop(self) -> None:
@@ -120,5 +121,6 @@ class Taker:
 
         tell = held.found.tell if lease.kind in HEARD else nobody
         stoppable = lease.preempted < MOST_PREEMPTIONS
-        is_small = len(lease.body) <= SMALL
-        return Work(task_of(lease), lease.deadline, ended, stoppable, tell, self._expected(lease.kind), is_small)
+        is_small = len(lease.body) + sum(map(len, held.motions.values())) <= SMALL
+        task, expected = task_of(lease, held.motions), self._expected(lease.kind)
+        return Work(task, lease.deadline, ended, stoppable, tell, expected, is_small)

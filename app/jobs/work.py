@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import orjson
@@ -33,9 +34,9 @@ MOST_PREEMPTIONS = 2
 """Times that a caller may take the worker of a request; then it is left to end."""
 
 
-def task_of(lease: Lease) -> JobRequestTask:
-    """The task of a lease."""
-    return JobRequestTask(lease.kind, lease.body, request_id_of(lease))
+def task_of(lease: Lease, motions: Mapping[str, bytes]) -> JobRequestTask:
+    """The task of a lease; `motions` are known ones of the cell of a round."""
+    return JobRequestTask(lease.kind, lease.body, request_id_of(lease), motions=motions)
 
 
 def outcome_of(lease: Lease, ended: Ended, began: float) -> Outcome:
@@ -68,6 +69,7 @@ def _done(lease: Lease, result: TaskResult) -> Outcome:
         result.parts,
         identified=result.identified,
         is_optimal=result.is_optimal,
+        motions=result.motions,
     )
 
 

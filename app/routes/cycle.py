@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from app.engine.result import TaskResult
 from app.http.openapi import problem_responses
-from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
+from app.routes.dependencies import ServiceArmEngine, ServiceCache, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.later import ACCEPTED, ServiceLater
 from app.routes.parameters import WantedFormat, deadline_of
@@ -16,6 +16,8 @@ from app.schemas import errors as problems
 from app.schemas.cycle import CycleRequest, CycleResponse
 from app.store.store_answers import keep_answer, store_answers
 from app.tasks.cycle import CycleTask
+from app.tasks.read_body import HeldBody
+from app.tasks.request_key import cell_of
 from optimizer.progress import Tell
 
 router = APIRouter(tags=["motion"], route_class=LargeBodyRoute)
@@ -41,6 +43,7 @@ async def cycle(
     client: ServiceClient,
     later: ServiceLater,
     reply: ServiceReply,
+    cache: ServiceCache,
 ) -> Response:
     """Finds the arm configuration at every stop of a round, and the motions between them, that need the least
     electrical energy together. The configuration at one stop decides what the moves from there cost, so that all are
@@ -48,11 +51,13 @@ async def cycle(
     `Accept: text/event-stream` events while the search runs, and then the answer."""
     if later.wanted:
         return await later.respond("cycle", body)
-    task = CycleTask(body, request.state.id, wanted)
+    # a body above 64 KiB is not looked into here
+    cell = None if isinstance(body, HeldBody) else cell_of(body)
 
     async def work(tell: Tell) -> TaskResult:
+        task = CycleTask(body, request.state.id, wanted, await cache.motions(cell))
         result = await engine.run(task, deadline_of(body, settings.max_deadline), tell)
-        result = await store_answers(store, settings, "optimize", result, client.owner)
+        result = await store_answers(store, settings, "optimize", result, client.owner, cell)
         if result.kept_as is None:  # a table
             return result
         return await keep_answer(store, settings, "cycle", result, client.owner)

@@ -6,7 +6,7 @@ from typing import IO, Any, Literal
 
 from fastapi import APIRouter, Request, Response
 
-from app.exceptions import UnsupportedMediaType
+from app.exceptions import InvalidRequest, UnsupportedMediaType
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import result_response
 from app.http.json_body import FORM, TEXT
@@ -90,6 +90,8 @@ async def evaluate(
         async for chunk in request.stream():
             file.write(chunk)
         kind = kind or _kind_of(file)
+        if kind == "json" and request.query_params:
+            raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         if later.wanted and kind == "json":
             body = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request), evaluate=True)
             return await later.respond_with(await later.validated(body))

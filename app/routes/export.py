@@ -9,6 +9,7 @@ from fastapi import APIRouter, Path, Request, Response
 
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
+from app.http.weights import JSON, is_wanted
 from app.routes.dependencies import ServiceArmEngine, ServiceSettings, ServiceStore
 from app.routes.kept_answers import with_kept_answers
 from app.routes.large_bodies import LargeBodyRoute
@@ -68,7 +69,7 @@ async def export(
 ) -> Response:
     """Writes the motion of an answer as a file for a robot controller. The certificate of the motion is computed again,
     for the speed asked for: what fails it is not exported. No format was run on hardware."""
-    as_json = "application/json" in request.headers.get("accept", "").lower()
+    as_json = is_wanted(request, JSON)
     task = ExportTask(body, format, as_json, request.state.id)
     work = with_kept_answers(task, engine, store, settings.max_deadline)
     result = await unless_disconnected(request, work)

@@ -13,6 +13,7 @@ from sqlalchemy.exc import IntegrityError
 
 from app.http.disconnect import unless_disconnected
 from app.http.openapi import problem_responses
+from app.http.weights import is_wanted
 from app.routes.dependencies import ServiceArmEngine, ServiceClient, ServiceSettings, ServiceStore
 from app.routes.large_bodies import LargeBodyRoute
 from app.routes.parameters import LOCATION_HEADER
@@ -91,7 +92,7 @@ async def show(request: Request, id: FiguresIdPath, store: ServiceStore) -> Any:
     """The robot's `figures.yaml` with the identified figures in the place of its own, their covariance and `sd`.
     `Accept: application/yaml` returns a file for `load_robot(name, figures=…)` of the library."""
     detail = await _detail(store, await store.read(partial(figures.get, id=id)))
-    if YAML not in request.headers.get("accept", "").lower():
+    if not is_wanted(request, YAML):
         return detail
     content = detail.model_dump(mode="json", exclude={"id", "created", "owner", "parameters"}, exclude_none=True)
     return Response(await run_in_threadpool(_yaml, content), media_type=YAML)

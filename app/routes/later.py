@@ -114,7 +114,7 @@ async def _later(
 ) -> Later:
     given = ", ".join(request.headers.getlist("prefer")) if prefer is not None else ""
     preferences = {text.partition(";")[0].replace(" ", "").lower() for text in given.split(",")}
-    waits = [int(text[5:]) for text in preferences if re.fullmatch(r"wait=[0-9]{1,9}", text)]
+    waits = [int(found[1]) for text in preferences if (found := re.fullmatch(r'wait="?([0-9]{1,9})"?', text))]
     longest = int(jobs.settings.max_deadline)
     wanted = "respond-async" in preferences
     return Later(wanted, min(*waits, longest) if waits else 0, jobs, engine, client, key, request)

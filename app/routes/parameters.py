@@ -9,6 +9,7 @@ from fastapi import Depends, Header, Path, Request, Response
 from app.exceptions import InvalidRequest
 from app.http.event_stream import EVENT_STREAM
 from app.http.handlers import CACHE_HEADER
+from app.http.weights import is_wanted
 from app.schemas.common import KEY_HEADER
 from app.schemas.examples.values import STUDY_ID
 from app.schemas.studies import IdempotencyKey
@@ -44,8 +45,7 @@ def allowed_deadline(given: float | None, default: float, longest: float, where:
 
 
 async def _wanted_format(request: Request) -> Literal["json", "csv"]:
-    accepted = request.headers.get("accept", "").lower()
-    return "csv" if "text/csv" in accepted and EVENT_STREAM not in accepted else "json"
+    return "csv" if is_wanted(request, "text/csv") and not is_wanted(request, EVENT_STREAM) else "json"
 
 
 WantedFormat = Annotated[Literal["json", "csv"], Depends(_wanted_format)]

@@ -10,6 +10,7 @@ from fastapi import Depends, Request, Response
 from app.http.disconnect import unless_disconnected
 from app.http.event_stream import EVENT_STREAM, EventStream, Work
 from app.http.handlers import result_response
+from app.http.weights import is_wanted
 from app.schemas.examples.progress import EVENTS
 from optimizer.progress import nobody
 
@@ -32,7 +33,7 @@ class Reply:
 
 
 async def _reply(request: Request) -> Reply:
-    return Reply(request, EVENT_STREAM in request.headers.get("accept", "").lower())
+    return Reply(request, is_wanted(request, EVENT_STREAM))
 
 
 ServiceReply = Annotated[Reply, Depends(_reply)]

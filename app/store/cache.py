@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import NotRequired, TypedDict
 
 from sqlalchemy import select
 from sqlalchemy.dialects import postgresql, sqlite
@@ -14,11 +14,15 @@ from app.store.tables import Answer, CachedAnswer
 
 
 class Meaning(TypedDict):
-    """What a request means to a version of the service: the hash of its canonical form, and the name of its robot."""
+    """What a request means to a version of the service: the hash of its canonical form, and the name of its robot.
+
+    Of a round also its cell, see `KnownMotion`.
+    """
 
     version: str
     digest: str
     robot: str
+    cell: NotRequired[str]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session, defer
 
 from app.engine.result import AnswerFigures, StoredAnswer
 from app.exceptions import TooManyFigures
-from app.store import answers, cache, figures, jobs
+from app.store import answers, cache, figures, jobs, known_motions
 from app.store.cache import Answered, Asked, Meaning
 from app.store.job_events import Report, conclude, progress_is_due, record_progress, request_ended, set_state
 from app.store.tables import Job, JobRequest, new_id
@@ -62,7 +62,7 @@ class Outcome:
     `wall_time` [s] is that of the work. `answer` is the compressed document, and `answer_id` its id, if it says so
     itself. `parts` are the answers that it refers to, compressed, of the endpoint `parts_kind`. `identified` are the
     figures of an arm that were found, if any. `is_optimal`: no more time would make the answer better. It answers what
-    was `asked`, too.
+    was `asked`, too. `motions` are those that a round used or found in its cell.
     """
 
     lease: Lease
@@ -79,6 +79,7 @@ class Outcome:
     identified: FoundFigures | None = None
     is_optimal: bool = False
     asked: Asked | None = None
+    motions: Mapping[str, bytes] = field(default_factory=dict)
 
 
 def lease(session: Session, holder: str, count: int, now: datetime, until: datetime) -> tuple[list[Lease], set[str]]:
@@ -127,6 +128,9 @@ def settle(session: Session, holder: str, outcomes: Sequence[Outcome], now: date
             if request.state == "failed" and not job.keep_going:
                 stopped.append(job)
     cache.remember(session, _answered(held))
+    for outcome, request in held:
+        if request is not None and outcome.lease.meaning is not None and "cell" in outcome.lease.meaning:
+            known_motions.keep(session, outcome.lease.meaning["cell"], outcome.motions)
     for job in stopped:
         if job.state == "running":
             jobs.stop(session, job, now)

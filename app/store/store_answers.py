@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from app.engine.result import StoredAnswer, TaskResult
 from app.exceptions import StoreUnavailable
 from app.settings import Settings
-from app.store import answers, cache
+from app.store import answers, cache, known_motions
 from app.store.cache import Answered, Asked
 from app.store.store import Store
 from app.store.tables import Answer
@@ -23,16 +23,21 @@ class _TooLarge(Exception):
 
 
 async def store_answers(
-    store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None
+    store: Store, settings: Settings, kind: str, result: TaskResult, owner: str | None, cell: str | None = None
 ) -> TaskResult:
     """The result, once the answers that it refers to are stored.
 
     Stores `result.stored`, answers of the endpoint `kind` that belong to `owner`. Deletes answers that are too old or
-    too many. Raises StoreUnavailable.
+    too many. Keeps its motions, which are of a `cell`. Raises StoreUnavailable.
     """
+
+    def keep(session: Session) -> None:
+        if cell is not None:
+            known_motions.keep(session, cell, result.motions)
+
     if result.stored:
-        await _put(store, settings, kind, result.stored, owner)
-    return replace(result, stored=())
+        await _put(store, settings, kind, result.stored, owner, also=keep)
+    return replace(result, stored=(), motions={})
 
 
 async def keep_answer(

@@ -162,6 +162,21 @@ class CachedAnswer(Table):
     """Longest deadline [s] of a request that it answers; null if that does not matter, because it is optimal."""
 
 
+class KnownMotion(Table):
+    """A motion of a move of a round. Rounds of the same arm in the same `cell` may have it in common."""
+
+    __tablename__ = "known_motions"
+    __table_args__ = (Index(None, "cell", "used"), Index(None, "used"))
+
+    cell: Mapped[str] = mapped_column(String(64), primary_key=True)
+    """Hash of what a round says of the arm and its cell."""
+    key: Mapped[str] = mapped_column(String(64), primary_key=True)
+    """Hash of everything that the motion hangs on."""
+    used: Mapped[datetime] = mapped_column(Instant)
+    body: Mapped[bytes] = mapped_column(LargeBinary)
+    """The spline: JSON, compressed."""
+
+
 class Iteration(Table):
     """One step of a study: the request and the energies [J] of its motion. The complete answer is in `answers`."""
 

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from app.engine.result import TaskResult
 from app.exceptions import StoreUnavailable
 from app.schemas.common import Request
-from app.store import cache
+from app.store import cache, known_motions
 from app.store.cache import Asked, Meaning
 from app.store.store import Store
 from app.store.tables import Answer, now
@@ -60,6 +60,19 @@ class AnswerCache:
             return await compute(deadline)
         result, is_anothers = await self.in_flight.result(asked, compute)
         return replace(result, age=0).with_id(request_id) if is_anothers else result
+
+    async def motions(self, cell: str | None) -> dict[str, bytes]:
+        """Motions that rounds in this cell may have in common, by their keys; none for a round whose cell is not known.
+
+        They are shared by all clients: no answer hangs on them.
+        """
+        if cell is None or self.by_passed or self.store.fault is not None:
+            return {}
+        try:
+            async with asyncio.timeout(PATIENCE):
+                return await self.store.read(partial(known_motions.find, cell=cell))
+        except (StoreUnavailable, TimeoutError):
+            return {}
 
     async def find(self, asked: Asked | None, request_id: str) -> TaskResult | None:
         """A stored answer as that to the request with this id; None if there is none."""

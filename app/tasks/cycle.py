@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from app.convert.cycle import to_cycle_response, to_work_round
 from app.convert.cycle_csv import to_cycle_csv
+from app.convert.known_motions import to_kept, to_known_motions
 from app.convert.round_arms import arms_of_moves
 from app.convert.solution import to_optimize_response
 from app.engine.listening import listener
@@ -16,20 +18,31 @@ from app.tasks.answer_collector import AnswerCollector
 from app.tasks.answer_figures import figures_of
 from app.tasks.certified import certified
 from optimizer.optimize_round import optimize_round
+from optimizer.sequence.known_motions import knowing
+from optimizer.sequence.round_solution import RoundSolution
 from optimizer.solution import Solution
 
 
 @dataclass(frozen=True)
 class CycleTask:
-    """A validated request and its id; the media type of the answer is `wanted`."""
+    """A validated request and its id; the media type of the answer is `wanted`.
+
+    `motions` are kept ones of the same cell, see `store.known_motions`.
+    """
 
     request: CycleRequest
     request_id: str
     wanted: Literal["json", "csv"] = "json"
+    motions: Mapping[str, bytes] = field(default_factory=dict)
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of `POST /cycle`, within about `deadline` seconds."""
-        found = optimize_round(to_work_round(self.request, deadline), tell=listener())
+        motions = to_known_motions(self.motions)
+        with knowing(motions):
+            found = optimize_round(to_work_round(self.request, deadline), tell=listener())
+        return replace(self._result(found), motions=to_kept(motions))
+
+    def _result(self, found: RoundSolution) -> TaskResult:
         collector = AnswerCollector()
         if self.wanted == "csv":
             return TaskResult.of_csv(to_cycle_csv(found))

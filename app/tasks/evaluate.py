@@ -64,8 +64,6 @@ class EvaluateTask:
         return settings, result
 
     def _evaluate_json(self, began: Deadline) -> tuple[EvaluateSettings, Evaluation]:
-        if self.query:
-            raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -31,8 +31,8 @@ from app.tasks.pareto import ParetoTask
 from app.tasks.whatif import WhatifTask
 from optimizer.deadline import Deadline
 
-IDENTIFY = "identify"
-"""Kind of the request of an identification, which needs stored logs."""
+IDENTIFY, CYCLE = "identify", "cycle"
+"""Kinds of requests that need something of the database: stored logs, and motions that are known."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,8 @@ class JobRequestTask:
     request_id: str
     logs: tuple[Stored, ...] = ()
     """Those that an identification names."""
+    motions: Mapping[str, bytes] = field(default_factory=dict)
+    """Those of the cell of a round."""
 
     def run(self, deadline: float) -> TaskResult:
         """The answer of the endpoint, within about `deadline` seconds."""
@@ -64,6 +66,9 @@ class JobRequestTask:
         if self.kind == IDENTIFY:
             asked = IdentifyRequest.model_validate_json(body)
             result = IdentifyTask(asked, self.logs, self.request_id).run(deadline)
+        elif self.kind == CYCLE:
+            cycle = CycleRequest.model_validate_json(body)
+            result = CycleTask(cycle, self.request_id, motions=self.motions).run(deadline)
         else:
             result = _RUN[self.kind](body, self.request_id, deadline)
         answer = orjson.loads(result.document)
@@ -76,6 +81,7 @@ class JobRequestTask:
             result.kept_as,
             figures,
             result.is_optimal,
+            motions=result.motions,
             wall_time=time.perf_counter() - began,
             parts="evaluate" if self.kind == "whatif" and answer["objective"] is None else "optimize",
             identified=_identified(answer) if self.kind == IDENTIFY else None,
@@ -95,7 +101,6 @@ def _evaluate(body: bytes, request_id: str, deadline: float) -> TaskResult:
 
 _RUN: dict[str, Callable[[bytes, str, float], TaskResult]] = {
     "optimize": lambda body, own, left: OptimizeTask(OptimizeRequest.model_validate_json(body), own).run(left),
-    "cycle": lambda body, own, left: CycleTask(CycleRequest.model_validate_json(body), own).run(left),
     "pareto": lambda body, own, left: ParetoTask(ParetoRequest.model_validate_json(body), own, "json").run(left),
     "compare": lambda body, own, left: CompareTask(CompareRequest.model_validate_json(body), own).run(left),
     "whatif": lambda body, own, left: WhatifTask(WhatifRequest.model_validate_json(body), own).run(left),

@@ -9,8 +9,12 @@ import orjson
 from pydantic import BaseModel
 
 from app import __version__
+from app.schemas.arm import ArmRequest
+from app.schemas.cycle import CycleRequest
 from app.schemas.whatif import WhatifRequest
 from app.store.cache import Meaning
+
+_CELL = set(ArmRequest.model_fields) - {"payload"}
 
 
 def meaning_of(kind: str, body: Any) -> Meaning:
@@ -19,7 +23,15 @@ def meaning_of(kind: str, body: Any) -> Meaning:
     assert isinstance(body, BaseModel)
     content = [__version__, kind, body.model_dump(mode="json", exclude={"deadline"})]
     base = (body.optimize or body.evaluate) if isinstance(body, WhatifRequest) else body
-    return {"version": __version__, "digest": _hash(content), "robot": base.robot}  # type: ignore[union-attr]
+    meaning: Meaning = {"version": __version__, "digest": _hash(content), "robot": base.robot}  # type: ignore[union-attr]
+    if isinstance(body, CycleRequest):
+        meaning["cell"] = cell_of(body)
+    return meaning
+
+
+def cell_of(body: CycleRequest) -> str:
+    """What a round says of the arm and its cell: rounds that agree in it may have moves in common."""
+    return _hash([__version__, body.model_dump(mode="json", include=_CELL)])
 
 
 def key_of(meaning: Meaning, owner: str | None, own_robot: dict[str, Any] | None, job_id: str | None = None) -> str:

@@ -98,14 +98,17 @@ class Run:
             self.warm_start(spline)
         return self.search()
 
-    def as_it_is(self, spline: Spline) -> Solution:
-        """The solution that a known motion is, without any search. Raises NoTrajectory if it is not certified."""
+    def as_it_is(self, spline: Spline, stationarity: float | None = None, is_optimal: bool = False) -> Solution:
+        """The solution that a known motion is, without any search. Raises NoTrajectory if it is not certified.
+
+        `is_optimal`: a search found it, which ended with this `stationarity`.
+        """
         self.prepare()
         incumbent = self.incumbent
         candidate = between(incumbent.prepared, incumbent.candidates, *spline.control_points[[0, -1]])
-        result = SolveResult(SolveStatus.SOLVED, "a known motion", spline=spline)
+        result = SolveResult(SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity)
         incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
-        incumbent.cut_short = True
+        incumbent.cut_short = not is_optimal
         answer = self.answer(candidate, compare_with_baselines(incumbent, candidate))
         if answer is None:
             incumbent.reject(candidate)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, fastest
+from optimizer.methods.method import SolveResult
 from optimizer.problem.problem import LEAST_DURATION
+from optimizer.sequence.known_motions import KnownMotion, known_motions
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
 from optimizer.trajectories.spline import Spline, sampled
@@ -48,13 +50,26 @@ def fastest_motion(leg: Leg, s: int, g: int, deadline: Deadline) -> PricedMotion
 def _solved(
     leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None = None
 ) -> PricedMotion | None:
+    problem = replace(leg.prepared.problem, start=leg.start.q[s], goal=leg.goal.q[g], passes=leg.passes(s, g))
+    motions, asked = known_motions(), (interval, None if guess is None else sampled(guess))
+    key = motions.key("priced", problem, *asked)
+    known = motions.recall(key)
+    result = known.result if known is not None else _looked_for(leg, s, g, interval, deadline, guess)
+    if result is None or result.spline is None:
+        return None
+    if not result.cut_short:
+        motions.keep(key, KnownMotion(result.spline, result.stationarity))
+    return PricedMotion(result.spline, leg.prepared.energy(result.spline).electrical.total)
+
+
+def _looked_for(
+    leg: Leg, s: int, g: int, interval: DurationInterval, deadline: Deadline, guess: Spline | None
+) -> SolveResult | None:
+    """What a solver makes of a pair; None if the time is up."""
     solver = solver_for(leg.prepared_for(s, g), leg.start.q[s], leg.goal.q[g], deadline, interval)
     try:
         with watch(deadline):
-            result = solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)
-            if result.spline is None:
-                return None
-            return PricedMotion(result.spline, leg.prepared.energy(result.spline).electrical.total)
+            return solver.solve() if guess is None else solver.solve_from(*sampled(guess), False)
     except DeadlinePassed:
         return None
 

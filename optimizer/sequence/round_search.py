@@ -23,6 +23,7 @@ from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, 
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
 from optimizer.sequence.chains import LeastChain
+from optimizer.sequence.known_motions import KnownMotion, known_motions
 from optimizer.sequence.layers import Layer, layer_of
 from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
@@ -55,6 +56,7 @@ class RoundSearch(LazySearch):
         self.solutions: dict[tuple[int, int, int], Solution] = {}
         # searches that have a first motion, to go on with
         self._runs: dict[tuple[int, int, int], Run] = {}
+        self._known_motions = known_motions()
         try:
             with watch(self.end):
                 layers = layers_of(asked)
@@ -170,7 +172,11 @@ class RoundSearch(LazySearch):
         if candidate.status is CandidateStatus.INFEASIBLE:
             return np.inf
         if candidate.energy is None:
-            candidate.attempt = result = solve(incumbent, candidate)
+            motions, key = self._known_motions, self._known_motions.key("tried", run.problem)
+            known = motions.recall(key)
+            candidate.attempt = result = solve(incumbent, candidate) if known is None else known.result
+            if result.spline is not None and not incumbent.cut_short:
+                motions.keep(key, KnownMotion(result.spline, result.stationarity))
             if result.status is SolveStatus.OUT_OF_TIME:
                 return self.late()
             self.failed |= result.spline is None
@@ -208,22 +214,27 @@ class RoundSearch(LazySearch):
         if own is not None and self.moves[k].tool_path is not None:
             # a path that is followed as fast as it can be is not followed so fast again without a guess
             known.append(own.trajectory.spline)
-        return Run(fixed, known, self.clock).solution()
+        key = self._known_motions.key("finished", fixed, known)
+        return self._recalled(key, fixed) or self._kept(key, Run(fixed, known, self.clock).solution())
 
     def finish(self, k: int, s: int, g: int) -> None:
         """Optimise the motion of a pair to the end, and certify it. Raises DeadlineExceeded if no time is left."""
         leg, before, end = self.legs[k], float(self.legs[k].cost[s, g]), self._end_of(k)
+        problem, known = self._problem_of(k, s, g, end.left), self._known(k, s, g)
         run = self._runs.pop((k, s, g), None)
+        key = self._known_motions.key("finished", problem, known)
         try:
-            if run is None:
-                found = Run(self._problem_of(k, s, g, end.left), self._known(k, s, g), self.clock).solution()
+            if (recalled := self._recalled(key, problem)) is not None:
+                found = recalled
+            elif run is None:
+                found = self._kept(key, Run(problem, known, self.clock).solution())
             else:
                 run.incumbent.end = end
-                if run.incumbent.cut_short and (known := self._known(k, s, g)):
+                if run.incumbent.cut_short and known:
                     # its share of the search's time was too short
                     run.incumbent.cut_short = False
                     run.warm_start(known[0])
-                found = run.search()
+                found = self._kept(key, run.search())
         except NoTrajectory:
             self.failed = True
             leg.set_pair(s, g, np.inf)
@@ -231,6 +242,23 @@ class RoundSearch(LazySearch):
         self.solutions[k, s, g] = found
         leg.set_pair(s, g, found.energy.electrical.total)
         self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
+
+    def _kept(self, key: str, found: Solution) -> Solution:
+        """A solution, whose motion is kept if no more time would make it better."""
+        if found.status == "optimal":
+            self._known_motions.keep(key, KnownMotion(found.trajectory.spline, found.solver.stationarity))
+        return found
+
+    def _recalled(self, key: str, problem: Problem) -> Solution | None:
+        """The solution that a known motion is; None if none is known, or it is not certified."""
+        known = self._known_motions.recall(key)
+        if known is None:
+            return None
+        try:
+            return Run(problem, clock=self.clock).as_it_is(known.spline, known.stationarity, is_optimal=True)
+        except NoTrajectory:
+            self._known_motions.forget(key)
+            return None
 
     def _end_of(self, k: int) -> Deadline:
         """The deadline of the motion of a leg. Raises DeadlineExceeded if no time is left."""

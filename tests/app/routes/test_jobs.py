@@ -244,6 +244,15 @@ def test_other_preferences_have_no_effect(prefer: str, client: TestClient) -> No
     assert "preference-applied" not in answer.headers
 
 
+@pytest.mark.parametrize("headers", [{}, LATER])
+def test_settings_beside_a_json_body_are_refused(headers: dict[str, str], client: TestClient) -> None:
+    """They would have no effect."""
+    body, query = evaluation()["evaluate"], {"drives": '{"inverter": {"constant": 1.0}}'}
+    answer = client.post("/evaluate", json=body, params=query, headers=headers)
+    (error,) = refused(answer, problems.Validation)["errors"]
+    assert error["loc"] == ["query"] and "JSON body" in error["msg"]
+
+
 def test_a_table_is_evaluated_at_once(client: TestClient) -> None:
     table = "q1,q2,q3,q4,q5,q6\n0,-1.57,1.57,-1.57,-1.57,0\n0.3,-1.4,1.4,-1.5,-1.57,0.2\n"
     headers = LATER | {"Content-Type": "text/csv"}

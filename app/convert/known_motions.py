@@ -1,0 +1,36 @@
+"""Known motions as the database keeps them: JSON, compressed."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+
+import numpy as np
+import orjson
+
+from optimizer.sequence.known_motions import KnownMotion, KnownMotions
+from optimizer.trajectories.spline import Spline
+
+_SPLINE = ("degree", "knots", "control_points")
+
+
+def to_known_motions(kept: Mapping[str, bytes]) -> KnownMotions:
+    """Known motions from kept ones."""
+    return KnownMotions({key: _to_motion(orjson.loads(zlib.decompress(body))) for key, body in kept.items()})
+
+
+def to_kept(motions: KnownMotions) -> dict[str, bytes]:
+    """What is to be kept of known motions: those that were used or found."""
+    return {key: _kept(motion) for key, motion in motions.used.items()}
+
+
+def _to_motion(kept: dict[str, object]) -> KnownMotion:
+    degree, knots, points = (kept[name] for name in _SPLINE)
+    assert isinstance(degree, int)
+    return KnownMotion(Spline(degree, np.array(knots), np.array(points)), kept["stationarity"])  # type: ignore[arg-type]
+
+
+def _kept(motion: KnownMotion) -> bytes:
+    spline = {name: np.ascontiguousarray(getattr(motion.spline, name)) for name in _SPLINE[1:]}
+    own = {"degree": motion.spline.degree, **spline, "stationarity": motion.stationarity}
+    return zlib.compress(orjson.dumps(own, option=orjson.OPT_SERIALIZE_NUMPY))

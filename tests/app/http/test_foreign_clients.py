@@ -1,0 +1,129 @@
+"""Clients that speak HTTP in ways of their own: without names, with offers of other protocols, for the head alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from starlette.requests import Request
+
+from app.http.weights import is_wanted
+from tests.app.live import Server, serving
+from tests.app.raw import RawAnswer, answer_on, connected
+
+WRONG = b'{"sart": {"q": [0, 0, 0, 0, 0, 0]}}'
+EVENTS, CSV = "text/event-stream", "text/csv"
+
+
+@pytest.fixture(scope="module")
+def service() -> Iterator[Server]:
+    """A server whose workers are not waited for: nothing is computed."""
+    with serving(warm=False, workers=1) as server:
+        server.wait_listening()
+        yield server
+
+
+def asked(service: Server, *parts: bytes) -> RawAnswer:
+    with connected(service) as connection:
+        for part in parts:
+            connection.sendall(part)
+        return answer_on(connection)
+
+
+def lines(*given: str) -> bytes:
+    return "\r\n".join([*given, "", ""]).encode()
+
+
+@pytest.mark.parametrize("offer", ["h2c", "websocket", "TLS/1.0, HTTP/1.1"])
+@pytest.mark.parametrize("cut", [0, 20, 1])
+def test_a_body_is_read_although_the_client_offers_another_protocol(service: Server, offer: str, cut: int) -> None:
+    head = lines(
+        "POST /optimize HTTP/1.1",
+        "Host: localhost",
+        f"Upgrade: {offer}",
+        "Connection: Upgrade, HTTP2-Settings",
+        "HTTP2-Settings: AAMAAABkAAQAAP__",
+        f"Content-Length: {len(WRONG)}",
+    )
+    # in one piece, divided in the body, and divided in the head
+    whole = head + WRONG
+    at = {0: len(whole), 20: len(head) + 20, 1: len(head) // 2}[cut]
+    assert "`sart`" in json.dumps(asked(service, whole[:at], whole[at:]).problem)
+
+
+def test_offers_one_after_another_on_one_connection(service: Server) -> None:
+    get = lines("GET /healthz HTTP/1.1", "Host: localhost", "Upgrade: h2c", "Connection: Upgrade")
+    with connected(service) as connection:
+        connection.sendall(3 * get + lines("GET /robots HTTP/1.1", "Host: localhost"))
+        assert [answer_on(connection).status for _ in range(4)] == 4 * [200]
+    assert asked(service, lines("CONNECT localhost:80 HTTP/1.1", "Host: localhost")).status == 400
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/robots", "/robots/ur5e", "/studio", "/problems/busy", "/nowhere"])
+def test_a_head_is_that_of_the_whole_answer(service: Server, path: str) -> None:
+    whole = asked(service, lines(f"GET {path} HTTP/1.1", "Host: localhost"))
+    with connected(service) as connection:
+        connection.sendall(lines(f"HEAD {path} HTTP/1.1", "Host: localhost", "Connection: close"))
+        with connection.makefile("rb") as stream:
+            head, _, body = stream.read().partition(b"\r\n\r\n")
+    assert body == b""
+    first, *others = head.decode().lower().split("\r\n")
+    assert first.split()[1] == str(whole.status)
+    headers = dict(line.split(": ", 1) for line in others)
+    assert headers["content-type"] == whole.headers["content-type"]
+    assert headers["content-length"] == whole.headers["content-length"]
+
+
+def test_the_head_of_a_stream_ends(service: Server) -> None:
+    """Nobody waits for what would follow it: the job has not ended."""
+    job = service.post("/jobs", {"requests": [{"optimize": {"start": {"q": [0.0] * 6}, "goal": {"q": [0.1] * 6}}}]})
+    with connected(service) as connection:
+        path = f"{job.headers['location']}/events"
+        connection.sendall(lines(f"HEAD {path} HTTP/1.1", "Host: localhost"))
+        connection.sendall(lines("GET /healthz HTTP/1.1", "Host: localhost"))
+        with connection.makefile("rb") as stream:
+            heads = [stream.readline()]
+            while not heads[-1].startswith(b"HTTP/1.1 200") or len(heads) == 1:
+                heads.append(stream.readline())
+    assert any(EVENTS in line.decode() for line in heads)
+
+
+@pytest.mark.parametrize("path", ["/optimize", "/jobs"])
+def test_a_method_that_a_path_has_not_is_told_so(service: Server, path: str) -> None:
+    method = "PUT" if path == "/jobs" else "GET"
+    answer = asked(service, lines(f"{method} {path} HTTP/1.1", "Host: localhost"))
+    assert answer.status == 405 and "POST" in answer.headers["allow"]
+
+
+def test_http_1_0_has_no_host(service: Server) -> None:
+    post = lines("POST /optimize HTTP/1.0", f"Content-Length: {len(WRONG)}") + WRONG
+    assert "`sart`" in json.dumps(asked(service, post).problem)
+    assert asked(service, lines("GET /robots HTTP/1.1", "Connection: close")).problem["type"] == "/problems/wrong-host"
+
+
+@pytest.mark.parametrize("declared", ["", " ", ";charset=utf-8"])
+def test_an_empty_content_type_is_none(service: Server, declared: str) -> None:
+    head = ("POST /optimize HTTP/1.1", "Host: localhost", f"Content-Type: {declared}", f"Content-Length: {len(WRONG)}")
+    assert "`sart`" in json.dumps(asked(service, lines(*head) + WRONG).problem)
+
+
+@pytest.mark.parametrize(
+    ("accept", "media_type", "wanted"),
+    [
+        (EVENTS, EVENTS, True),
+        ("TEXT/Event-Stream; q=0.5", EVENTS, True),
+        ("application/json, text/event-stream", EVENTS, True),
+        ("text/event-stream;q=0, application/json", EVENTS, False),
+        ("application/json, text/event-stream;q=0.5", EVENTS, False),
+        ("text/event-streamx", EVENTS, False),
+        ("*/*", EVENTS, False),
+        ("text/csv, */*;q=0.1", CSV, True),
+        ("text/csv;q=abc", CSV, False),
+        ("", CSV, False),
+        (",;,", CSV, False),
+    ],
+)
+def test_what_a_client_accepts(accept: str, media_type: str, wanted: bool) -> None:
+    request = Request({"type": "http", "headers": [(b"accept", accept.encode())]})
+    assert is_wanted(request, media_type) == wanted

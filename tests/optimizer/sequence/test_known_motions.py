@@ -1,0 +1,116 @@
+"""Motions that are known change the time until an answer is there, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from optimizer.optimize_round import optimize_round
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.problem import Problem
+from optimizer.problem.scene import Box, Obstacle, Scene
+from optimizer.problem.work_round import WorkRound
+from optimizer.sequence.known_motions import KnownMotion, KnownMotions, knowing
+from optimizer.sequence.round_solution import RoundSolution
+from optimizer.trajectories.spline import Spline
+from tests.optimizer.moves import ROBOT
+from tests.optimizer.sequence.rounds import HOME, pick_and_place
+from tests.optimizer.sequence.test_optimize_round import assert_true
+
+ASKED = pick_and_place(1, 2, windings=False)
+PROBLEM = Problem(arm=Arm(robot=ROBOT), start=HOME, goal=HOME + 0.1, windings=False)
+
+
+@cache
+def searched() -> tuple[RoundSolution, KnownMotions]:
+    motions = KnownMotions()
+    with knowing(motions):
+        return optimize_round(ASKED), motions
+
+
+def again(asked: WorkRound, motions: KnownMotions) -> RoundSolution:
+    with knowing(motions):
+        return optimize_round(asked)
+
+
+def solves(found: RoundSolution) -> int:
+    return sum(move.solution.solver.nlp_solves for move in found.moves)
+
+
+def assert_same(found: RoundSolution, other: RoundSolution) -> None:
+    assert (found.status, found.duration, found.lower_bound) == (other.status, other.duration, other.lower_bound)
+    for own, its in zip(found.moves, other.moves, strict=True):
+        assert own.solution.status == its.solution.status
+        assert own.solution.solver.stationarity == its.solution.solver.stationarity
+        for name in ("q", "v", "tau_motor", "power"):
+            np.testing.assert_array_equal(
+                getattr(own.solution.trajectory, name), getattr(its.solution.trajectory, name)
+            )
+    assert [each.electrical for each in found.baselines] == [each.electrical for each in other.baselines]
+
+
+def test_the_same_round_solves_nothing_again_and_has_the_same_answer() -> None:
+    found, motions = searched()
+    known = KnownMotions(motions.used)
+    other = again(ASKED, known)
+    assert solves(found) > 0
+    assert solves(other) == 0
+    assert known.used.keys() == motions.used.keys()
+    assert_same(other, found)
+    assert_true(ASKED, other)
+
+
+def test_of_an_edited_round_only_the_moves_that_changed_are_solved() -> None:
+    last = ASKED.stops[-1]
+    edited = replace(ASKED, stops=[*ASKED.stops[:-1], replace(last, payload=Payload(mass=1.0))])
+    known, fresh = KnownMotions(searched()[1].used), KnownMotions()
+    found = again(edited, known)
+    assert_same(found, again(edited, fresh))
+    of_before = known.used.keys() & searched()[1].used.keys()
+    assert known.used.keys() == fresh.used.keys()
+    assert of_before
+    # the move home carries something else now
+    assert fresh.used.keys() - of_before
+    assert found.moves[0].solution.solver.nlp_solves == 0 < found.moves[-1].solution.solver.nlp_solves
+
+
+def test_in_a_given_time_too() -> None:
+    own = searched()[0].duration
+    asked, motions = replace(ASKED, duration_min=1.3 * own, duration_max=1.3 * own), KnownMotions()
+    found = again(asked, motions)
+    other = again(asked, KnownMotions(motions.used))
+    assert solves(other) == 0 < solves(found)
+    assert_same(other, found)
+
+
+def test_a_motion_that_is_not_certified_is_solved_for() -> None:
+    _, motions = searched()
+    wrong = {key: replace(each, spline=_twice_as_fast(each)) for key, each in motions.used.items()}
+    assert_true(ASKED, again(ASKED, KnownMotions(wrong)))
+
+
+def _twice_as_fast(motion: KnownMotion) -> Spline:
+    return replace(motion.spline, knots=motion.spline.knots / 2)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        replace(PROBLEM, goal=HOME + 0.2),
+        replace(PROBLEM, duration_max=3.0),
+        replace(PROBLEM, method="time_scaling"),
+        replace(PROBLEM, arm=replace(PROBLEM.arm, payload=Payload(mass=1.0))),
+        replace(PROBLEM, arm=replace(PROBLEM.arm, tcp_speed=0.5)),
+        replace(PROBLEM, arm=replace(PROBLEM.arm, limits=ROBOT.limits.tightened(v_max=ROBOT.limits.v_max * 0.9))),
+        replace(PROBLEM, arm=replace(PROBLEM.arm, scene=Scene([Obstacle("box", Box(np.ones(3)))]))),
+        replace(PROBLEM, arm=replace(PROBLEM.arm, robot=replace(ROBOT, torque_side="link"))),
+    ],
+)
+def test_another_question_has_another_key(other: Problem) -> None:
+    keys = KnownMotions().key
+    assert keys("tried", PROBLEM) != keys("tried", other)
+    assert keys("tried", PROBLEM) == keys("tried", replace(PROBLEM, arm=replace(PROBLEM.arm), deadline=1.0))
+    assert len({keys("tried", PROBLEM), keys("finished", PROBLEM), keys("tried", PROBLEM, 1.0)}) == 3
