@@ -35,9 +35,11 @@ from optimizer.search.self_motion_bound import EndCurves
 
 # boxes along each inner joint at first, but for so many starts that there would be more than MOST_FIRST in all; boxes
 # split in a round, rounds, and rounds of a tight bound
-FIRST_BOXES, MOST_FIRST, SPLIT, ROUNDS, TIGHT_ROUNDS = (4, 2, 1), 4096, 400, 24, 200
+FIRST_BOXES, MOST_FIRST, SPLIT, ROUNDS, TIGHT_ROUNDS = (4, 2, 1), 4096, 400, 80, 200
+# after so many rounds, and unless the bound is to be tight, a bound within this share of what is enough will do
+FEW, NEARLY = 24, 0.1
 # a box is not split once its widest side is below this [rad]
-SMALLEST = 0.01
+SMALLEST = 0.002
 # where a side is chosen to split: what a radian of any joint counts as [m] beside the path that it moves the TCP by,
 # and the half side [rad] from which on a box is as wide as can be, so that inner joints come first
 RADIAN, WIDE = 0.3, 0.3
@@ -65,8 +67,11 @@ def family_bound_of(
         return np.inf
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
-    rounds = (TIGHT_ROUNDS if prepared.problem.bound == "tight" else ROUNDS) // len(poses)
-    return min(family_bound(prepared, pose, starts, rounds, deadline, half, enough, curves.given) for pose in poses)
+    tight = prepared.problem.bound == "tight"
+    rounds, nearly = (TIGHT_ROUNDS if tight else ROUNDS) // len(poses), 0.0 if tight else NEARLY
+    return min(
+        family_bound(prepared, pose, starts, rounds, deadline, half, enough, curves.given, nearly) for pose in poses
+    )
 
 
 def family_bound(
@@ -78,14 +83,16 @@ def family_bound(
     half: Array | None = None,
     enough: float = np.inf,
     given: bool = False,
+    nearly: float = 0.0,
 ) -> float:
     """Lower bound [J] on the objective of motions from any of `starts` (s, nq) to any configuration of `pose`.
 
     Starts that are `given` stand as they are, others with any full turn that the limits allow.
     With `half` (s, nq) [rad] the starts are boxes, `starts` their middles and `half` their half sides. Fewer rounds, or
-    a deadline, give a weaker bound; the search ends once it reaches `enough` [J].
+    a deadline, give a weaker bound; the search ends once it reaches `enough` [J], after FEW rounds once it is within
+    the share `nearly` of that.
     """
-    return _BoxSearch(_Family(prepared, pose, given), starts, half).run(rounds, deadline, enough)
+    return _BoxSearch(_Family(prepared, pose, given), starts, half).run(rounds, deadline, enough, nearly)
 
 
 def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array | None) -> Array:
@@ -127,13 +134,14 @@ class _BoxSearch:
         self.start_half = np.zeros_like(starts) if half is None else half
         self.potentials = _greatest_potentials(family.prepared, starts, half)
 
-    def run(self, rounds: int, deadline: Deadline, enough: float = np.inf) -> float:
-        """The least bound [J] of any box after at most so many rounds of splitting, or once it reaches `enough` [J]."""
+    def run(self, rounds: int, deadline: Deadline, enough: float, nearly: float) -> float:
+        """The least bound [J] of any box after at most so many rounds of splitting, or once it is enough."""
         boxes = self.first()
-        for _ in range(rounds):
+        for n in range(rounds):
             boxes = boxes[np.flatnonzero(np.isfinite(boxes.value))]
             order = np.argsort(boxes.value, kind="stable")
-            if not len(order) or boxes.value[order[0]] >= enough or deadline.passed:
+            will_do = enough if n < FEW else enough - nearly * abs(enough)
+            if not len(order) or boxes.value[order[0]] >= will_do or deadline.passed:
                 break
             if self.family.settled(boxes.half[order[0]]):
                 break

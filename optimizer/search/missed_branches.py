@@ -15,7 +15,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import AnyOf, Target
 from optimizer.search.candidates import Candidate
-from optimizer.search.free_goal_bound import ROUNDS, TIGHT_ROUNDS, family_bound
+from optimizer.search.free_goal_bound import FEW, TIGHT_ROUNDS, family_bound
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves, self_motion_bound
 
@@ -42,7 +42,7 @@ def bound_of_others(prepared: PreparedProblem, candidates: Sequence[Candidate], 
     poses = [ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)]
     curves = EndCurves.of([each.start for each in candidates])
     starts, half = curves.boxes(curves.first())
-    rounds = max(1, (TIGHT_ROUNDS if problem.bound == "tight" else ROUNDS) // len(poses))
+    rounds = max(1, (TIGHT_ROUNDS if problem.bound == "tight" else FEW) // len(poses))
     return min(family_bound(prepared, pose, starts, rounds, deadline, half, given=curves.given) for pose in poses)
 
 

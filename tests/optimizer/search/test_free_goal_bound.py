@@ -17,7 +17,7 @@ from optimizer.problem.problem import Problem
 from optimizer.problem.tool_cone import ToolCone
 from optimizer.search import free_goal_bound
 from optimizer.search.ends import within_cone
-from optimizer.search.free_goal_bound import MOST_FIRST, family_bound
+from optimizer.search.free_goal_bound import FEW, MOST_FIRST, NEARLY, ROUNDS, family_bound
 from optimizer.search.lower_bound import lower_bounds
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose
@@ -127,3 +127,15 @@ def test_the_rim_of_the_tools_cone_is_covered() -> None:
     cone = ToolCone([0, 0, 1], [0, 0, -1], 0.4)
     made = PreparedProblem.of(problem(HOME, GOAL, tool_cone=cone))
     assert within_cone(made, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])).half_angle == cone.half_angle
+
+
+def test_more_boxes_are_halved_where_the_bound_is_far_from_the_energy() -> None:
+    """The bound reaches nine tenths of an energy that few rounds leave it far below; what is near ends after a few."""
+    made = PreparedProblem.of(problem(HOME, GOAL))
+    pose = ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])
+    few, many = (family_bound(made, pose, HOME[None], rounds) for rounds in (FEW, ROUNDS))
+    assert few < many
+    enough = few / (1 - NEARLY)
+    assert family_bound(made, pose, HOME[None], ROUNDS, enough=enough, nearly=NEARLY) == few
+    between = family_bound(made, pose, HOME[None], ROUNDS, enough=many / (1 - NEARLY), nearly=NEARLY)
+    assert between >= many * (1 - 1e-9)
