@@ -13,6 +13,7 @@ from models.robot import Array, Limits
 from optimizer.collision.bodies import Indices
 from optimizer.collision.path_planner import along, interpolation_is_free
 from optimizer.deadline import Deadline, DeadlinePassed, watch
+from optimizer.energy.plant import has_corners
 from optimizer.methods.limit_repair import (
     MARGIN,
     LimitCheck,
@@ -45,6 +46,7 @@ CHECKING = 0.15
 # planned path alone: what is that deep inside an obstacle seldom gets out of it
 DEEP = 0.09
 STOPPED = "the deadline ended its optimisation"
+COSTLIER = "ended early: it comes to no less energy than the best motion found"
 NO_BETTER = (
     "not solved further: its motion collides, and even so needs at least as much energy as the best motion found"
 )
@@ -118,7 +120,8 @@ class SqpMethod(Method):
             needed = self.takes_long or (len(stage.pairs) > 0 and np.isinf(self.best_known))
             until = deadline.earlier_by(CHECKING) if needed else deadline
             progress = max(guess.progress, ROUGH_PROGRESS) if guess.rough and len(stage.pairs) else guess.progress
-            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, until, progress)
+            below = self._must_be_below(stage)
+            result = solve(stage.program, stage.free, stage.duration, stage.multiplier, until, progress, below)
             iterations += result.iterations
             late = result.status is SqpStatus.OUT_OF_TIME
             if late and not (needed and result.feasible):
@@ -128,18 +131,26 @@ class SqpMethod(Method):
                 return _failed(reason, collision, iterations, solves)
             check = self._checked(stage.program, result)
             collision = check.collision
+            costlier = result.status is SqpStatus.COSTLIER
             if check.passed:
-                reason = STOPPED if late else CONVERGED
+                reason = STOPPED if late else COSTLIER if costlier else CONVERGED
                 return SolveResult(
                     SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity, cut_short=late
                 )
             if collision is not None and not len(stage.pairs):
-                if self.prepared.cost_of(check.spline) >= self.best_known:
+                if costlier or self.prepared.cost_of(check.spline) >= self.best_known:
                     return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
                 if self.was_postponed or (np.isfinite(self.best_known) and collision.min_clearance < -DEEP):
                     return _failed("its motion collides", collision, iterations, solves)
+            if costlier:
+                return SolveResult(SolveStatus.PRUNED, COSTLIER, iterations, solves)
             stage = self._repaired(stage, result, check)
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
+
+    def _must_be_below(self, stage: _Stage) -> float:
+        """The energy [J] that a solve must promise to come below. Around obstacles, promises are not kept."""
+        smoothed = has_corners(self.prepared.problem.objective, self.prepared.arm)
+        return np.inf if len(stage.pairs) or smoothed or self.interval.minimum_time else self.best_known
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths as initial guesses; `failed` if there is none.

@@ -27,6 +27,9 @@ BACKTRACKS = 14
 MOST_RELAXED = 4
 # part of the decrease promised by the gradient that a step of the line search must reach (Armijo), and its rounding
 ARMIJO, ROUNDING = 1e-4, 1e-12
+# a solve ends if even this multiple of the decrease that the gradient promises leaves the cost above what it must be
+# below. With 2, one of 200 random requests missed a better motion, by 0.6 %; with 3, none did
+MOST_DECREASE = 3.0
 # smallest eigenvalue that the QP's Hessian may have, relative to the largest or to 1, the scale of the cost
 EIGENVALUE_FLOOR = 1e-7
 # the penalty of a violation before any multiplier is known, and its least multiple of the multipliers
@@ -41,6 +44,7 @@ class SqpStatus(Enum):
     SOLVED = "solved"
     INFEASIBLE = "infeasible"
     STALLED = "stalled"
+    COSTLIER = "costlier"
     OUT_OF_TIME = "out of time"
 
 
@@ -125,8 +129,9 @@ class _Solver:
         multiplier: Array | None,
         deadline: Deadline,
         progress: float,
+        below: float,
     ) -> None:
-        self.p, self.deadline, self.progress = program, deadline, progress
+        self.p, self.deadline, self.progress, self.below = program, deadline, progress, below
         self.qp = WorkingSetQP(program, time_scale=T)
         # among obstacles, steps of fewer rounds stall
         self.rounds = MOST_ROUNDS if program.has_clearance else QP_ROUNDS
@@ -148,7 +153,7 @@ class _Solver:
             self.multipliers.penalty[-path.shape[1] :] = CLEARANCE_PENALTY
 
     def solve(self) -> Result:
-        """Iterate until no step promises a further decrease, no step is found, or the deadline passes."""
+        """Iterate until no step promises a further, or enough, decrease; or none is found; or the deadline passes."""
         status, stationarity, iterations, relaxed = SqpStatus.STALLED, np.inf, 0, 0
         for iterations in range(1, MAX_ITERATIONS + 1):  # noqa: B007
             if self.deadline.passed:
@@ -171,6 +176,9 @@ class _Solver:
             feasible = float(self.at.violation.max()) < FEASIBILITY
             if feasible and promised < self.progress:
                 status = SqpStatus.SOLVED
+                break
+            if feasible and self.line.cost + MOST_DECREASE * slope / self.cost_scale >= self.below:
+                status = SqpStatus.COSTLIER
                 break
             found = self._line_search(step.x, slope)
             if found is None and self.rounds < MOST_ROUNDS:
@@ -268,11 +276,13 @@ def solve(
     multiplier: Array | None = None,
     deadline: Deadline = NEVER,
     progress: float = PROGRESS,
+    below: float = np.inf,
 ) -> Result:
     """Minimise the cost of an NLP from an initial guess: free control points (m, r), duration [s], multipliers (N, nq).
 
     Without `multiplier` the torque multipliers start at zero. Once `deadline` passes, the last iterate is returned.
-    The solve ends when a step promises less than the relative decrease `progress`.
+    The solve ends when a step promises less than the relative decrease `progress`, or when the iterate is feasible and
+    the cost is not expected to come below `below` [J].
     """
     duration = min(max(duration, program.t_min), program.t_max)
-    return _Solver(program, free, duration, multiplier, deadline, progress).solve()
+    return _Solver(program, free, duration, multiplier, deadline, progress, below).solve()

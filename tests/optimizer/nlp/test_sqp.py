@@ -260,6 +260,22 @@ def test_an_optimum_is_left_alone() -> None:
         assert again.cost == pytest.approx(first.cost, rel=SAME)
 
 
+@pytest.mark.parametrize("ratio", [0.5, 0.9, 1.02, 1.5])
+def test_a_solve_ends_early_only_if_its_optimum_is_not_below_what_is_asked_for(ratio: float) -> None:
+    ended = 0
+    for start, goal in random_moves(8, 6):
+        of = program(start, goal)
+        guess = quintic(of), 1.3 * shortest(start, goal)
+        whole = solve(of, *guess)
+        early = solve(of, *guess, below=ratio * whole.cost)
+        ended += early.status is SqpStatus.COSTLIER
+        if early.status is SqpStatus.COSTLIER:
+            assert early.feasible and early.cost >= ratio * whole.cost and early.iterations <= whole.iterations
+        else:
+            assert early.cost == whole.cost
+    assert ended == 0 if ratio > 1 else ended > 0
+
+
 def test_electrical_optimum_does_not_depend_on_the_guess() -> None:
     """Bent motions and durations too short and too long all lead to the same cost."""
     rng = np.random.default_rng(3)
