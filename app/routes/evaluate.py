@@ -20,7 +20,7 @@ from app.routes.uploads import upload
 from app.schemas import errors as problems
 from app.schemas.evaluate import EvaluateCsvSettings, EvaluateRequest, EvaluateResponse
 from app.schemas.examples.evaluate import CSV_TABLE
-from app.tasks.evaluate import EvaluateTask
+from app.tasks.evaluate import EvaluateTask, check_query
 from app.tasks.job_body import JobBodyTask
 
 router = APIRouter(tags=["motion"])
@@ -91,6 +91,7 @@ async def evaluate(
             file.write(chunk)
         kind = kind or _kind_of(file)
         if later.wanted and kind == "json":
+            check_query(request.query_params)
             body = JobBodyTask(path, deadlines(settings), request.state.id, is_fresh(request), evaluate=True)
             return await later.respond_with(await later.validated(body))
         task = EvaluateTask(path, kind, dict(request.query_params), wanted, request.state.id, longest)

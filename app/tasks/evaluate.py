@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -64,8 +64,7 @@ class EvaluateTask:
         return settings, result
 
     def _evaluate_json(self, began: Deadline) -> tuple[EvaluateSettings, Evaluation]:
-        if self.query:
-            raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
+        check_query(self.query)
         body = Path(self.file).read_bytes()
         content = parsed_json(body)
         request = _validated(lambda: EvaluateRequest.model_validate(content), "body")
@@ -82,6 +81,12 @@ class EvaluateTask:
 def evaluated(request: EvaluateRequest, end: Deadline) -> Evaluation:
     """The evaluation of the motion in a request, until about `end`."""
     return evaluate(to_arm(request), to_motion(request), request.sample_period, end.left)
+
+
+def check_query(query: Mapping[str, str]) -> None:
+    """Raises InvalidRequest for settings beside a JSON body."""
+    if query:
+        raise InvalidRequest([{"loc": ["query"], "msg": "Put the settings into the JSON body"}])
 
 
 def csv_settings(query: dict[str, str]) -> EvaluateCsvSettings:
