@@ -60,7 +60,8 @@ function ask(request) {
 }
 
 function chooseLog({ target }) {
-  file = target.files[0] ?? file;
+  [file] = target.files;
+  target.value = ""; // so that the same file can be chosen again
   if (file) ask({ log: file.name, robot: state.request?.robot ?? state.answer?.robot ?? "ur5e", name: file.name.slice(0, 80) });
 }
 

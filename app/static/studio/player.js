@@ -4,8 +4,7 @@ import { follow, set, state } from "./store.js";
 
 const REST = 0.7; // at the end of the motion, before it begins again [s]
 
-let before = null;
-let resting = 0;
+let [before, resting] = [null, 0]; // time of the frame before [ms], and at the end of the motion [s]
 
 export function createPlayer(view) {
   $("play").onclick = toggle;
@@ -34,8 +33,7 @@ const toggle = () => (state.playing ? set({ playing: false }) : play());
 /** Plays from where the clock is; from the start, if it is at the end. */
 export function play() {
   if (state.playing || !state.answer) return;
-  before = null;
-  resting = 0;
+  [before, resting] = [null, 0];
   set({ playing: true, ...(state.time >= state.duration ? { time: 0 } : {}) });
   requestAnimationFrame(tick);
 }
