@@ -5,7 +5,7 @@
 - paper_motion_1.json to paper_motion_15.json, for `POST /evaluate`: the paper's own motion to each configuration of its
   Table 2 and back, at constant joint speed
 
-    python examples/make_paper_requests.py
+    .venv/bin/python examples/make_paper_requests.py
 
 `tests/reference/README.md` names the paper and tells what is known of its frames and joint convention.
 """

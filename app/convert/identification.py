@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
@@ -9,11 +10,15 @@ from typing import Any
 import numpy as np
 
 from app.schemas.identifications import Fraction, IdentifyRequest
+from models.robot import Array
 from optimizer.identification.document import document_of
 from optimizer.identification.fits.payload_fit import Carried
 from optimizer.identification.identify import Identification
 from optimizer.identification.options import Options
-from optimizer.identification.results import Validation
+from optimizer.identification.results import Curves, Validation
+
+DECIMALS = 4
+"""Of the times, torques and powers of a picture."""
 
 
 def to_options(request: IdentifyRequest) -> Options:
@@ -40,12 +45,51 @@ def identification_fields(found: Identification, validation: Validation) -> dict
         "parameters": [asdict(each) for each in found.parameters],
         "structure": asdict(found.structure),
         "physical": None if found.physical is None else asdict(found.physical),
-        "validation": asdict(validation),
+        "validation": _without_curves(asdict(validation)),
         "residuals": asdict(found.residuals),
         "temperatures": asdict(found.temperatures),
         "advice": None if found.advice is None else asdict(found.advice),
         "payload": None if found.payload is None else _payload_fields(found.payload),
     }
+
+
+def residual_fields(found: Identification, validation: Validation, logs: Sequence[str]) -> list[dict[str, Any]]:
+    """The moves of logs with these ids: those of the fit, and from the next number on those that validate it alone."""
+    own = len(found.logs)
+    others = own if len(logs) > own else 0
+    return [*_moves(found.curves, logs, False), *_moves(validation.curves, logs[others:], True)]
+
+
+def _moves(curves: Curves, logs: Sequence[str], held_out: bool) -> Iterator[dict[str, Any]]:
+    order = np.lexsort((curves.time, curves.log))
+    ends = np.flatnonzero(np.diff(curves.log[order]) | np.diff(curves.move[order])) + 1
+    for rows in np.split(order, ends):
+        if not rows.size:
+            continue
+        torque, power = curves.torque[rows], curves.power[rows]
+        yield {
+            "log": logs[curves.log[rows[0]]],
+            "held_out": held_out,
+            "t": _rounded(curves.time[rows]),
+            "torque": _series(torque.T, curves.modelled_torque[rows].T),
+            "power": _series(power, curves.modelled_power[rows]),
+        }
+
+
+def _series(measured: Array, modelled: Array) -> dict[str, Any] | None:
+    """None where nothing was measured."""
+    if np.isnan(measured).all():
+        return None
+    return {"measured": _rounded(measured), "modelled": _rounded(modelled)}
+
+
+def _rounded(values: Array) -> Array:
+    # of what sensors tell, nothing is lost; the document is half as long
+    return np.ascontiguousarray(values.round(DECIMALS))
+
+
+def _without_curves(validation: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in validation.items() if name != "curves"}
 
 
 def _payload_fields(carried: Carried) -> dict[str, Any]:

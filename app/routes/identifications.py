@@ -1,4 +1,4 @@
-"""POST /identifications, GET /identifications/{id}."""
+"""POST and GET /identifications, GET /identifications/{id} and /identifications/{id}/residuals."""
 
 from __future__ import annotations
 
@@ -7,22 +7,32 @@ from functools import partial
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Query, Request, Response
 from sqlalchemy.orm import Session
 
+from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest, UnknownIdentification, UnknownJob
+from app.http.handlers import result_response
 from app.http.openapi import problem_responses
 from app.routes.dependencies import ServiceClient, ServiceJobs, ServiceStore
 from app.routes.later import deadlines
 from app.routes.parameters import CREATED_HEADERS, Key, set_location
 from app.schemas import errors as problems
 from app.schemas.examples.values import IDENTIFICATION_ID
-from app.schemas.identifications import Identification, IdentifyRequest
+from app.schemas.identifications import (
+    Identification,
+    IdentificationList,
+    IdentificationPage,
+    IdentifyRequest,
+    ListedIdentification,
+    ResidualCurves,
+)
+from app.store import answers
 from app.store import jobs as stored_jobs
 from app.store import logs as stored_logs
-from app.store.tables import Figures, JobRequest
+from app.store.tables import Figures, Job, JobRequest
 from app.tasks.job_body import job_of_one
-from app.tasks.job_request import IDENTIFY
+from app.tasks.job_request import IDENTIFY, RESIDUALS
 
 router = APIRouter(prefix="/identifications", tags=["logs"])
 
@@ -69,6 +79,18 @@ async def add(
 
 
 @router.get(
+    "",
+    summary="List identifications",
+    response_model=IdentificationList,
+    responses=problem_responses(problems.Validation, problems.StoreUnavailable),
+)
+async def list_identifications(page: Annotated[IdentificationPage, Query()], store: ServiceStore) -> IdentificationList:
+    """All identifications, newest first, page by page. They are deleted with their jobs."""
+    found, following = await store.read(partial(_page, limit=page.limit, after=page.after))
+    return IdentificationList(identifications=found, next=following)
+
+
+@router.get(
     "/{id}",
     summary="An identification",
     response_model=Identification,
@@ -79,6 +101,20 @@ async def show(id: IdentificationId, store: ServiceStore) -> Identification:
     return await _shown(store, id)
 
 
+@router.get(
+    "/{id}/residuals",
+    summary="The residuals of an identification",
+    response_model=ResidualCurves,
+    responses=problem_responses(problems.UnknownIdentification, problems.StoreUnavailable),
+)
+async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
+    """Measured and modelled torques and power over time, move by move. Moves that were held out are predicted by a fit
+    that has not seen them."""
+    body = await store.read(partial(_curves, job_id=id))
+    content = {"id": id, "moves": None} if body is None else {"id": id, **orjson.loads(zlib.decompress(body))}
+    return result_response(TaskResult.of_json(content))
+
+
 async def _shown(store: ServiceStore, job_id: str) -> Identification:
     content = await store.read(partial(_content, job_id=job_id))
     return Identification.model_validate_json(orjson.dumps(content))
@@ -86,6 +122,25 @@ async def _shown(store: ServiceStore, job_id: str) -> Identification:
 
 def _content(session: Session, job_id: str) -> dict[str, Any]:
     """The fields of an identification. Raises UnknownIdentification."""
+    job, request, body = _found(session, job_id)
+    result = None if body is None else orjson.Fragment(zlib.decompress(body))
+    return _summary(session, job, request) | {"problem": request.problem, "result": result}
+
+
+def _curves(session: Session, job_id: str) -> bytes | None:
+    """The compressed curves of an identification, if it has any. Raises UnknownIdentification."""
+    job, _, _ = _found(session, job_id)
+    return answers.of_job(session, job.id, RESIDUALS)
+
+
+def _page(session: Session, limit: int, after: str | None) -> tuple[list[ListedIdentification], str | None]:
+    found, following = stored_jobs.page_of_kind(session, IDENTIFY, limit, after)
+    listed = [ListedIdentification(**_summary(session, job, request), robot=robot) for job, request, robot in found]
+    return listed, following
+
+
+def _found(session: Session, job_id: str) -> tuple[Job, JobRequest, bytes | None]:
+    """The job of an identification, its request and the compressed answer. Raises UnknownIdentification."""
     try:
         job = stored_jobs.view(session, job_id).job
         request, body = stored_jobs.outcome(session, job_id, 0)
@@ -93,17 +148,15 @@ def _content(session: Session, job_id: str) -> dict[str, Any]:
         raise UnknownIdentification from None
     if request.kind != IDENTIFY:
         raise UnknownIdentification
+    return job, request, body
+
+
+def _summary(session: Session, job: Job, request: JobRequest) -> dict[str, Any]:
     has_figures = request.figures is not None and session.get(Figures, request.figures) is not None
     return {
         "id": job.id,
-        "state": _state(request),
+        "state": _STATES.get(request.state, request.state),
         "created": job.created,
         "owner": job.owner,
-        "problem": request.problem,
         "figures": request.figures if has_figures else None,
-        "result": None if body is None else orjson.Fragment(zlib.decompress(body)),
     }
-
-
-def _state(request: JobRequest) -> str:
-    return _STATES.get(request.state, request.state)

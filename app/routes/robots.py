@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import partial
 from typing import Annotated, Any
 
@@ -26,6 +27,7 @@ from app.store import robots
 from app.store.tables import OwnRobot, now
 from app.tasks.own_robot import OwnRobotTask
 from app.tasks.pictures import MEDIA_TYPE, PictureTask, digest, kept
+from models.form import link_bodies
 from models.pictures import picture_sources
 from models.registry import load_robot, robot_names
 from models.robot import FrictionLaw as Law
@@ -212,6 +214,7 @@ def _detail(name: str, figures: dict[str, Any], added: bool, owner: str | None, 
     content: dict[str, Any] = {section: figures.get(section) for section in _SECTIONS}
     content |= _summary(name, figures, added, owner)
     content |= {"trust": TRUST, "friction": _friction(figures), "warnings": warnings}
+    content["form"] = [[asdict(body) for body in link] for link in link_bodies(figures)]
     content["has_meshes"] = picture_sources(name) is not None
     return RobotDetail(**content)
 

@@ -10,12 +10,15 @@ from pydantic import Field
 from app.schemas.common import Request, Response, described, part
 from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
+from app.schemas.studies import PAGE_PATTERN, Query
 
 MOST_LOGS = 32
 Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
 Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
+State = Literal["queued", "running", "done", "failed", "cancelled"]
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
 DEADLINE = 60.0
+_POSITION = f"1741944413589793_{IDENTIFICATION_ID}"
 
 
 class Fraction(Request):
@@ -188,23 +191,98 @@ class Advice(Response):
     do: str = described("What to log. Four times as many such moves halve its standard deviation.", None, "Log rests.")
 
 
-class Identification(Response):
-    """An identification: its state and, once it is done, what was found."""
+class IdentificationSummary(Response):
+    """An identification and its state."""
 
     id: str = described("Its id.", None, IDENTIFICATION_ID)
-    state: Literal["queued", "running", "done", "failed", "cancelled"] = described("Its state.", None, "done")
+    state: State = described("Its state.", None, "done")
     created: datetime = described("Time at which it was sent, in UTC.", None, CREATED)
     owner: str | None = described("Name of the API key that sent it; null without one.", None, "press_shop")
-    problem: dict[str, Any] | None = described(
-        "Why it failed (RFC 9457); null otherwise.", None, {"type": "/problems/not-excited", "status": 422}
-    )
     figures: str | None = described(
         "Id of the figures that were found: every request about a motion takes it as `figures`. Null before the end, "
         "where the service has no room for more figures, and after they were deleted.",
         None,
         FIGURES_ID,
     )
+
+
+class ListedIdentification(IdentificationSummary):
+    """An identification in a list."""
+
+    robot: str | None = described("Name of the robot; null before it is done.", None, "ur5e")
+
+
+class IdentificationList(Response):
+    """Identifications, newest first."""
+
+    identifications: list[ListedIdentification] = part("The identifications.")
+    next: str | None = described("Value of `after` for the next page; null on the last page.", None, _POSITION)
+
+
+class IdentificationPage(Query):
+    """The part of the list of identifications that is returned."""
+
+    limit: int = described("Largest number of identifications in the answer.", "1", 50, default=50, ge=1, le=200)
+    after: str | None = described(
+        "Value of `next` on the previous page. Null: the first page.",
+        None,
+        _POSITION,
+        default=None,
+        pattern=PAGE_PATTERN,
+    )
+
+
+class Identification(IdentificationSummary):
+    """An identification: its state and, once it is done, what was found."""
+
+    problem: dict[str, Any] | None = described(
+        "Why it failed (RFC 9457); null otherwise.", None, {"type": "/problems/not-excited", "status": 422}
+    )
     result: IdentificationResult | None = part("What was found; null before it is done.")
+
+
+class TorqueCurves(Response):
+    """Torques of the motors, one list for each joint."""
+
+    measured: list[list[float | None]] = described(
+        "As measured, or from the currents; null where not logged.", "N·m", [[12.4, 12.6], [-3.1, -3.0]]
+    )
+    modelled: list[list[float | None]] = described(
+        "By the figures; null where the joint is slower than `velocity_threshold`: friction at rest is not known.",
+        "N·m",
+        [[12.3, 12.7], [None, -3.1]],
+    )
+
+
+class PowerCurves(Response):
+    """Power on the arm's bus."""
+
+    measured: list[float | None] = described("As measured; null where not logged.", "W", [96.2, 101.5])
+    modelled: list[float | None] = described("By the figures.", "W", [95.8, 102.0])
+
+
+class ResidualMove(Response):
+    """A move of a log: what was measured, and what figures make of it. The residual is the difference."""
+
+    log: str = described("Id of the log.", None, LOG_ID)
+    held_out: bool = described(
+        "Whether the fit that predicts it has not seen it. All others are predicted by the figures that were found.",
+        None,
+        True,
+    )
+    t: list[float] = described("Times from the start of the log.", "s", [0.505, 0.525])
+    torque: TorqueCurves | None = part("Torques of the motors; null without efforts.")
+    power: PowerCurves | None = part("Power; null without power.")
+
+
+class ResidualCurves(Response):
+    """What identified figures make of the logs, over time."""
+
+    id: str = described("Id of the identification.", None, IDENTIFICATION_ID)
+    moves: list[ResidualMove] | None = part(
+        "All moves, those that are held out last: some 3000 instants in all, evenly among the rows. Null before it is "
+        "done, and for identifications of an earlier version."
+    )
 
 
 class FoundPayload(Response):

@@ -67,6 +67,15 @@ class RobotList(Response):
     robots: list[RobotSummary] = part("The robots.")
 
 
+class FormBody(Response):
+    """A round body of a link, in the frame of the link."""
+
+    kind: Literal["housing", "cap", "ring", "tube", "foot"] = described("What it is.", None, "tube")
+    start: list[float] = described("One end of its axis.", "m", [0.0, 0.0, 0.138])
+    end: list[float] = described("The other end.", "m", [-0.425, 0.0, 0.138])
+    radius: float = described("Its radius.", "m", 0.05)
+
+
 class RobotDetail(RobotSummary):
     """The parameters of a robot, each with its source and trust letter."""
 
@@ -84,6 +93,10 @@ class RobotDetail(RobotSummary):
     friction: Friction = part("Joint friction.")
     default_motion: Parameters | None = part(
         "Default speed and acceleration of the robot's own controller; null if they are unknown."
+    )
+    form: list[list[FormBody]] = part(
+        "What each link looks like by these parameters, base first: tubes between the joints and round housings with "
+        "caps at them. No collision check sees it."
     )
     has_meshes: bool = described(
         "Whether `GET /robots/{name}/meshes.glb` has the maker's meshes of the links.", None, True

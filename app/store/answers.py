@@ -48,6 +48,11 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
     return answer, zlib.decompress(answer.body)
 
 
+def of_job(session: Session, job_id: str, kind: str) -> bytes | None:
+    """The compressed answer of this kind that a job has, if it has one."""
+    return session.scalar(select(Answer.body).where(Answer.job_id == job_id, Answer.kind == kind))
+
+
 def page(session: Session, limit: int, after: str | None) -> tuple[list[Answer], str | None]:
     """Up to `limit` answers without their documents, newest first, and the `after` of the next page; None on the last
     page."""

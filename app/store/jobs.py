@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import TypeVarTuple
 
-from sqlalchemy import ColumnElement, and_, func, insert, or_, select
+from sqlalchemy import ColumnElement, Select, and_, func, insert, or_, select
 from sqlalchemy import delete as delete_from
 from sqlalchemy.orm import Session, defer
 
@@ -17,6 +18,8 @@ from app.store.cache import Meaning
 from app.store.job_events import ENDED, Counts, conclude, counts_of, record, request_ended, set_state
 from app.store.paging import position_after, position_of
 from app.store.tables import Answer, Job, JobRequest, is_id, new_id, now
+
+Ts = TypeVarTuple("Ts")
 
 
 @dataclass(frozen=True)
@@ -92,16 +95,35 @@ def view(session: Session, job_id: str) -> JobView:
 
 def page(session: Session, limit: int, after: str | None, state: str | None) -> tuple[list[JobView], str | None]:
     """Up to `limit` jobs, newest first, and the `after` of the next page; None on the last page."""
-    query = select(Job).order_by(Job.created.desc(), Job.id.desc()).limit(limit + 1)
+    query = select(Job)
     if state is not None:
         query = query.where(Job.state == state)
-    if after is not None:
-        created, job_id = position_after(after)
-        query = query.where(or_(Job.created < created, and_(Job.created == created, Job.id < job_id)))
-    jobs = list(session.scalars(query))
+    jobs = list(session.scalars(_newest_first(query, limit, after)))
     more, jobs = len(jobs) > limit, jobs[:limit]
     counts = counts_of(session, [job.id for job in jobs])
     return [JobView(job, counts[job.id]) for job in jobs], position_of(jobs[-1]) if more else None
+
+
+def page_of_kind(
+    session: Session, kind: str, limit: int, after: str | None
+) -> tuple[list[tuple[Job, JobRequest, str | None]], str | None]:
+    """Up to `limit` jobs of one request to the endpoint `kind`, newest first, each with it and the robot of its answer;
+    and the `after` of the next page, None on the last page."""
+    query = select(Job, JobRequest, Answer.robot).join(JobRequest, JobRequest.job_id == Job.id)
+    query = query.outerjoin(Answer, Answer.id == JobRequest.answer_id)
+    query = query.where(Job.total == 1, JobRequest.kind == kind).options(defer(JobRequest.body, raiseload=True))
+    rows = session.execute(_newest_first(query, limit, after))
+    found = [(job, request, robot) for job, request, robot in rows]
+    more, found = len(found) > limit, found[:limit]
+    return found, position_of(found[-1][0]) if more else None
+
+
+def _newest_first(query: Select[*Ts], limit: int, after: str | None) -> Select[*Ts]:
+    """One more than `limit` jobs of a query, from a position on."""
+    if after is not None:
+        created, job_id = position_after(after)
+        query = query.where(or_(Job.created < created, and_(Job.created == created, Job.id < job_id)))
+    return query.order_by(Job.created.desc(), Job.id.desc()).limit(limit + 1)
 
 
 def requests(session: Session, job_id: str, limit: int, after: int) -> list[JobRequest]:

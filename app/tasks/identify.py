@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import uuid
 from dataclasses import dataclass
 from typing import Any
 
 from app.convert.arm import robot_named
 from app.convert.fields import location
-from app.convert.identification import identification_fields, to_options
+from app.convert.identification import identification_fields, residual_fields, to_options
 from app.convert.logs import stored_log
-from app.engine.result import TaskResult
+from app.engine.result import AnswerFigures, StoredAnswer, TaskResult, json_document
 from app.exceptions import InvalidRequest
 from app.schemas.identifications import IdentifyRequest
 from optimizer.exceptions import InvalidProblem
@@ -28,7 +29,8 @@ class IdentifyTask:
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
-        """What was found. `deadline` is not watched: whoever runs the task ends it.
+        """What was found; the curves of its residuals are stored beside it. `deadline` is not watched: whoever runs
+        the task ends it.
 
         Raises UnknownRobot, EffortNotUsable, NotExcited, NothingHeldOut, NoPowerChannel, PayloadUnknown or
         InvalidRequest.
@@ -41,4 +43,6 @@ class IdentifyTask:
         except InvalidProblem as error:
             raise InvalidRequest([{"loc": location(error, "body"), "msg": str(error)}]) from None
         assert others is not None
-        return TaskResult.of_json(identification_fields(found, others))
+        moves = residual_fields(found, others, self.request.all_logs)
+        curves = StoredAnswer(str(uuid.uuid4()), json_document({"moves": moves}), AnswerFigures(robot.name))
+        return TaskResult.of_json(identification_fields(found, others), (curves,))

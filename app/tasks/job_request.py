@@ -33,11 +33,13 @@ from optimizer.deadline import Deadline
 
 IDENTIFY, CYCLE = "identify", "cycle"
 """Kinds of requests that need something of the database: stored logs, and motions that are known."""
+RESIDUALS = "residuals"
+"""Kind of the answer beside that of an identification: its curves."""
 
 
 @dataclass(frozen=True)
 class JobResult(TaskResult):
-    """An answer with its figures. Its documents are compressed; `parts` is the endpoint of those in `stored`.
+    """An answer with its figures. Its documents are compressed; `parts` is the kind of those in `stored`.
 
     `wall_time` [s] is that of the work. `identified` are the figures of an arm that were found, if any.
     """
@@ -83,9 +85,16 @@ class JobRequestTask:
             result.is_optimal,
             motions=result.motions,
             wall_time=time.perf_counter() - began,
-            parts="evaluate" if self.kind == "whatif" and answer["objective"] is None else "optimize",
+            parts=_parts_of(self.kind, answer),
             identified=_identified(answer) if self.kind == IDENTIFY else None,
         )
+
+
+def _parts_of(kind: str, answer: dict[str, Any]) -> str:
+    """What the stored parts of an answer of the endpoint `kind` are."""
+    if kind == IDENTIFY:
+        return RESIDUALS
+    return "evaluate" if kind == "whatif" and answer["objective"] is None else "optimize"
 
 
 def _identified(answer: dict[str, Any]) -> FoundFigures:

@@ -25,11 +25,13 @@ from optimizer.identification.logs.log import Log
 from optimizer.identification.logs.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
 from optimizer.identification.quality.advice import advice_of
+from optimizer.identification.quality.curves import curves_of
 from optimizer.identification.quality.interval import Spread, sessions, spread_of
 from optimizer.identification.quality.structure import inertials_of, physical_of, structure_of
 from optimizer.identification.quality.validation import Fold, validate
 from optimizer.identification.results import (
     Advice,
+    Curves,
     IdentifiedFigures,
     Parameter,
     Physical,
@@ -51,7 +53,8 @@ WHITE = 0.3
 class Identification:
     """An arm's figures from logs. `validation` is of a fit without the held-out moves; None if none was asked for.
 
-    `payload` is what the last log carried; None if it was not asked for."""
+    `payload` is what the last log carried; None if it was not asked for. `curves` show the moves that are not held out,
+    as the figures predict them."""
 
     robot: Robot
     options: Options
@@ -65,6 +68,7 @@ class Identification:
     advice: Advice | None
     validation: Validation | None
     payload: Carried | None
+    curves: Curves
     logs: tuple[str, ...]
 
     @one_thread()
@@ -130,9 +134,11 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
     options, last = options or Options(), len(logs) - 1
     rows = _rows(robot, logs, options)
     _check(robot, rows, logs, options)
-    validation = None
+    validation, blind = None, np.zeros(len(rows.q), dtype=bool)
     if options.held_out:
-        folds = [_fold(robot, rows, out, options, last) for out in held_out(rows, options.held_out)]
+        outs = held_out(rows, options.held_out)
+        blind = np.any(outs, axis=0)
+        folds = [_fold(robot, rows, out, options, last) for out in outs]
         validation = validate(robot, folds, options.velocity_threshold)
     carried = _carried(robot, rows, options, last)
     rows = rows if carried is None else loaded(rows, carried)
@@ -158,6 +164,7 @@ def fit(robot: Robot, logs: Sequence[Log], options: Options | None = None) -> Id
         advice=advice_of(fitted, rows),
         validation=validation,
         payload=carried,
+        curves=curves_of([(fitted.arm, rows, ~blind)], options.velocity_threshold),
         logs=tuple(log.name or "" for log in logs),
     )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from models.robot import Array
 from optimizer.identification.estimates.estimate import Name
+from optimizer.identification.rows.fit_rows import Numbers
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,30 @@ class Prediction:
 
 
 @dataclass(frozen=True, eq=False)
+class Curves:
+    """What was measured over n rows in motion, and what figures make of it.
+
+    `log`, `move` (n,) are their numbers from 0, `time` (n,) [s] counts from the start of the log. Torques of the motors
+    (n, nq) [N·m] and power on the bus (n,) [W] are NaN where nothing was measured. So is the modelled torque of a joint
+    that hardly moves: friction at rest is not known.
+    """
+
+    log: Numbers
+    move: Numbers
+    time: Array
+    torque: Array
+    modelled_torque: Array
+    power: Array
+    modelled_power: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Validation:
     """How the figures predict `moves` moves that their fit has not seen.
 
     `fitted` are the identified figures, `own` the robot's, `constant` a constant power. `coverage` [1] is the share of
     these moves whose measured energy lies between P5 and P95, `half_width` [%] the mean half of that interval; None
-    without power.
+    without power. `curves` show these moves, as the fit without them predicts them.
     """
 
     moves: int
@@ -69,6 +88,7 @@ class Validation:
     constant: PowerErrors | None
     coverage: float | None
     half_width: float | None
+    curves: Curves
 
 
 @dataclass(frozen=True, eq=False)

@@ -246,7 +246,7 @@ def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
     lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
     ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
     page.locator("#compute-front").click()
-    points = page.locator("#front circle.point")
+    points = page.locator("#front .point")
     expect(points.first).to_be_visible()
     assert points.count() > 1
     fastest = points.first.get_attribute("aria-label")

@@ -12,12 +12,12 @@ export class Problem extends Error {
 }
 
 /** JSON of a GET. Throws Problem. */
-export const get = (path) => call(path, { method: "GET" });
+export const get = async (path) => (await send(path, {})).json();
 
-/** JSON of the answer to a POST. Throws Problem, or AbortError. */
-export const post = (path, body, options = {}) => call(path, posting(body, options));
+/** JSON of the answer to a POST. Throws Problem. */
+export const post = async (path, body) => (await send(path, posting(body))).json();
 
-const posting = (body, { signal, headers = {} } = {}) => ({ method: "POST", body: JSON.stringify(body), signal, headers: { "Content-Type": "application/json", ...headers } });
+const posting = (body, headers = {}) => ({ method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json", ...headers } });
 
 /** The response to a request that was accepted. It asks for the key where one is needed. Throws Problem. */
 export async function send(path, options) {
@@ -42,13 +42,11 @@ export async function send(path, options) {
   throw new Problem({ status: response.status, retry: Number(response.headers.get("Retry-After")) || null, ...details });
 }
 
-const call = async (path, options) => (await send(path, options)).json();
-
 /** Posts, and passes every event of the stream to `event(name, data)`. Where the answer is plain JSON, it is the only
  * event: `answer`. Throws Problem, or AbortError. */
 export async function stream(path, body, event, signal) {
   const accept = { Accept: "text/event-stream, application/json;q=0.9" };
-  const response = await send(path, posting(body, { signal, headers: accept }));
+  const response = await send(path, { ...posting(body, accept), signal });
   if (!response.headers.get("Content-Type")?.startsWith("text/event-stream")) {
     event("answer", await response.json());
     return;

@@ -2,19 +2,23 @@
 import * as THREE from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 import { IDENTITY } from "./chain.js";
-import { linkBodies, linkCapsules } from "./links.js";
 import { along, capsule, place, placedShape, roundedCylinder } from "./shapes.js";
 
 const COLOURS = { tube: 0xe3e7ec, housing: 0xcfd5dc, cap: 0x2f7fb8, ring: 0x3a424c, foot: 0x555e69, tool: 0x2f3742, payload: 0xd8951f };
+const ROUNDED = { tube: 0.01, housing: 0.04, cap: 0.16, ring: 0.01, foot: 0.1 }; // edges, of the radius
 const SIDES = 22; // of round bodies
 const WATER = 1000; // density [kg/m³]
 const geometries = new Map(); // of each robot, by name: several arms share them
 
+/** Names of the links, base first. */
+export const linkNames = (robot) => ["base", ...robot.kinematics.link_names.value];
+
 /** One geometry for each link, with the colours of its bodies, and one with the capsules of its collision checks. */
 function robotGeometry(robot) {
   if (!geometries.has(robot.name)) {
-    const drawn = linkBodies(robot).map((bodies) => merged(bodies.map(({ kind, from, to, radius }) => coloured(bodyGeometry(kind, from, to, radius), COLOURS[kind]))));
-    const seen = linkCapsules(robot).map((own) => merged(own.map(({ from, to, radius }) => capsule(from, to, radius, 14))));
+    const drawn = robot.form.map((bodies) => merged(bodies.map((body) => coloured(bodyGeometry(body), COLOURS[body.kind]))));
+    const capsules = linkNames(robot).map((name) => robot.collision[name]?.value ?? []);
+    const seen = capsules.map((own) => merged(own.map((row) => capsule(row.slice(0, 3), row.slice(3, 6), row[6], 14))));
     geometries.set(robot.name, { drawn, seen });
   }
   return geometries.get(robot.name);
@@ -31,11 +35,7 @@ function coloured(geometry, colour) {
   return geometry.setAttribute("color", new THREE.Float32BufferAttribute(all, 3));
 }
 
-function bodyGeometry(kind, from, to, radius) {
-  if (kind === "tube") return along(from, to, (length) => new THREE.CylinderGeometry(radius, radius, length, SIDES, 1, true).rotateX(Math.PI / 2));
-  const round = { cap: 0.16, housing: 0.04, ring: 0.01, foot: 0.1 }[kind] * radius;
-  return along(from, to, (length) => roundedCylinder(radius, length, round, SIDES));
-}
+const bodyGeometry = ({ kind, start, end, radius }) => along(start, end, (length) => roundedCylinder(radius, length, ROUNDED[kind] * radius, SIDES));
 
 /** What is drawn of a payload: its shape; without one, the ball that as much water has. */
 const loadShape = ({ mass, com, shape }) =>

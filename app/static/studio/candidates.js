@@ -1,5 +1,5 @@
 // The table of candidates: choose branches to see them as ghosts, compute one to let both arms move on one clock.
-import { $, el, figure } from "./dom.js";
+import { $, el, table } from "./dom.js";
 import { play } from "./player.js";
 import { compute, optimise, problem } from "./request.js";
 import { embedded } from "./standalone.js";
@@ -24,13 +24,11 @@ function draw() {
   $("candidate-counts").textContent = counts.map(([status, count]) => `${count} ${status}`).join(", ");
   const filter = $("candidate-filter").value;
   const rows = answer.candidates.filter(({ status }) => !filter || status === filter).toSorted(compare);
-  const head = el("tr", {}, el("th", {}, "show"), COLUMNS.map(([key, name]) =>
-    el("th", { "aria-sort": key === order ? "ascending" : "none" }, el("button", { type: "button", onclick: () => { order = key; draw(); } }, name))), el("th", {}));
-  const table = el("table", {}, el("thead", {}, head), el("tbody", {}, rows.slice(0, MOST_ROWS).map(row)));
+  const head = COLUMNS.map(([key, name]) => el("th", { "aria-sort": key === order ? "ascending" : "none" }, el("button", { type: "button", onclick: () => { order = key; draw(); } }, name)));
   const more = [];
   if (rows.length > MOST_ROWS) more.push(el("p", { class: "hint" }, `${MOST_ROWS} of ${rows.length} are listed.`));
   if (answer.candidates.length < total && !embedded()) more.push(el("button", { type: "button", onclick: () => optimise({ ...state.asked, candidates: "all" }).catch(problem) }, `List all ${total} (computes again)`));
-  $("candidates").replaceChildren(rows.length ? el("div", { class: "scroll" }, table) : el("p", { class: "hint" }, "None with this status."), ...more);
+  $("candidates").replaceChildren(rows.length ? table(["show", ...head, ""], rows.slice(0, MOST_ROWS).map(row)) : el("p", { class: "hint" }, "None with this status."), ...more);
 }
 
 const compare = (a, b) => {
@@ -48,12 +46,9 @@ function row(candidate) {
     set({ chosen: box.checked ? [...others, candidate].slice(-MOST) : others });
   };
   const best = candidate.q_goal.every((x, j) => Math.abs(x - state.answer.branch.goal.q[j]) < 1e-6) && candidate.q_start.every((x, j) => Math.abs(x - state.answer.branch.start.q[j]) < 1e-6);
-  return el("tr", { title: candidate.reason, class: best ? "best" : candidate.status },
-    el("td", {}, box),
-    el("td", {}, candidate.goal, candidate.start === candidate.goal ? null : el("small", {}, ` from ${candidate.start}`)),
-    el("td", {}, best ? "this motion" : candidate.status),
-    ...["lower_bound", "energy", "duration"].map((key) => el("td", { class: "number" }, figure(candidate[key]))),
-    el("td", {}, best || embedded() ? null : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute")));
+  const name = [candidate.goal, candidate.start === candidate.goal ? null : el("small", {}, ` from ${candidate.start}`)];
+  const compute_ = best || embedded() ? "" : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute");
+  return { title: candidate.reason, class: best ? "best" : candidate.status, cells: [box, name, best ? "this motion" : candidate.status, candidate.lower_bound, candidate.energy, candidate.duration, compute_] };
 }
 
 /** Computes one branch, and lets its arm move beside the answer's. Throws Problem. */

@@ -21,12 +21,6 @@ export const quaternionOf = (T) => new Quaternion().setFromRotationMatrix(new Ma
 
 export const multiply = (A, B) => rows(new Matrix4().set(...A).multiply(new Matrix4().set(...B)));
 
-/** A point [x, y, z] moved by a matrix. */
-export const moved = (T, [x, y, z]) => [0, 4, 8].map((row) => T[row] * x + T[row + 1] * y + T[row + 2] * z + T[row + 3]);
-
-/** A direction [x, y, z] turned by a matrix. */
-export const turned = (T, [x, y, z]) => [0, 4, 8].map((row) => T[row] * x + T[row + 1] * y + T[row + 2] * z);
-
 /** What is drawn of a request: the same with all obstacles in the base frame. ROS's `base_link` may stand elsewhere. */
 export function cellOf(request, robot) {
   const T = ofOrigin(robot.kinematics.base_link_origin?.value ?? [0, 0, 0, 0, 0, 0]);

@@ -1,16 +1,10 @@
 // Small helpers for elements and numbers.
 
-const SVG = "http://www.w3.org/2000/svg";
-
 export const $ = (id) => document.getElementById(id);
 
 /** An element with attributes, listeners (`onclick`) and children. Text goes in as text. */
-export const el = (tag, attributes = {}, ...children) => filled(document.createElement(tag), attributes, children);
-
-/** The same for SVG. */
-export const svg = (tag, attributes = {}, ...children) => filled(document.createElementNS(SVG, tag), attributes, children);
-
-function filled(node, attributes, children) {
+export function el(tag, attributes = {}, ...children) {
+  const node = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) node.addEventListener(name.slice(2), value);
     else if (value === true) node.setAttribute(name, "");
@@ -33,6 +27,15 @@ export function figure(value, digits = 3) {
 const superscript = (digits) => [...digits].map((digit) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[digit]).join("");
 
 export const percent = (share, digits = 3) => `${figure(share * 100, digits)} %`;
+
+/** A table of rows of words, elements and numbers; an object instead of a row has its `cells` beside its attributes. */
+export function table(head, rows) {
+  const cell = (value) => (value === null || typeof value === "number" ? el("td", { class: "number" }, figure(value)) : el("td", {}, value));
+  const row = (given) => (Array.isArray(given) ? el("tr", {}, given.map(cell)) : el("tr", { ...given, cells: null }, given.cells.map(cell)));
+  const first = rows[0]?.cells ?? rows[0];
+  const names = head.map((name, k) => (name instanceof Node ? name : el("th", { class: first?.[k] === null || typeof first?.[k] === "number" ? "number" : null }, name)));
+  return el("div", { class: "scroll" }, el("table", {}, el("thead", {}, el("tr", {}, names)), el("tbody", {}, rows.map(row))));
+}
 
 /** A custom property of the page's style, as it is now. */
 export const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();

@@ -2,9 +2,9 @@
 import * as THREE from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { post } from "./api.js";
-import { Chain, multiply, ofOrigin, ofPose, quaternionOf } from "./chain.js";
+import { Chain, cellOf, multiply, ofOrigin, ofPose, quaternionOf } from "./chain.js";
 import { $, el } from "./dom.js";
-import { robotOf, setRequest } from "./request.js";
+import { robotOf } from "./request.js";
 import { follow, set, state } from "./store.js";
 
 const HEIGHT = 0.2; // of a box that is drawn [m]
@@ -45,6 +45,9 @@ function offer() {
 }
 
 const linkFrame = (robot, frame) => ofOrigin((frame === "base_link" && robot.kinematics.base_link_origin?.value) || [0, 0, 0, 0, 0, 0]);
+
+/** A copy of a request with its obstacles in the base frame. */
+const inBase = (request) => structuredClone(request.scene?.frame === "base_link" ? { ...request, scene: { ...request.scene, ...cellOf(request, state.robot).scene, frame: "base" } } : request);
 
 /** The pose of what is dragged, in the base frame. */
 function poseOf(chosen, robot) {
@@ -123,17 +126,11 @@ function tellReach(solutions, robot) {
 /** Writes the new pose into the request, and asks whether it is reached. */
 function release() {
   const pose = poseOfHandle();
-  const request = structuredClone(state.request);
-  if (isEnd(target)) {
-    const [parent, key] = endIn(request, target);
-    parent[key] = { pose };
-    setRequest(request);
-    reach(pose);
-  } else {
-    if (request.scene.frame === "base_link") delete request.scene.frame, request.scene.obstacles = state.cell.scene.obstacles;
-    request.scene.obstacles[target].pose = pose;
-    setRequest(request);
-  }
+  const request = inBase(state.request);
+  const [parent, key] = isEnd(target) ? endIn(request, target) : [request.scene.obstacles[target], "pose"];
+  parent[key] = isEnd(target) ? { pose } : pose;
+  set({ request });
+  if (isEnd(target)) reach(pose);
 }
 
 /** The next drag over the floor draws the ground of a box. */
@@ -141,51 +138,36 @@ function drawBox() {
   tell("Drag over the floor to draw the ground of a box.");
   gizmo.detach();
   view.controls.enabled = false;
-  const ghost = new THREE.Mesh(new THREE.BoxGeometry(1, 1, HEIGHT), new THREE.MeshLambertMaterial({ color: 0x3b7dd8, transparent: true, opacity: 0.5 }));
+  const before = inBase(state.request);
   const over = new AbortController();
   const on = (name, act) => view.renderer.domElement.addEventListener(name, act, { signal: over.signal });
-  let [first, box] = [null, null];
+  let first = null;
   on("pointerdown", (event) => { first = onFloor(event); });
   on("pointermove", (event) => {
     const last = first && onFloor(event);
-    if (!last) return;
-    box = between(first, last);
-    ghost.scale.set(box.size[0], box.size[1], 1);
-    ghost.position.set(...box.position);
-    view.scene.add(ghost);
-    view.draw();
+    if (last) set({ request: withBox(before, first, last) });
   });
   on("pointerup", () => {
     over.abort();
-    view.scene.remove(ghost);
     view.controls.enabled = true;
     tell("");
-    if (box) addBox(box);
   });
 }
 
-/** The box on the floor between two of its corners [x, y]. */
-function between(first, last) {
+/** The request with one more box, on the floor between two of its corners [x, y]. */
+function withBox(request, first, last) {
   const round = (value) => Math.round(value * 1000) / 1000;
   const size = first.map((value, axis) => Math.max(0.01, round(Math.abs(last[axis] - value))));
-  return { size: [...size, HEIGHT], position: [...first.map((value, axis) => round((value + last[axis]) / 2)), HEIGHT / 2] };
-}
-
-function addBox({ size, position }) {
-  const request = structuredClone(state.request);
-  request.scene ??= {};
-  request.scene.obstacles ??= [];
+  const position = first.map((value, axis) => round((value + last[axis]) / 2));
+  const obstacles = request.scene?.obstacles ?? [];
   let k = 1;
-  while (request.scene.obstacles.some(({ name }) => name === `box ${k}`)) k += 1;
-  request.scene.obstacles.push({ name: `box ${k}`, shape: "box", size, pose: { position, quaternion: [0, 0, 0, 1] } });
-  setRequest(request);
+  while (obstacles.some(({ name }) => name === `box ${k}`)) k += 1;
+  const box = { name: `box ${k}`, shape: "box", size: [...size, HEIGHT], pose: { position: [...position, HEIGHT / 2], quaternion: [0, 0, 0, 1] } };
+  return { ...request, scene: { ...request.scene, obstacles: [...obstacles, box] } };
 }
 
 /** The point [x, y] of the plane z = 0 under the pointer; null beside it. */
 function onFloor(event) {
-  const area = view.renderer.domElement.getBoundingClientRect();
-  const ray = new THREE.Raycaster();
-  ray.setFromCamera(new THREE.Vector2((2 * (event.clientX - area.left)) / area.width - 1, 1 - (2 * (event.clientY - area.top)) / area.height), view.camera);
-  const hit = ray.ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 0, 1), 0), new THREE.Vector3());
+  const hit = view.eye.aim(event).ray.intersectPlane(new THREE.Plane(new THREE.Vector3(0, 0, 1), 0), new THREE.Vector3());
   return hit && hit.length() < 5 ? [hit.x, hit.y] : null;
 }

@@ -1,5 +1,5 @@
 // Where the energy goes: its parts as one stacked bar; and the savings against other planners, down to the proven bound.
-import { $, el, figure, percent, svg } from "./dom.js";
+import { $, el, figure, percent } from "./dom.js";
 import { follow, state } from "./store.js";
 
 const PARTS = {
@@ -31,18 +31,15 @@ export function createEnergy() {
 /** A stacked bar of an `ElectricalEnergy`, and the list of its parts. */
 export function breakdown(electrical) {
   const drawn = Object.keys(PARTS).map((key) => ({ key, value: electrical[key] ?? 0 })).filter(({ value }) => Math.abs(value) > 1e-9);
-  const gains = drawn.filter(({ value }) => value > 0).reduce((sum, { value }) => sum + value, 0);
-  const returned = drawn.filter(({ value }) => value < 0).reduce((sum, { value }) => sum - value, 0);
-  const scale = 100 / (gains + returned || 1);
-  let [right, left] = [returned * scale, returned * scale];
-  const bar = svg("svg", { class: "stack", viewBox: "0 0 100 10", preserveAspectRatio: "none", role: "img", "aria-label": "Parts of the energy" });
-  for (const { key, value } of drawn) {
-    const width = Math.abs(value) * scale;
-    if (value < 0) left -= width;
-    bar.append(svg("rect", { x: value < 0 ? left : right, y: 0, width, height: 10, class: `part part-${key}` }, svg("title", {}, `${PARTS[key][0]}: ${figure(value)} J. ${PARTS[key][1]}`)));
-    if (value > 0) right += width;
-  }
-  if (returned > 0) bar.append(svg("line", { x1: returned * scale, x2: returned * scale, y1: 0, y2: 10, class: "zero", "vector-effect": "non-scaling-stroke" }));
+  const part = ({ key, value }) => {
+    const node = el("i", { class: `part-${key}`, title: `${PARTS[key][0]}: ${figure(value)} J. ${PARTS[key][1]}` });
+    node.style.flexGrow = Math.abs(value);
+    return node;
+  };
+  const back = drawn.filter(({ value }) => value < 0).toReversed();
+  const spent = drawn.filter(({ value }) => value > 0);
+  const zero = back.length ? el("i", { class: "zero" }) : null;
+  const bar = el("div", { class: "stack", role: "img", "aria-label": "Parts of the energy" }, back.map(part), zero, spent.map(part));
   const listed = drawn.filter(({ value }) => Math.abs(value) > LEAST * Math.abs(electrical.total));
   const list = el("ul", { class: "parts" }, listed.map(({ key, value }) =>
     el("li", { title: PARTS[key][1] }, el("i", { class: `swatch part-${key}` }), el("span", {}, PARTS[key][0]), el("b", {}, `${figure(value)} J`))));

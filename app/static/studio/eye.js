@@ -102,12 +102,17 @@ export class Eye {
     return best.from;
   }
 
-  /** The obstacle {object, at} at a point of the picture, both coordinates from -1 to 1; null if there is none. */
-  under(x, y) {
-    this.ray.setFromCamera(new THREE.Vector2(x, y), this.camera);
+  /** The ray through the pointer. */
+  aim({ offsetX, offsetY, target }) {
+    this.ray.setFromCamera(new THREE.Vector2((2 * offsetX) / target.clientWidth - 1, 1 - (2 * offsetY) / target.clientHeight), this.camera);
     this.ray.far = Infinity;
+    return this.ray;
+  }
+
+  /** The obstacle {object, at} under the pointer; null if there is none. */
+  under(event) {
     const all = this.obstacles.children.filter(({ userData }) => userData.hides);
-    const [hit] = this.ray.intersectObjects(all, true);
+    const [hit] = this.aim(event).intersectObjects(all, true);
     return hit ? { object: all.find((each) => each.getObjectById(hit.object.id)), at: hit.point.toArray() } : null;
   }
 

@@ -1,8 +1,8 @@
 // A form made from the OpenAPI document: it shows the fields that the request sets, and offers the others.
 import { get } from "./api.js";
 import { $, el } from "./dom.js";
-import { openapi, problem, setRequest } from "./request.js";
-import { follow, state } from "./store.js";
+import { kindOf, openapi, problem } from "./request.js";
+import { follow, set, state } from "./store.js";
 
 // how a unit is shown and read; requests are in SI units always
 const SHOWN = { rad: { deg: ["°", 180 / Math.PI] }, m: { mm: ["mm", 1000] } };
@@ -28,7 +28,15 @@ export async function showForm() {
   if (!state.request) return $("form").replaceChildren(el("p", { class: "hint" }, "The request of a kept round is not kept. Choose an example, or write one as JSON."));
   schemas ??= (await openapi()).components.schemas;
   if (!$("robots").childElementCount) $("robots").replaceChildren(...(await get("robots")).robots.map(({ name }) => el("option", {}, name)));
-  $("form").replaceChildren(fields(state.request.stops ? schemas.CycleRequest : schemas.OptimizeRequest, state.request, []));
+  const { schema, path, drawn } = kindOf(state.request);
+  $("drag-tools").hidden = !drawn;
+  $("form").replaceChildren(fields(schemas[schema] ?? (await querySchema(path)), state.request, []));
+}
+
+/** The query parameters of a POST as a schema. */
+async function querySchema(path) {
+  const asked = (await openapi()).paths[`/${path}`].post.parameters.filter((each) => each.in === "query");
+  return { properties: Object.fromEntries(asked.map(({ name, schema, content, ...about }) => [name, { ...about, ...(schema ?? content["application/json"].schema) }])) };
 }
 
 const resolve = (schema) => (schema.$ref ? { ...schemas[schema.$ref.split("/").at(-1)], ...schema, $ref: undefined } : schema);
@@ -78,14 +86,14 @@ function write(path, value, redraw = true) {
   else if (Array.isArray(parent)) parent.splice(last, 1);
   else delete parent[last];
   own = !redraw;
-  setRequest(request);
+  set({ request });
   own = false;
 }
 
 /** Set fields of an object, and a list that adds others. */
 function fields(schema, value, path) {
   const needed = (name) => (schema.required?.includes(name) ? 0 : 1);
-  const set = Object.keys(schema.properties).filter((name) => name in value).toSorted((a, b) => needed(a) - needed(b));
+  const there = Object.keys(schema.properties).filter((name) => name in value).toSorted((a, b) => needed(a) - needed(b));
   const unset = Object.keys(schema.properties).filter((name) => !(name in value));
   const add = el("select", { "aria-label": `Add a field${path.length ? ` to ${path.join(" ")}` : ""}`, class: "add" }, el("option", { value: "" }, "add …"),
     unset.map((name) => el("option", { value: name, title: schema.properties[name].description }, words(name))));
@@ -93,7 +101,7 @@ function fields(schema, value, path) {
     open.add([...path, add.value].join("."));
     write([...path, add.value], fresh(schema.properties[add.value]));
   };
-  return el("div", { class: "fields" }, set.map((name) => field(schema.properties[name], value[name], [...path, name], schema.required?.includes(name))), unset.length ? add : null);
+  return el("div", { class: "fields" }, there.map((name) => field(schema.properties[name], value[name], [...path, name], schema.required?.includes(name))), unset.length ? add : null);
 }
 
 /** One field with its name, its control and, unless it has to be there, a button that takes it away. */
@@ -136,7 +144,7 @@ function pick(options, chosen, then, label) {
   return select;
 }
 
-const kind = (schema) => schema.type === "null" ? "none" : schema.properties?.shape?.const ?? schema.properties?.mode?.const ?? (schema.required?.length ? schema.required.filter((name) => name !== "position" && name !== "direction").join(", ") || schema.title : schema.title ?? schema.type);
+const kind = (schema) => schema.type === "null" ? "none" : schema.const ?? schema.properties?.shape?.const ?? schema.properties?.mode?.const ?? (schema.required?.length ? schema.required.filter((name) => name !== "position" && name !== "direction").join(", ") || schema.title : schema.title ?? schema.type);
 
 /** One of several forms of a value: a list that chooses, then the form chosen. */
 function choice(others, value, path, label) {

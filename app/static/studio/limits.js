@@ -29,8 +29,7 @@ function row(name, share) {
   const time = worstTime(name);
   const fill = el("span", { class: `fill ${share > FULL ? "own" : "other"}` });
   fill.style.width = `${Math.min(100, share * 100)}%`;
-  const label = NAMES[name] ?? name;
-  const parts = [el("span", { class: "name" }, label), el("span", { class: "track" }, fill), el("span", { class: "value" }, percent(share))];
+  const parts = [el("span", { class: "name" }, NAMES[name] ?? name), el("span", { class: "track" }, fill), el("span", { class: "value" }, percent(share))];
   if (time === null) return el("li", {}, parts);
   return el("li", {}, el("button", { type: "button", class: "jump row", title: `Worst at ${figure(time)} s`, onclick: () => goTo(time) }, parts));
 }

@@ -10,11 +10,11 @@ import { createLimits } from "./limits.js";
 import { createMeshes } from "./meshes.js";
 import { createPlayer, play } from "./player.js";
 import { createPlots } from "./plots.js";
-import { createRequest, keepRobot, optimise, problem, setFirst, setRequest, showAnswer } from "./request.js";
+import { createRequest, optimise, problem, robots, setFirst, showAnswer } from "./request.js";
 import { createRound } from "./round.js";
 import { createShare, shared } from "./share.js";
 import { embedded } from "./standalone.js";
-import { follow, state } from "./store.js";
+import { follow, set, state } from "./store.js";
 import { createView, drawnTcp } from "./view.js";
 
 const view = createView();
@@ -39,12 +39,12 @@ start().catch(problem);
 async function start() {
   const given = inside ?? (await shared());
   if (inside) {
-    keepRobot(inside.robot);
+    robots.set(inside.robot.name, inside.robot);
     await showAnswer(inside.answer, inside.request, inside.round);
   } else if (given.answer) {
     await openAnswer(given.answer);
   } else {
-    await (given.request ? setRequest(given.request) : setFirst());
+    await (given.request ? set({ request: given.request }) : setFirst());
     await optimise();
   }
   if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play();

@@ -1,7 +1,6 @@
 // The maker's meshes, where the service has them: they take the place of what is drawn from a robot's figures.
 import { send } from "./api.js";
-import { drawBy } from "./arm.js";
-import { linkNames } from "./links.js";
+import { drawBy, linkNames } from "./arm.js";
 import { fromBase64, readMeshes } from "./shapes.js";
 import { follow, state } from "./store.js";
 

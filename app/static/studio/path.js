@@ -18,8 +18,7 @@ export function pathOfPower({ q, power }, tcp, radius) {
   const step = Math.ceil(q.length / MOST);
   const kept = q.map((_, k) => k).filter((k) => k % step === 0 || k === q.length - 1);
   const points = kept.map((k) => tcp(q[k])).map((T) => new THREE.Vector3(T[3], T[7], T[11]));
-  const long = points.some((point) => point.distanceTo(points[0]) > 1e-4);
-  if (!long) return new THREE.Group();
+  if (points.every((point) => point.distanceTo(points[0]) <= 1e-4)) return new THREE.Group();
   const [least, most] = [Math.min(...power), Math.max(...power)];
   const curve = new THREE.CatmullRomCurve3(points, false, "chordal");
   const segments = kept.length - 1;

@@ -3,10 +3,8 @@ import { $, figure } from "./dom.js";
 import { follow, set, state } from "./store.js";
 
 const REST = 0.7; // at the end of the motion, before it begins again [s]
-const VIEW_KEYS = "123456";
 
-let before = null;
-let resting = 0;
+let [before, resting] = [null, 0]; // time of the frame before [ms], and at the end of the motion [s]
 
 export function createPlayer(view) {
   $("play").onclick = toggle;
@@ -35,8 +33,7 @@ const toggle = () => (state.playing ? set({ playing: false }) : play());
 /** Plays from where the clock is; from the start, if it is at the end. */
 export function play() {
   if (state.playing || !state.answer) return;
-  before = null;
-  resting = 0;
+  [before, resting] = [null, 0];
   set({ playing: true, ...(state.time >= state.duration ? { time: 0 } : {}) });
   requestAnimationFrame(tick);
 }
@@ -61,8 +58,7 @@ function tick(now) {
 /** Time of the sample `steps` away from the present one. */
 function neighbour(steps) {
   const times = state.answer?.trajectory.t ?? [0];
-  let nearest = times.findIndex((t) => t > state.time + 1e-9);
-  nearest = (nearest < 0 ? times.length : nearest) - 1;
+  let nearest = times.findLastIndex((t) => t <= state.time + 1e-9);
   if (steps < 0 && state.time > times[nearest] + 1e-9) nearest += 1;
   return times[Math.max(0, Math.min(times.length - 1, nearest + steps))];
 }
@@ -78,7 +74,7 @@ function keys(event, view) {
     End: () => goTo(state.duration),
     r: () => view?.look(1),
   }[event.key.length > 1 ? event.key : event.key.toLowerCase()];
-  if (VIEW_KEYS.includes(event.key)) view?.look(Number(event.key));
+  if (/^[1-6]$/.test(event.key)) view?.look(Number(event.key));
   else if (!act || (event.key === " " && onButton)) return;
   else act();
   event.preventDefault();

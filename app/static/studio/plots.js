@@ -1,5 +1,5 @@
 // Plots over time, tied to the clock: the power, and one quantity of the joints, in SI units or as shares of the limits.
-import uPlot from "uplot";
+import { chart, DASHES, hatching } from "./chart.js";
 import { $, el, figure, style, tabs } from "./dom.js";
 import { goTo } from "./player.js";
 import { follow, state } from "./store.js";
@@ -10,8 +10,6 @@ const QUANTITIES = {
   a: { name: "acceleration", unit: "rad/s²", limit: "acceleration" },
   tau: { name: "torque", unit: "N·m", limit: "torque" },
 };
-// each joint has a dash beside its colour
-const DASHES = [[], [7, 3], [2, 3], [10, 3, 2, 3], [4, 2], [12, 4], [1, 2]];
 
 let quantity = "v";
 const plots = {};
@@ -29,11 +27,6 @@ export function createPlots() {
   follow("answer", drawAll);
   follow("time", () => Object.values(plots).forEach(moveCursor));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
-  let waiting;
-  new ResizeObserver(() => {
-    clearTimeout(waiting);
-    waiting = setTimeout(() => Object.values(plots).forEach((plot) => plot.setSize(sizeOf(plot.root.parentNode))), 60);
-  }).observe($("plot-power"));
 }
 
 function drawAll() {
@@ -42,28 +35,9 @@ function drawAll() {
   drawJoints();
 }
 
-const sizeOf = (box) => ({ width: Math.max(200, box.clientWidth), height: rem(9.4) });
-const rem = (size) => size * parseFloat(getComputedStyle(document.documentElement).fontSize);
-
-function axis(extra = {}) {
-  const grid = { stroke: style("--line"), width: 1 };
-  return { stroke: style("--ink-2"), grid, ticks: { ...grid, size: 4 }, font: `${rem(0.69)}px system-ui, sans-serif`, ...extra };
-}
-
-function draw(id, series, data, extra = {}) {
-  const box = $(id);
-  plots[id]?.destroy();
-  const options = {
-    ...sizeOf(box),
-    scales: { x: { time: false, range: [0, Math.max(state.duration, 1e-3)] }, ...extra.scales },
-    axes: [axis({ size: rem(1.5), values: (_, values) => values.map((t) => `${+t.toFixed(3)} s`) }), axis({ size: rem(2.9) })],
-    legend: { show: false },
-    cursor: { drag: { x: false, y: false }, points: { size: 6 } },
-    padding: [8, 10, 0, 0],
-    series: [{}, ...series],
-    hooks: extra.hooks ?? {},
-  };
-  const plot = new uPlot(options, data, box);
+/** A chart over the time of the motion, with the clock as a line. */
+function draw(id, series, data, y) {
+  const plot = chart($(id), series, data, { x: [0, Math.max(state.duration, 1e-3)], y });
   plot.line = el("div", { class: "now" });
   plot.over.append(plot.line);
   plot.over.onpointerdown = (event) => {
@@ -73,6 +47,7 @@ function draw(id, series, data, extra = {}) {
   plot.over.onpointermove = (event) => {
     if (event.buttons) seek(plot, event);
   };
+  plot.hooks.setSize = [moveCursor];
   plots[id] = plot;
   moveCursor(plot);
   return plot;
@@ -82,41 +57,19 @@ const seek = (plot, event) => goTo(plot.posToVal(event.clientX - plot.over.getBo
 
 const moveCursor = (plot) => { plot.line.style.transform = `translateX(${plot.valToPos(state.time, "x")}px)`; };
 
+/** The power, the zero line, and hatching over what flows back to the supply. */
 function drawPower() {
   const { t, power } = state.answer.trajectory;
   const green = style("--good");
-  const floor = Math.min(0, ...power);
-  const plot = draw("plot-power", [{ stroke: green, width: 2, fill: `${green}2e`, fillTo: 0 }], [t, power], {
-    scales: { y: { range: [floor * 1.08, Math.max(1, ...power) * 1.08] } },
-    hooks: { draw: [zeroAndRecovered] },
-  });
+  const series = [
+    { stroke: green, width: 2, fill: `${green}2e`, fillTo: 0 },
+    { fill: hatching(), fillTo: 0, width: 0, points: { show: false } },
+    { stroke: style("--ink-2"), width: 1, points: { show: false } },
+  ];
+  const data = [t, power, power.map((watts) => Math.min(0, watts)), t.map(() => 0)];
+  const plot = draw("plot-power", series, data, [Math.min(0, ...power) * 1.08, Math.max(1, ...power) * 1.08]);
   plot.root.setAttribute("role", "img");
   plot.root.setAttribute("aria-label", `Power from ${figure(Math.min(...power))} to ${figure(Math.max(...power))} W`);
-}
-
-/** The zero line, and hatching over what flows back to the supply. */
-function zeroAndRecovered(plot) {
-  const { ctx, bbox } = plot;
-  const zero = plot.valToPos(0, "y", true);
-  ctx.save();
-  ctx.strokeStyle = style("--ink-2");
-  ctx.beginPath();
-  ctx.moveTo(bbox.left, zero);
-  ctx.lineTo(bbox.left + bbox.width, zero);
-  ctx.stroke();
-  const [t, power] = plot.data;
-  ctx.beginPath();
-  ctx.moveTo(plot.valToPos(t[0], "x", true), zero);
-  t.forEach((time, k) => ctx.lineTo(plot.valToPos(time, "x", true), plot.valToPos(Math.min(0, power[k]), "y", true)));
-  ctx.lineTo(plot.valToPos(t.at(-1), "x", true), zero);
-  ctx.clip();
-  ctx.beginPath();
-  for (let x = bbox.left - bbox.height; x < bbox.left + bbox.width; x += 7) {
-    ctx.moveTo(x, bbox.top + bbox.height);
-    ctx.lineTo(x + bbox.height, bbox.top);
-  }
-  ctx.stroke();
-  ctx.restore();
 }
 
 /** The samples that a torque limit is for: those of the motor, or those of the link. */
@@ -135,31 +88,18 @@ function drawJoints() {
     return x / answer.limits[limit][j];
   };
   const columns = robot.joints.map((_, j) => rows.map((row) => value(row[j], j)));
-  const extent = asShares ? 1 : Math.max(1e-6, ...columns.flat().map(Math.abs));
+  const extent = 1.12 * (asShares ? 1 : Math.max(1e-6, ...columns.flat().map(Math.abs)));
   const series = robot.joints.map((_, j) => ({ stroke: style(`--joint-${j + 1}`), width: 1.8, dash: DASHES[j], show: !hidden.has(j) }));
-  draw("plot-joints", series, [answer.trajectory.t, ...columns], {
-    scales: { y: { range: [-extent * 1.12, extent * 1.12] } },
-    hooks: { draw: asShares ? [limitLines] : [] },
-  });
+  const limits = asShares ? [-1, 1] : [];
+  const red = { stroke: style("--bad"), width: 1, dash: [6, 4], points: { show: false } };
+  draw("plot-joints", [...series, ...limits.map(() => red)], [answer.trajectory.t, ...columns, ...limits.map((share) => rows.map(() => share))], [-extent, extent]);
   $("joint-title").textContent = `Joint ${name}`;
   $("joint-title").append(el("small", {}, asShares ? " share of the limit" : ` ${unit}`));
   legend(robot.joints);
 }
 
-function limitLines(plot) {
-  const { ctx, bbox } = plot;
-  ctx.save();
-  ctx.strokeStyle = style("--bad");
-  ctx.setLineDash([6, 4]);
-  ctx.beginPath();
-  for (const share of [-1, 1]) {
-    const y = plot.valToPos(share, "y", true);
-    ctx.moveTo(bbox.left, y);
-    ctx.lineTo(bbox.left + bbox.width, y);
-  }
-  ctx.stroke();
-  ctx.restore();
-}
+/** The name of a joint, in short. */
+export const jointName = (name) => name.replace(/_joint$/, "").replaceAll("_", " ");
 
 function legend(joints) {
   const box = $("plot-joints");
@@ -170,7 +110,7 @@ function legend(joints) {
     plots["plot-joints"].setSeries(j + 1, { show: !hidden.has(j) });
   };
   box.append(el("div", { class: "joints" }, joints.map((name, j) => {
-    const button = el("button", { type: "button", class: "joint", "aria-pressed": String(!hidden.has(j)), title: "Show or hide" }, name.replace(/_joint$/, "").replaceAll("_", " "));
+    const button = el("button", { type: "button", class: "joint", "aria-pressed": String(!hidden.has(j)), title: "Show or hide" }, jointName(name));
     button.style.setProperty("--tint", `var(--joint-${j + 1})`);
     button.onclick = () => toggle(j, button);
     return button;

@@ -1,13 +1,22 @@
 // The request: examples, JSON, and its way to the service and back.
 import { Problem, get, stream } from "./api.js";
 import { cellOf } from "./chain.js";
-import { $, el, figure, svg } from "./dom.js";
+import { chart, steps } from "./chart.js";
+import { $, el, figure, style } from "./dom.js";
+import { addLog, openIdentification } from "./kept.js";
 import { showRound } from "./round.js";
 import { follow, set, state } from "./store.js";
 
+// what may be asked for, by the field that tells it
+const KINDS = {
+  stops: { path: "cycle", schema: "CycleRequest", verb: "Optimise", drawn: true, show: (answer, request) => showRound(answer, request) },
+  logs: { path: "identifications", schema: "IdentifyRequest", verb: "Identify", show: ({ id }) => openIdentification(id) },
+  log: { path: "logs", verb: "Add the log", show: added },
+};
+const MOTION = { path: "optimize", schema: "OptimizeRequest", verb: "Optimise", drawn: true, show: (answer, request) => showAnswer(answer, request) };
 const FIRST = "studio/first.json";
 const PATIENCE = 3; // times that a busy service is asked again
-const robots = new Map();
+export const robots = new Map(); // figures of those that are known, by name
 let example = null; // the request that the list of examples names
 let running = null; // AbortController of the request that is on its way
 
@@ -17,20 +26,18 @@ export function createRequest() {
   $("json").onchange = readJson;
   follow("request", () => {
     $("optimise").disabled = !state.request;
+    $("optimise").textContent = state.request ? kindOf(state.request).verb : "Optimise";
     const text = JSON.stringify(state.request, null, 1);
     if ($("json").value !== text) $("json").value = text;
     if (state.request !== example) $("examples").selectedIndex = -1;
   });
-  $("examples").onchange = (event) => setRequest((example = structuredClone(event.target.selectedOptions[0].body)));
+  $("examples").onchange = (event) => set({ request: (example = structuredClone(event.target.selectedOptions[0].body)) });
   // the first answer does not wait for the document
   follow("answer", () => state.answer && fillExamples().catch(problem));
 }
 
 /** Puts the example of the first visit into the editor. */
-export const setFirst = async () => setRequest((example = await get(FIRST)));
-
-/** Puts a request into the editor. */
-export const setRequest = (request) => set({ request });
+export const setFirst = async () => set({ request: (example = await get(FIRST)) });
 
 let document_ = null;
 
@@ -46,6 +53,12 @@ async function fillExamples() {
   if (state.request !== example) $("examples").selectedIndex = -1;
 }
 
+/** A log was added: it can be used now. */
+function added({ id, warnings }) {
+  set({ request: { logs: [id] } });
+  $("status").textContent = `The log is there. ${warnings.join(" ")}`;
+}
+
 function readJson() {
   try {
     set({ request: JSON.parse($("json").value) });
@@ -56,11 +69,14 @@ function readJson() {
   }
 }
 
+/** What kind of thing a request asks for. */
+export const kindOf = (request) => KINDS[Object.keys(KINDS).find((name) => name in request)] ?? MOTION;
+
 /** Sends the request, shows its progress, then its answer. Throws Problem. */
 export async function optimise(request = state.request) {
-  const isRound = Boolean(request.stops);
-  const answer = await compute(isRound ? "cycle" : "optimize", request);
-  if (answer) await (isRound ? showRound : showAnswer)(answer, request);
+  const { path, show } = kindOf(request);
+  const answer = await compute(path, request);
+  if (answer) await show(answer, request);
 }
 
 /** The answer to a POST with progress; null if it was cancelled. Throws Problem. */
@@ -73,7 +89,7 @@ export async function compute(path, request) {
   busy(true);
   const timer = setInterval(() => tell(progress, began), 200);
   try {
-    return await patiently(() => streamed(path, request, progress, own.signal));
+    return await patiently(() => (path === "logs" ? addLog(request, own.signal) : streamed(path, request, progress, own.signal)));
   } catch (error) {
     if (error.name === "AbortError") {
       if (running === own) $("status").textContent = "Cancelled.";
@@ -126,29 +142,21 @@ function busy(on) {
 function tell({ done, total, incumbents }, began) {
   if (total) $("progress-bar").value = Math.min(1, done / total);
   const incumbent = incumbents.at(-1);
-  if (incumbents.length > 1) $("progress-chart").replaceChildren(falling(incumbents, began));
+  if (incumbents.length > 1) falling(incumbents, began);
   const parts = [`${((performance.now() - began) / 1000).toFixed(1)} s`];
   if (total) parts.push(`${done} of ${total} branches`);
   if (incumbent) parts.push(`best ${figure(incumbent.energy)} J, bound ${figure(incumbent.bound)} J, gap ${figure(100 * (incumbent.gap ?? NaN), 2)} %`);
   $("progress-text").textContent = parts.join(" · ");
 }
 
-/** The best energy and its bound over time, both in one small picture. */
+/** Draws the best energy and its bound over time, as they fall and rise. */
 function falling(incumbents, began) {
-  const now = performance.now();
-  const [least, most] = [Math.min(...incumbents.map(({ bound, energy }) => bound ?? energy)), incumbents[0].energy];
-  const x = (at) => (100 * (at - began)) / (now - began);
-  const y = (value) => 28 - (26 * (value - least)) / (most - least || 1);
-  const steps = (key) => incumbents.flatMap((each, k) => {
-    const until = incumbents[k + 1]?.at ?? now;
-    return each[key] === null ? [] : [`${x(each.at)},${y(each[key])}`, `${x(until)},${y(each[key])}`];
-  }).join(" ");
-  const line = (key) => svg("polyline", { points: steps(key), class: key, "vector-effect": "non-scaling-stroke" });
-  return svg("svg", { viewBox: "0 0 100 30", preserveAspectRatio: "none", role: "img", "aria-label": "Best energy and bound over time" }, line("energy"), line("bound"));
+  const all = [...incumbents, { ...incumbents.at(-1), at: performance.now() }];
+  const column = (key) => all.map((each) => each[key]);
+  const line = (colour, dash) => ({ stroke: style(colour), width: 2, dash, paths: steps, points: { show: false } });
+  const data = [column("at").map((at) => (at - began) / 1000), column("energy"), column("bound")];
+  chart($("progress-chart"), [line("--good"), line("--bound", [5, 3])], data, { x: [0, data[0].at(-1)], y: (_, least, most) => [least, most + 1e-9] });
 }
-
-/** Keeps the figures of a robot that are known already. */
-export const keepRobot = (robot) => robots.set(robot.name, robot);
 
 /** Figures of a robot, asked for once. */
 export async function robotOf(name) {

@@ -1,7 +1,7 @@
 // Whole rounds: their legs on a time line, played as one motion, and where time and joules go.
 import { get } from "./api.js";
 import { cellOf } from "./chain.js";
-import { $, el, figure } from "./dom.js";
+import { $, el, figure, table } from "./dom.js";
 import { goTo } from "./player.js";
 import { robotOf } from "./request.js";
 import { follow, set, state } from "./store.js";
@@ -84,12 +84,11 @@ function draw() {
     button.style.setProperty("--height", `${(100 * leg.electrical) / (leg.duration || 1) / most}%`);
     return button;
   });
-  const rows = round.legs.map((leg) => el("tr", { class: leg.answer ? null : "rest" }, el("td", {}, el("button", { type: "button", class: "jump", onclick: () => goTo(leg.t0) }, legName(leg))),
-    [leg.duration, leg.electrical, leg.lower_bound, leg.payload_mass].map((value) => el("td", { class: "number" }, figure(value)))));
-  const head = el("tr", {}, el("th", {}, "leg"), ["s", "J", "bound J", "kg"].map((name) => el("th", { class: "number" }, name)));
+  const jump = (leg) => el("button", { type: "button", class: "jump", onclick: () => goTo(leg.t0) }, legName(leg));
+  const rows = round.legs.map((leg) => ({ class: leg.answer ? null : "rest", cells: [jump(leg), leg.duration, leg.electrical, leg.lower_bound, leg.payload_mass] }));
   $("timeline").replaceChildren(el("div", { class: "legs", role: "group", "aria-label": "Legs of the round" }, legs),
     el("p", { class: "hint" }, "As wide as the time, as high as the mean power; the figures are joules. Click to go there."),
-    el("div", { class: "scroll" }, el("table", {}, el("thead", {}, head), el("tbody", {}, rows))));
+    table(["leg", "s", "J", "bound J", "kg"], rows));
   mark();
 }
 

@@ -31,14 +31,9 @@ export const capsule = (from, to, radius, segments = 20) =>
 /** A cylinder along z whose edges are rounded by `round` [m]. */
 export function roundedCylinder(radius, length, round, segments = 32) {
   const edge = Math.min(round, radius / 2, length / 2);
-  const profile = [new THREE.Vector2(0, -length / 2)];
-  for (const [sign, steps] of [[-1, [0, 1, 2]], [1, [2, 1, 0]]])
-    for (const step of steps) {
-      const angle = (step / 2) * (Math.PI / 2);
-      profile.push(new THREE.Vector2(radius - edge + edge * Math.sin(angle), sign * (length / 2 - edge + edge * Math.cos(angle))));
-    }
-  profile.push(new THREE.Vector2(0, length / 2));
-  return upright(new THREE.LatheGeometry(profile, segments));
+  const [wide, high] = [radius - edge, length / 2 - edge];
+  const profile = new THREE.Path().lineTo(0, -length / 2).absarc(wide, -high, edge, -Math.PI / 2, 0).absarc(wide, high, edge, 0, Math.PI / 2).lineTo(0, length / 2);
+  return upright(new THREE.LatheGeometry(profile.getPoints(2).slice(1), segments));
 }
 
 /** An object in the frame of the shape's pose; `margin` [m] makes it thicker. Mesh files come as a promise in `later`. */

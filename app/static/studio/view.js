@@ -3,10 +3,11 @@ import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Arm } from "./arm.js";
 import { Chain, cellOf, multiply, ofPose, sampleAt } from "./chain.js";
-import { $, el, figure, style, svg } from "./dom.js";
+import { $, el, figure, style } from "./dom.js";
 import { Eye } from "./eye.js";
 import { Labels } from "./labels.js";
 import { pathOfPower, rampStops } from "./path.js";
+import { kindOf } from "./request.js";
 import { legAt } from "./round.js";
 import { placedShape } from "./shapes.js";
 import { follow, state } from "./store.js";
@@ -93,15 +94,14 @@ class View {
     const { answer, cell, robot, arms, round } = state;
     if (!answer) return;
     this.chain = new Chain(robot);
-    for (const name of ["arms", "obstacles", "margins", "path"]) this.empty(this.parts[name]);
+    for (const name of ["arms", "path"]) this.empty(this.parts[name]);
     this.arms = arms.map(({ answer: own, colour }, k) => {
       const arm = new Arm(this.chain, robot, cell, { ...(k ? { tint: colour } : {}), loads: round?.loads.map(({ payload }) => payload) });
       this.parts.arms.add(arm.object);
       this.parts.path.add(pathOfPower(own.trajectory, (q) => this.chain.tcp(q, cell.tcp), k ? 0.006 : 0.009));
       return arm;
     });
-    for (const obstacle of cell.scene.obstacles) this.obstacle(obstacle);
-    this.drawnScene = cell.scene;
+    this.drawScene(cell.scene);
     this.nearest = this.nearestOf(answer);
     this.eye.fit(state.answer.trajectory, this.chain, this.sun);
     this.explain();
@@ -128,8 +128,8 @@ class View {
   /** What the colours of the path mean, and what the axes are. */
   explain() {
     const { power } = state.answer.trajectory;
-    const stops = rampStops.map((colour, k) => svg("stop", { offset: k / (rampStops.length - 1), "stop-color": colour }));
-    const ramp = svg("svg", { viewBox: "0 0 100 8", preserveAspectRatio: "none" }, svg("linearGradient", { id: "ramp" }, stops), svg("rect", { width: 100, height: 8, rx: 2, fill: "url(#ramp)" }));
+    const ramp = el("i");
+    ramp.style.background = `linear-gradient(90deg, ${rampStops})`;
     $("legend").replaceChildren("power along the path", ramp, el("div", {}, el("span", {}, `${figure(Math.min(...power))} W`), el("span", {}, `${figure(Math.max(...power))} W`)));
     const pendant = state.robot.title.startsWith("Universal Robots");
     $("frame-note").textContent = pendant ? "base frame as on the teach pendant; ROS base_link is turned by 180° about z" : "base frame of the robot";
@@ -138,13 +138,17 @@ class View {
   /** Obstacles of a request that is being edited, before it is sent. */
   preview() {
     const { request, robot, cell, answer } = state;
-    if (!answer || !request || (request.robot ?? "ur5e") !== answer.robot) return;
+    if (!answer || !request || !kindOf(request).drawn || (request.robot ?? "ur5e") !== answer.robot) return;
     const edited = cellOf(request, robot);
     if (JSON.stringify(edited.scene) === JSON.stringify(this.drawnScene ?? cell.scene)) return;
-    this.drawnScene = edited.scene;
-    for (const name of ["obstacles", "margins"]) this.empty(this.parts[name]);
-    for (const obstacle of edited.scene.obstacles) this.obstacle(obstacle);
+    this.drawScene(edited.scene);
     this.draw();
+  }
+
+  drawScene(scene) {
+    this.drawnScene = scene;
+    for (const name of ["obstacles", "margins"]) this.empty(this.parts[name]);
+    for (const obstacle of scene.obstacles) this.obstacle(obstacle);
   }
 
   obstacle(obstacle) {
@@ -173,8 +177,7 @@ class View {
 
   /** The obstacle under the pointer has its name, and its margin as a shell. */
   hover(event) {
-    const { width, height } = this.size;
-    const found = event && this.eye.under((2 * event.offsetX) / width - 1, 1 - (2 * event.offsetY) / height);
+    const found = event && this.eye.under(event);
     const over = found && found.object.userData.title;
     this.labels.drop("hover");
     if (over) this.labels.put("hover", over, found.at, "hover");

@@ -11,6 +11,7 @@ from models.robot import Array, Robot
 from models.uncertainty.ranges import P95
 from optimizer.identification.arm.fitted_arm import FittedArm, own_arm
 from optimizer.identification.fits.fitting import Fitted, motor_torque
+from optimizer.identification.quality.curves import curves_of
 from optimizer.identification.quality.interval import Spread, energy_sd
 from optimizer.identification.results import PowerErrors, Prediction, TorqueErrors, Validation
 from optimizer.identification.rows.fit_rows import Rows
@@ -39,6 +40,7 @@ def validate(robot: Robot, folds: Sequence[Fold], threshold: float) -> Validatio
         else None,
         coverage=float(inside.mean()) if len(inside) else None,
         half_width=float(half.mean()) if len(half) else None,
+        curves=curves_of([(fold.fitted.arm, fold.rows, ~fold.rows.rest) for fold in folds], threshold),
     )
 
 

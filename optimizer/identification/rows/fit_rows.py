@@ -37,6 +37,7 @@ class Rows:
     """Rows (n, nq) of all logs: q [rad], v [rad/s], a [rad/s²], `rigid` torques of links and load [N·m], and those of
     the `links` alone.
 
+    `time` (n,) [s] is the middle of a row, from the start of its log.
     `effort` (n, nq) is the motor torque [N·m], or the motor current [A] if `current`; `power` (n,) [W] and
     `temperature` (n, nq) [°C]; all of them NaN where not logged. `log`, `move` (n,) are numbers from 0; moves count
     through all logs, and rows at rest belong to the move before. `group` (n,): moves along the same motion share one.
@@ -44,6 +45,7 @@ class Rows:
     (n, nq, 10 nq) is that of the links, None where their inertials are taken as known.
     """
 
+    time: Array
     q: Array
     v: Array
     a: Array
@@ -132,6 +134,7 @@ def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) ->
     if payload.mass > 0:
         links = rigid_torques(robot.loaded_model(0.0, payload.com, payload.inertia * 0.0, log.gravity), q, v, a)
     return {
+        "time": mean(log.time, ()),
         "q": q,
         "v": v,
         "a": a,

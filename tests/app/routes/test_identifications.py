@@ -11,9 +11,17 @@ from starlette.testclient import TestClient
 
 from app.schemas import errors as problems
 from app.schemas.excitation import ExcitationRequest
-from app.schemas.identifications import Identification, IdentificationResult
+from app.schemas.identifications import (
+    Identification,
+    IdentificationList,
+    IdentificationResult,
+    IdentificationSummary,
+    ResidualCurves,
+    ResidualMove,
+)
 from models.registry import load_robot
 from optimizer.problem.arm import Payload
+from tests.app.requests import HOME
 from tests.app.routes.test_problems import refused
 from tests.identification_logs import Truth, csv_of, recorded, truth_of
 
@@ -22,6 +30,9 @@ TRUTH = truth_of(ROBOT)
 CSV = {"Content-Type": "text/csv"}
 # of the standard deviations: what one of a thousand figures exceeds
 FAR = 4.0
+# relative; every k-th row stands for all of them
+THINNED = 0.15
+MOST_BYTES = 500_000  # of the residuals of logs of any length
 NOBODY = "3d0b7c55-8e0a-4a6b-b1f0-7a5d9c2e4f18"
 
 
@@ -90,10 +101,69 @@ def test_a_log_becomes_figures(client: TestClient, log: str) -> None:
     # stored with the end of the job, under the id that its content has on every server
     stored = client.put("/figures", json=result.document)
     assert stored.status_code == 200 and stored.json()["id"] == whole.figures, stored.text
-    home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
-    motion = {"configurations": [home, [0.5, *home[1:]]], "time_per_segment": 1.5, "figures": stored.json()["id"]}
+    motion = {"configurations": [HOME, [0.5, *HOME[1:]]], "time_per_segment": 1.5, "figures": stored.json()["id"]}
     answer = client.post("/evaluate", json=motion)
     assert answer.status_code == 200, answer.text
+
+
+def residuals(client: TestClient, id: str) -> list[ResidualMove]:
+    answer = client.get(f"/identifications/{id}/residuals")
+    assert answer.status_code == 200, answer.text
+    assert len(answer.content) < MOST_BYTES
+    moves = ResidualCurves.model_validate_json(answer.content).moves
+    assert moves is not None
+    return moves
+
+
+def test_residuals_are_those_of_moves_that_the_fit_has_not_seen(client: TestClient, log: str) -> None:
+    found = ended(client, logs=[log])
+    assert found.result is not None and found.result.validation.fitted.torque is not None
+    moves = residuals(client, found.id)
+    blind = [move for move in moves if move.held_out]
+    assert len(moves) == 8 and len(blind) == found.result.validation.moves
+    assert {move.log for move in moves} == {log}
+    rests = [move for move in client.get(f"/logs/{log}").json()["moves"] if not move["at_rest"]]
+    for move, rest in zip(sorted(moves, key=lambda each: each.t), rests, strict=True):
+        assert rest["start"] <= move.t[0] < move.t[-1] <= rest["end"], "times are those of the log"
+        assert move.torque is not None and move.power is not None
+        lists = [*move.torque.measured, *move.torque.modelled, move.power.measured, move.power.modelled]
+        assert len(lists) == 2 * 6 + 2 and {len(each) for each in lists} == {len(move.t)}
+    for joint, rmse in enumerate(found.result.validation.fitted.torque.rmse):
+        left = [
+            measured - modelled
+            for move in blind
+            if move.torque is not None
+            for measured, modelled in zip(move.torque.measured[joint], move.torque.modelled[joint], strict=True)
+            if measured is not None and modelled is not None
+        ]
+        assert np.sqrt(np.mean(np.square(left))) == pytest.approx(rmse, rel=THINNED)
+
+
+def test_residuals_of_other_logs_are_held_out(client: TestClient, log: str) -> None:
+    other = add_log(client, moves=4, seed=6, without="iP", params=NOTHING)
+    motion = add_log(client, moves=4, seed=7, without="i")
+    found = ended(client, logs=[log], validate=[other, motion])
+    moves = residuals(client, found.id)
+    assert {(move.log, move.held_out) for move in moves} == {(log, False), (other, True), (motion, True)}
+    for move in moves:
+        assert (move.torque is None) == (move.log != log), "no efforts were logged"
+        assert (move.power is None) == (move.log == other)
+
+
+def test_identifications_are_listed(client: TestClient, log: str) -> None:
+    found = ended(client, logs=[log])
+    first = IdentificationList.model_validate_json(client.get("/identifications?limit=1").content)
+    assert [each.model_dump() for each in first.identifications] == [
+        {name: getattr(found, name) for name in IdentificationSummary.model_fields} | {"robot": ROBOT.name}
+    ]
+    assert first.next is not None
+    client.post("/jobs", json={"requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]})
+    rest = IdentificationList.model_validate_json(client.get(f"/identifications?after={first.next}").content)
+    assert found.id not in {each.id for each in rest.identifications}
+    assert client.delete(f"/jobs/{found.id}").status_code == 204
+    after = IdentificationList.model_validate_json(client.get("/identifications").content)
+    assert [each.id for each in after.identifications] == [each.id for each in rest.identifications]
+    refused(client.get(f"/identifications/{found.id}/residuals"), problems.UnknownIdentification)
 
 
 def test_other_logs_validate_and_inertials_are_refitted(client: TestClient, log: str) -> None:
@@ -126,6 +196,7 @@ def test_what_logs_do_not_tell_is_a_problem(
 ) -> None:
     found = ended(client, logs=[add_log(client, moves, **options)], **body)
     assert found.state == "failed" and found.result is None and found.problem is not None
+    assert client.get(f"/identifications/{found.id}/residuals").json() == {"id": found.id, "moves": None}
     problem.model_validate(found.problem)
     if "advice" in found.problem:
         assert ExcitationRequest.model_validate(found.problem["advice"]).robot == ROBOT.name
@@ -156,6 +227,8 @@ def test_unknown_logs_are_refused_at_once(client: TestClient, log: str) -> None:
     refused(client.post("/identifications", json={"logs": [log, NOBODY]}), problems.UnknownLog)
     refused(client.get(f"/identifications/{NOBODY}"), problems.UnknownIdentification)
     refused(client.get("/identifications/x"), problems.UnknownIdentification)
+    refused(client.get("/identifications/x/residuals"), problems.UnknownIdentification)
+    refused(client.get("/identifications?limit=0"), problems.Validation)
 
 
 @pytest.mark.parametrize(
@@ -175,8 +248,8 @@ def test_malformed_requests_name_the_field(client: TestClient, body: dict[str, A
 
 
 def test_other_jobs_are_no_identifications(client: TestClient) -> None:
-    home = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
     job = client.post(
-        "/jobs", json={"requests": [{"evaluate": {"configurations": [home, home], "time_per_segment": 1.0}}]}
+        "/jobs", json={"requests": [{"evaluate": {"configurations": [HOME, HOME], "time_per_segment": 1.0}}]}
     ).json()
-    refused(client.get(f"/identifications/{job['id']}"), problems.UnknownIdentification)
+    for path in ("", "/residuals"):
+        refused(client.get(f"/identifications/{job['id']}{path}"), problems.UnknownIdentification)

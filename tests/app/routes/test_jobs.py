@@ -260,6 +260,12 @@ def test_a_table_is_evaluated_at_once(client: TestClient) -> None:
     assert (answer.status_code, "preference-applied" in answer.headers) == (200, False)
 
 
+def test_settings_beside_a_json_body_are_refused_now_or_later(client: TestClient) -> None:
+    for headers in (LATER, {}):
+        answer = client.post("/evaluate", json=evaluation()["evaluate"], params={"robot": "ur3e"}, headers=headers)
+        refused(answer, problems.Validation)
+
+
 def test_a_job_may_have_a_longer_deadline(client: TestClient) -> None:
     longer = move(deadline=300.0)
     refused(client.post("/optimize", json=longer), problems.Validation)

@@ -16,6 +16,7 @@ from optimizer.identification.identify import Identification, fit
 from optimizer.identification.logs.log import Log, Move
 from optimizer.identification.logs.log_errors import EffortNotUsable
 from optimizer.identification.options import Options
+from optimizer.identification.quality.curves import MOST
 from optimizer.problem.arm import Payload
 from tests.identification_logs import GRAVITY, Noise, Recording, Truth, recorded, truth_of
 
@@ -59,6 +60,45 @@ def test_the_fitted_figures_predict_held_out_moves_better_than_the_robots_own() 
     assert (errors.fitted.torque.relative < 0.5 * errors.own.torque.relative).all()
     assert errors.fitted.power is not None and errors.own.power is not None and errors.constant is not None
     assert errors.fitted.power.energy_max < errors.own.power.energy_max < errors.constant.energy_max
+
+
+def test_curves_show_each_row_by_figures_that_may_predict_it() -> None:
+    """All moves, once; what is left over has the size that the validation says."""
+    _, found = run(options=Options())
+    assert found.validation is not None and found.validation.fitted.torque is not None
+    seen, blind = found.curves, found.validation.curves
+    assert not set(seen.move) & set(blind.move) and set(seen.move) | set(blind.move) == set(range(14))
+    assert len(np.unique(blind.move)) == found.validation.moves
+    left = blind.torque - blind.modelled_torque
+    # every k-th row: a sample of the rows that the validation averages over
+    np.testing.assert_allclose(np.sqrt(np.nanmean(left**2, axis=0)), found.validation.fitted.torque.rmse, rtol=0.1)
+    assert found.validation.fitted.power is not None
+    left = blind.power - blind.modelled_power
+    np.testing.assert_allclose(np.sqrt(np.mean(left**2)), found.validation.fitted.power.rmse, rtol=0.1)
+    for curves in (seen, blind):
+        assert (np.diff(curves.time)[np.diff(curves.move) == 0] > 0).all()
+
+
+def test_curves_of_long_logs_are_thinned() -> None:
+    truth = truth_of(ROBOT)
+    logs = [recorded(ROBOT, truth, moves=14, seed=seed).log() for seed in (0, 1, 2)]
+    found = fit(ROBOT, logs[:2], Options(held_out=1.0))
+    assert found.validation is not None
+    curves, moves = found.validation.curves, found.validation.moves
+    assert MOST - moves < len(curves.time) <= MOST + moves
+    assert set(curves.log) == {0, 1} and len(np.unique(curves.move)) == moves == 2 * 14
+    assert not len(found.curves.time), "each motion was held out in its turn"
+    assert set(found.validate(logs[2:]).curves.log) == {0}
+
+
+def test_what_was_not_measured_is_not_modelled() -> None:
+    truth = truth_of(ROBOT)
+    log = recorded(ROBOT, truth, moves=4).log()
+    curves = fit(ROBOT, [without_power(log)], WITHOUT_SPLIT).curves
+    assert np.isnan(curves.power).all() and np.isnan(curves.modelled_power).all()
+    assert np.isfinite(curves.torque).all() and 0.3 < np.isfinite(curves.modelled_torque).mean() < 1
+    curves = fit(ROBOT, [replace(log, effort=None, effort_meaning=None)], WITHOUT_SPLIT).curves
+    assert np.isnan(curves.modelled_torque).all() and np.isfinite(curves.modelled_power).all()
 
 
 def test_another_log_validates() -> None:

@@ -1,0 +1,156 @@
+"""What an arm looks like by its own figures: tubes between the joints, and round housings with caps at them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+
+from models.robot import Array
+
+Kind = Literal["housing", "cap", "ring", "tube", "foot"]
+
+# points of a capsule's axis that are looked at
+SAMPLES = 9
+# of a capsule's radius: how near its axis is to the joint's, to count as the joint's housing
+NEAR = 0.7
+# the capsules hold the meshes, so that what they hold is a little slimmer
+SLIMMER = 0.94
+# of the z axis of the first joint: from here on it is upright
+UPRIGHT = 0.99
+# height [m] of the foot, and its radius over that of the first housing
+FOOT, WIDER = 0.02, 1.22
+
+
+@dataclass(frozen=True)
+class Body:
+    """A round body about the line from `start` to `end` [m] in the frame of its link, with a radius [m]."""
+
+    kind: Kind
+    start: list[float]
+    end: list[float]
+    radius: float
+
+
+@dataclass
+class _Housing:
+    """What a link's capsules fill about a joint's axis, the z axis of `T` (4, 4): from `low` to `high` [m]."""
+
+    T: Array
+    low: float
+    high: float
+    radius: float
+
+    def at(self, height: float) -> Array:
+        """The point (3,) of the axis at a height."""
+        return np.asarray(self.T[:3, 3] + height * self.T[:3, 2])
+
+    @property
+    def middle(self) -> Array:
+        """Its centre (3,)."""
+        return self.at((self.low + self.high) / 2)
+
+    def body(self, low: float, high: float, radius: float, kind: Kind) -> Body:
+        """A body about its axis."""
+        return Body(kind, self.at(low).tolist(), self.at(high).tolist(), radius)
+
+
+def link_bodies(figures: dict[str, Any]) -> list[list[Body]]:
+    """The bodies of every link by a robot's figures, base first."""
+    kinematics = figures["kinematics"]
+    names = ["base", *kinematics["link_names"]["value"]]
+    capsules = [np.reshape(figures["collision"].get(name, {}).get("value", []), (-1, 7)) for name in names]
+    placements = [_placement(row) for row in kinematics["joint_origin"]["value"]]
+    typical = max(float(np.linalg.norm(T[:3, 3])) for T in placements) / 8
+    # the housings of both links at every joint, about the same axis and measured from the same point
+    pairs = [
+        (_housing(capsules[joint], T, typical), _housing(capsules[joint + 1], np.eye(4), typical))
+        for joint, T in enumerate(placements)
+    ]
+    for pair in pairs:
+        _meet(*pair)
+    _ground(placements[0], pairs[0][0])
+    bodies: list[list[Body]] = [[] for _ in names]
+    for joint, (first, second) in enumerate(pairs):
+        bodies[joint] += [*_bodies(first, second), _ring(first, second)]
+        bodies[joint + 1] += _bodies(second, first)
+    flange = _placement(kinematics["flange_origin"]["value"])[:3, 3]
+    for link, own in enumerate(capsules):
+        foot, last = (np.zeros(3), pairs[0][0].radius), (flange, 0.8 * pairs[-1][1].radius)
+        begin = (pairs[link - 1][1].middle, pairs[link - 1][1].radius) if link else foot
+        end = (pairs[link][0].middle, pairs[link][0].radius) if link < len(pairs) else last
+        bodies[link] += _tube(own, *begin, *end, is_base=link == 0)
+    bodies[0].append(Body("foot", [0.0] * 3, [0.0, 0.0, FOOT], WIDER * pairs[0][0].radius))
+    return bodies
+
+
+def _placement(origin: list[float]) -> Array:
+    """The matrix (4, 4) of x, y, z [m], roll, pitch, yaw [rad]."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = pin.rpy.rpyToMatrix(*origin[3:]), origin[:3]
+    return T
+
+
+def _housing(capsules: Array, T: Array, typical: float) -> _Housing:
+    """The part along the z axis of T that a link's capsules (n, 7) fill around it; a `typical` one [m] without any."""
+    start, end, radius = capsules[:, :3], capsules[:, 3:6], np.repeat(capsules[:, 6], SAMPLES)
+    share = np.linspace(0, 1, SAMPLES)[:, None]
+    points = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3) - T[:3, 3]
+    along = points @ T[:3, 2]
+    aside = np.linalg.norm(points - along[:, None] * T[:3, 2], axis=1)
+    near = aside <= NEAR * radius
+    if not near.any():
+        small = min(0.7 * float(radius[aside.argmin()]), typical) if len(radius) else typical / 2
+        return _Housing(T, -small, small, small)
+    along, aside, radius = along[near], aside[near], radius[near]
+    wide = SLIMMER * np.sqrt(np.maximum(radius**2 - aside**2, 0.4 * radius**2))
+    return _Housing(T, float((along - 0.8 * radius).min()), float((along + 0.8 * radius).max()), float(wide.max()))
+
+
+def _meet(first: _Housing, second: _Housing) -> None:
+    """Lets the two housings at a joint end where they meet."""
+    lower, upper = (first, second) if first.low + first.high < second.low + second.high else (second, first)
+    border = min((lower.high + upper.low) / 2, upper.high - 0.3 * upper.radius)
+    lower.high = upper.low = max(lower.low + 0.3 * lower.radius, border)
+    slim = min(lower.radius, upper.radius)
+    lower.radius, upper.radius = min(lower.radius, 1.3 * slim), min(upper.radius, 1.3 * slim)
+
+
+def _ground(placement: Array, foot: _Housing) -> None:
+    """Nothing of the base is below the ground that it stands on."""
+    up, height = placement[2, 2], placement[2, 3]
+    if up > UPRIGHT:
+        foot.low = max(foot.low, -height)
+    if up < -UPRIGHT:
+        foot.high = min(foot.high, height)
+
+
+def _bodies(own: _Housing, other: _Housing) -> list[Body]:
+    """A housing, and the cap on the side that is away from the other link's."""
+    outward = -1 if own.low + own.high < other.low + other.high else 1
+    inner, outer = (own.low, own.high) if outward > 0 else (own.high, own.low)
+    edge = outer - outward * 0.16 * own.radius
+    return [own.body(inner, edge, own.radius, "housing"), own.body(edge, outer, 0.9 * own.radius, "cap")]
+
+
+def _ring(own: _Housing, other: _Housing) -> Body:
+    """The gap between the housings of a joint."""
+    inner = own.high if own.low + own.high < other.low + other.high else own.low
+    gap = 0.035 * own.radius
+    return own.body(inner - gap, inner + gap, 1.015 * min(own.radius, other.radius), "ring")
+
+
+def _tube(
+    capsules: Array, start: Array, start_radius: float, end: Array, end_radius: float, is_base: bool
+) -> list[Body]:
+    """The tube between two ends of a link, as thick as its long capsules (n, 7); none where the ends overlap."""
+    span = float(np.linalg.norm(end - start))
+    if span < 0.35 * (start_radius + end_radius):
+        return []
+    lengths = np.linalg.norm(capsules[:, 3:6] - capsules[:, :3], axis=1)
+    long = capsules[lengths > 0.4 * span, 6]
+    widest = 0.92 * min(start_radius, end_radius)
+    slim = min(widest, SLIMMER * float(long.max()) if len(long) else 0.8 * widest)
+    return [Body("tube", start.tolist(), end.tolist(), widest if is_base else slim)]

@@ -1,0 +1,140 @@
+"""The studio page in a real browser: from a log to figures, their residuals, and a motion computed with them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from models.registry import load_robot
+from tests.app.live import CLIENT, Server
+from tests.browser.pages import SHOWN, opened, show, state, until
+from tests.browsers import BROWSER, MISSING
+from tests.identification_logs import csv_of, recorded, truth_of
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
+
+ROBOT = load_robot("ur5e")
+TRUTH = truth_of(ROBOT)
+# relative; the page shows three digits
+DIGITS = 0.006
+OPENED = "() => !document.getElementById('identification').hidden"
+
+
+def send(page: Page) -> None:
+    page.locator("#optimise").click()
+
+
+def choose_log(page: Page, file: Path) -> None:
+    show(page, "kept")
+    page.get_by_label("Add a log").set_input_files(file)
+    until(page, f"() => studio.state.request.log === '{file.name}'")
+
+
+def last(service: Server) -> dict[str, Any]:
+    """The newest identification, as the service tells it."""
+    id = service.get("/identifications").json()["identifications"][0]["id"]
+    found = service.get(f"/identifications/{id}").json()
+    return dict(found) | service.get(f"/identifications/{id}/residuals").json()
+
+
+def shown_rms(page: Page, name: str) -> float:
+    """What the page says of the residuals of one curve."""
+    title = page.locator("#identification h3", has_text=re.compile(rf"^{name}")).inner_text()
+    found = re.search(r"residual ([\d.]+)", title)
+    assert found is not None, title
+    return float(found[1])
+
+
+def rms(moves: list[dict[str, Any]], joint: int) -> float:
+    pairs = [pair for move in moves for pair in zip(*(move["torque"][key][joint] for key in KEYS), strict=True)]
+    return float(np.sqrt(np.mean([(measured - modelled) ** 2 for measured, modelled in pairs if modelled is not None])))
+
+
+KEYS = ("measured", "modelled")
+
+
+def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Server, tmp_path: Path) -> None:
+    file = tmp_path / "monday.csv"
+    file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=6)))
+    choose_log(page, file)
+    send(page)
+    until(page, "() => Boolean(studio.state.request.logs)")
+    expect(page.locator("#status")).to_contain_text("No payload is given")
+    send(page)
+    until(page, OPENED)
+    found = last(service)
+    assert found["state"] == "done" and state(page, "request.logs") == [found["moves"][0]["log"]]
+    box = page.locator("#identification")
+    expect(box.locator(".u-wrap")).to_have_count(ROBOT.nq + 1)
+    assert shown_rms(page, "shoulder lift") == pytest.approx(rms(found["moves"], 1), rel=DIGITS)
+    expect(box).to_contain_text("No payload is given")
+    cells = box.locator("tr", has_text="torque, elbow").locator("td").all_inner_texts()
+    fitted, own = (found["result"]["validation"][whose]["torque"]["relative"][2] for whose in ("fitted", "own"))
+    assert [float(cell) for cell in cells[1:3]] == pytest.approx([fitted, own], rel=DIGITS)
+    coulomb = next(each for each in found["result"]["parameters"] if (each["figure"], each["joint"]) == ("coulomb", 1))
+    cells = box.locator("tr", has_text="coulomb").nth(1).locator("td").all_inner_texts()
+    assert cells[1] == "shoulder lift" and cells[5:] == ["B", "N·m"]
+    told = [coulomb[name] for name in ("value", "sd", "previous")]
+    assert [float(cell) for cell in cells[2:5]] == pytest.approx(told, rel=DIGITS)
+    page.get_by_role("button", name="Use these figures").click()
+    assert state(page, "request.figures") == found["figures"] and not page.evaluate(OPENED)
+    before = state(page, "answer.id")
+    send(page)
+    until(page, f"() => studio.state.answer.id !== '{before}'")
+    assert state(page, "asked.figures") == found["figures"]
+
+
+def test_moves_are_chosen_and_those_held_out_are_named(browser: Browser, service: Server) -> None:
+    """On a phone, from the lists of what is kept, as a job and by itself; the log was deleted meanwhile."""
+    with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
+        until(page, SHOWN)
+        body = csv_of(recorded(ROBOT, TRUTH, moves=4, seed=3), without="P")
+        log = CLIENT.post(f"{service.url}/logs", content=body, headers={"Content-Type": "text/csv"}).json()["id"]
+        made = service.post("/identifications", {"logs": [log], "validate": {"fraction": 0.5}}).json()
+        show(page, "kept")
+        page.locator("#pane-kept h2:text('Jobs') + ul button").first.click()
+        page.locator("#pane-kept li button", has_text="1: identify").click()
+        until(page, OPENED)
+        assert CLIENT.delete(f"{service.url}/logs/{log}").status_code == 204
+        page.evaluate("() => document.getElementById('tab-kept').click()")
+        page.locator("#pane-kept h2:text('Identifications') + ul button").first.click()
+        expect(page.locator("#identification")).to_contain_text("This log was deleted.")
+        found = last(service)
+        assert found["id"] == made["id"]
+        moves = sorted(found["moves"], key=lambda each: each["t"])
+        options = page.get_by_label("Moves shown").locator("option")
+        assert ["held out" in text for text in options.all_inner_texts()] == [False, *(m["held_out"] for m in moves)]
+        assert any(move["held_out"] for move in moves)
+        for k in (0, 3):
+            page.get_by_label("Moves shown").select_option(index=k + 1)
+            assert shown_rms(page, "elbow") == pytest.approx(rms(moves[k : k + 1], 2), rel=DIGITS)
+        assert page.locator("#identification .u-wrap").count() == ROBOT.nq, "no power was logged"
+        width = page.evaluate("() => document.documentElement.scrollWidth")
+        assert width <= 390, "the page is one column"
+        page.get_by_role("button", name="Back to the motion").click()
+        expect(page.locator("#view")).to_be_visible()
+
+
+def test_what_a_log_does_not_tell_is_explained(page: Page, tmp_path: Path) -> None:
+    file = tmp_path / "short.csv"
+    file.write_bytes(csv_of(recorded(ROBOT, TRUTH, moves=1)))
+    choose_log(page, file)
+    page.get_by_label("Add a field", exact=True).select_option("units")
+    page.get_by_label("units", exact=True).select_option("deg")
+    assert state(page, "request.units") == "deg"
+    page.get_by_label("Remove units").click()
+    send(page)
+    until(page, "() => Boolean(studio.state.request.logs)")
+    send(page)
+    expect(page.locator("#problem")).to_be_visible()
+    expect(page.locator("#problem a")).to_have_attribute("href", "problems/nothing-held-out")
+    assert not page.evaluate(OPENED)
+    file.write_text("t,q1\n0,1\n")
+    choose_log(page, file)
+    send(page)
+    expect(page.locator("#problem a")).to_have_attribute("href", re.compile("problems/(validation|invalid-table)"))
