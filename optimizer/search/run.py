@@ -130,9 +130,8 @@ class Run:
             incumbent.tell_candidates()
             incumbent.tell_best()
         while (best := incumbent.best()) is not None:
-            coarse = best.energy or 0.0
-            refine(incumbent, best)
-            self_motions.polish(incumbent, best, coarse)
+            if not self_motions.polish(incumbent, best):
+                refine(incumbent, best)
             best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
