@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from models.robot import Array
-from optimizer.kinematics.tcp import tcp_jacobian, tcp_pose
+from optimizer.kinematics.chain import Chain, pose_error
+from optimizer.kinematics.forward import joint_placements
+from optimizer.kinematics.tcp import T_last_tcp
 from optimizer.problem.arm import Arm
 
 # the pose is held to this error [m, rad]; Newton steps, of which a few suffice near the curve
@@ -24,12 +25,21 @@ STEP = 1e-4
 
 @dataclass(frozen=True)
 class HeldPose:
-    """What holds T_base_tcp (4, 4) within joint limits (nq,) [rad]. The arm has one joint more than a pose fixes."""
+    """What holds the TCP at T (4, 4), base frame, within joint limits (nq,) [rad].
 
-    arm: Arm
+    `chain` ends at the TCP. It has one joint more than a pose fixes.
+    """
+
+    chain: Chain
     T: Array
     q_min: Array
     q_max: Array
+
+    @staticmethod
+    def of(arm: Arm, q: Array) -> HeldPose:
+        """The curve of an arm through q (nq,) [rad], within the limits in force."""
+        chain = Chain(joint_placements(arm.robot.model), T_last_tcp(arm))
+        return HeldPose(chain, chain.flange(q[None])[0], arm.active_limits.q_min, arm.active_limits.q_max)
 
     def put(self, q: Array) -> Array | None:
         """The configuration (nq,) on the curve that Newton's method finds from q (nq,); None if it finds none within
@@ -48,27 +58,22 @@ class HeldPose:
 
     def tangent(self, q: Array) -> Array:
         """The direction (nq,) of the curve at q (nq,), of length 1."""
-        return np.asarray(np.linalg.svd(tcp_jacobian(self.arm, q))[2][-1])
+        return np.asarray(np.linalg.svd(self.chain.flange_and_jacobian(q[None])[1][0])[2][-1])
 
     def bend(self, q: Array, tangent: Array) -> Array:
         """The change (nq,) of the tangent per length of the curve [1/rad]."""
-        after, before = (self.tangent(q + side * STEP * tangent) for side in (1, -1))
-        difference = after * np.sign(after @ tangent) - before * np.sign(before @ tangent)
-        return np.asarray(difference / (2 * STEP))
+        near = q + np.outer([-STEP, STEP], tangent)
+        before, after = np.linalg.svd(self.chain.flange_and_jacobian(near)[1])[2][:, -1]
+        return np.asarray((after * np.sign(after @ tangent) - before * np.sign(before @ tangent)) / (2 * STEP))
 
     def _solved(self, q: Array, fixed: int | None) -> Array | None:
         """The configuration that holds the pose, with one joint `fixed`; None if Newton's method finds none."""
         moving = np.arange(len(q)) != fixed
         q = q.copy()
         for _ in range(STEPS):
-            error = self._error(q)
+            T, jacobian = self.chain.flange_and_jacobian(q[None])
+            error = pose_error(T, self.T)[0]
             if np.abs(error).max() < HELD:
                 return q
-            q[moving] -= np.linalg.lstsq(tcp_jacobian(self.arm, q)[:, moving], error, rcond=None)[0]
+            q[moving] += np.linalg.lstsq(jacobian[0][:, moving], error, rcond=None)[0]
         return None
-
-    def _error(self, q: Array) -> Array:
-        """How far the TCP is from the pose at q (nq,): (6,) [m, rad], in base axes."""
-        T = tcp_pose(self.arm, q)
-        turned = pin.log3(np.ascontiguousarray(T[:3, :3] @ self.T[:3, :3].T))
-        return np.concatenate([T[:3, 3] - self.T[:3, 3], turned])

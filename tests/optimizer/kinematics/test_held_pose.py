@@ -10,7 +10,6 @@ import pytest
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.kinematics.held_pose import HeldPose
-from optimizer.kinematics.tcp import tcp_pose
 from optimizer.problem.arm import Arm
 
 # m, rad
@@ -24,7 +23,7 @@ def curve_of(name: str, seed: int) -> tuple[HeldPose, Array]:
     robot = load_robot(name)
     limits, rng = robot.limits, np.random.default_rng(seed)
     q = limits.q_min + rng.uniform(0.3, 0.7, robot.nq) * (limits.q_max - limits.q_min)
-    return HeldPose(Arm(robot=robot), tcp_pose(Arm(robot=robot), q), limits.q_min, limits.q_max), q
+    return HeldPose.of(Arm(robot=robot), q), q
 
 
 @pytest.mark.parametrize("name", ["panda", "iiwa14", "xarm7", "gen3"])
@@ -36,7 +35,7 @@ def test_what_is_put_on_the_curve_holds_the_pose(name: str) -> None:
         away = q + 0.1 * curve.tangent(q)
         found = curve.put(away)
         assert found is not None
-        assert np.abs(tcp_pose(curve.arm, found) - curve.T).max() < HELD
+        assert np.abs(curve.chain.flange(found[None])[0] - curve.T).max() < HELD
         # it goes back across the curve, not along it
         assert np.abs(found - q).max() > 0.5 * np.abs(away - q).max()
 
@@ -50,7 +49,7 @@ def test_a_joint_that_would_leave_its_range_stays_on_its_limit() -> None:
     found = narrow.put(beyond)
     assert found is not None
     assert found[joint] == pytest.approx(narrow.q_max[joint], abs=HELD)
-    assert np.abs(tcp_pose(curve.arm, found) - curve.T).max() < HELD
+    assert np.abs(curve.chain.flange(found[None])[0] - curve.T).max() < HELD
 
 
 def test_an_unreachable_pose_is_held_nowhere() -> None:

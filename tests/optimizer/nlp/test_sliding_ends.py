@@ -31,8 +31,7 @@ DIFFERENCES = 5e-3
 
 
 def curve(q: Array) -> HeldPose:
-    arm = Arm(robot=PANDA)
-    return HeldPose(arm, tcp_pose(arm, q), PANDA.limits.q_min, PANDA.limits.q_max)
+    return HeldPose.of(Arm(robot=PANDA), q)
 
 
 @cache
