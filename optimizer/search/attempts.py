@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods import solver_for
