@@ -49,7 +49,8 @@ def main() -> None:
         print(
             f"{name}: at or below the best of {given.postures} fixed postures in {each['reached']} of {each['count']}"
         )
-        print(f"    energy over the best fixed one, median {each['excess'].median:+.2%}, greatest {each['worst']:+.2%}")
+        excess = each["excess"]
+        print(f"    energy over the best fixed one, median {excess.p50:+.2%}, greatest {excess.maximum:+.2%}")
     write_json(given.json, {"seed": given.seed, "postures": given.postures, "robots": results})
 
 

@@ -11,6 +11,7 @@ compiler, CasADi's virtual machine evaluates the same expressions.
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from functools import lru_cache
 
 import casadi as ca
@@ -100,18 +101,29 @@ class Kernel:
         cost, tau = self._evaluation("value", len(y))(y, p)
         return cost[:, 0], tau
 
+    def values(self, y: Array, p: Array) -> tuple[Array, Array]:
+        """Cost (k,) and tau_limited (k, nq) [N·m] for any number of samples y (k, 3nq)."""
+        cost, tau = self._in_chunks("value", y, p, (1, self.nq))
+        return cost[:, 0], tau
+
     def torque(self, q: Array, v: Array, a: Array, p: Array) -> Array:
         """Rigid body and rotor torque tau (k, nq) [N·m] for any number of samples."""
-        count = len(q)
-        evaluation = self._evaluation("torque", CHUNK)
+        (tau,) = self._in_chunks("torque", np.hstack([q, v, a]), p, (self.nq,))
+        return tau
+
+    def _in_chunks(self, name: str, given: Array, p: Array, sizes: Sequence[int]) -> list[Array]:
+        """The results (k, size) of a function of (y, p) for any number of samples y (k, 3nq)."""
+        count = len(given)
+        evaluation = self._evaluation(name, CHUNK)
         y = np.zeros((-(-count // CHUNK) * CHUNK, 3 * self.nq))
-        y[:count] = np.hstack([q, v, a])
-        tau = np.empty((len(y), self.nq))
+        y[:count] = given
+        results = [np.empty((len(y), size)) for size in sizes]
         for k, i in enumerate(range(0, len(y), CHUNK)):
             if k % CHUNKS_PER_CHECK == CHUNKS_PER_CHECK - 1:
                 checkpoint()
-            tau[i : i + CHUNK] = evaluation(y[i : i + CHUNK], p)[0]
-        return tau[:count]
+            for result, value in zip(results, evaluation(y[i : i + CHUNK], p), strict=True):
+                result[i : i + CHUNK] = value
+        return [result[:count] for result in results]
 
 
 class _Loader:

@@ -129,7 +129,7 @@ class FreeSpline(SqpMethod):
     def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
         """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])
-        points = space.fit(self.coordinates.from_joints(q), t / duration)
+        points = bspline.smooth_fit(self.coordinates.from_joints(q), t / duration, space.knots)
         # without clearance constraints, a motion from a planned path would return to the obstacle
         near = self.prepared.surroundings.is_near_contact(q)
         result = self.improve(Guess(space, points, duration, collision_free=near, progress=progress))

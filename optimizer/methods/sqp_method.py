@@ -14,6 +14,7 @@ from optimizer.collision.bodies import Indices
 from optimizer.collision.path_planner import along, interpolation_is_free
 from optimizer.deadline import Deadline, DeadlinePassed, watch
 from optimizer.energy.plant import has_corners
+from optimizer.kinematics.held_pose import HeldPose
 from optimizer.methods.limit_repair import (
     MARGIN,
     LimitCheck,
@@ -85,8 +86,13 @@ class _Stage:
 
 
 class SqpMethod(Method):
-    """A method whose motions form a linear space; the SQP optimises them."""
+    """A method whose motions form a linear space; the SQP optimises them.
 
+    An end with a curve slides along it from the candidate's own: the motion found may have another start or goal.
+    """
+
+    start_curve: HeldPose | None = None
+    goal_curve: HeldPose | None = None
     # whether the deadline may well end a solve: then what it has so far counts
     takes_long: ClassVar[bool] = False
 
@@ -209,8 +215,10 @@ class SqpMethod(Method):
             path=path,
             path_bounds=initial_bounds(path),
             passes=self.passes if len(self.passes) else None,
+            start_curve=self.start_curve,
+            goal_curve=self.goal_curve,
         )
-        free = guess.points[guess.space.free]
+        free = program.free_points(guess.points)
         limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
         return _Stage(program, limits, pairs, free, self._first_duration(program, free, guess.duration))
 

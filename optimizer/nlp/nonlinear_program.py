@@ -19,6 +19,7 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.energy.kernel import Kernel
+from optimizer.kinematics.held_pose import HeldPose
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.active_path_constraints import Index, PathConstraintRows
 from optimizer.nlp.clearance_constraint import CLEARANCE
@@ -52,9 +53,10 @@ class NonlinearProgram:
 
     `p` is the packed parameter vector of the kernel. The duration lies in [t_min, t_max] [s]; equal bounds fix it.
     `constant` [J] is a part of the cost that no variable changes: it keeps relative changes of the cost in proportion.
-    With `goal_constraints` the goal is a decision variable too: the last row of the free control points. Every ratio
-    of `path` is bounded by `path_bounds` (c,), 1 or a little less. The spline passes through the configurations
-    `passes` (k, r), in their order, at times that are free.
+    With `goal_constraints` or a `goal_curve` the goal is a decision variable too: the last row of the free control
+    points. With a `start_curve` the start is one, too: the first row. Every ratio of `path` is bounded by `path_bounds`
+    (c,), 1 or a little less. The spline passes through the configurations `passes` (k, r), in their order, at times
+    that are free.
     """
 
     kernel: Kernel
@@ -65,6 +67,8 @@ class NonlinearProgram:
     t_max: float
     constant: float = 0.0
     goal_constraints: GoalConstraints | None = None
+    start_curve: HeldPose | None = None
+    goal_curve: HeldPose | None = None
     path: PathConstraints | None = None
     path_bounds: Array = field(default_factory=lambda: np.zeros(0))
     passes: Array | None = None
@@ -81,8 +85,23 @@ class NonlinearProgram:
 
     @property
     def free_count(self) -> int:
-        """Number of free control points, with the goal if it is a decision variable."""
-        return self.basis.n - 2 * self.basis.resting + (self.goal_constraints is not None)
+        """Number of free control points, with the ends that are decision variables."""
+        return self.basis.n - 2 * self.basis.resting + self.free_start + self.free_goal
+
+    @property
+    def free_start(self) -> bool:
+        """Whether the start is a decision variable."""
+        return self.start_curve is not None
+
+    @property
+    def free_goal(self) -> bool:
+        """Whether the goal is a decision variable."""
+        return self.goal_constraints is not None or self.goal_curve is not None
+
+    @property
+    def held(self) -> bool:
+        """Whether every iterate is put on passes, or its ends on their curves."""
+        return not (self.passes is None and self.start_curve is None and self.goal_curve is None)
 
     @cached_property
     def _full_space(self) -> bool:
@@ -96,15 +115,27 @@ class NonlinearProgram:
     def points(self, free: Array) -> Array:
         """All control points (n, r) for the free ones (m, r)."""
         ends = np.ones((self.basis.resting, 1))
-        inner, goal = (free, self.coordinates.goal) if self.goal_constraints is None else (free[:-1], free[-1])
-        return np.concatenate([ends * self.coordinates.start, inner, ends * goal])
+        start, goal = self.coordinates.start, self.coordinates.goal
+        if self.free_start:
+            start, free = free[0], free[1:]
+        if self.free_goal:
+            goal, free = free[-1], free[:-1]
+        return np.concatenate([ends * start, free, ends * goal])
 
     def free_columns(self, matrix: Array) -> Array:
         """The columns (…, m) of a basis matrix (…, n) that multiply the free control points."""
         inner = matrix[..., self.basis.free]
-        if self.goal_constraints is None:
-            return np.ascontiguousarray(inner)
-        return np.concatenate([inner, matrix[..., -self.basis.resting :].sum(axis=-1, keepdims=True)], axis=-1)
+        parts, resting = [inner], self.basis.resting
+        if self.free_start:
+            parts.insert(0, matrix[..., :resting].sum(axis=-1, keepdims=True))
+        if self.free_goal:
+            parts.append(matrix[..., -resting:].sum(axis=-1, keepdims=True))
+        return np.ascontiguousarray(np.concatenate(parts, axis=-1))
+
+    def free_points(self, points: Array) -> Array:
+        """The free control points (m, r) of all of them (n, r)."""
+        first = self.basis.resting - self.free_start
+        return points[first : len(points) - self.basis.resting + self.free_goal]
 
     def joint_points(self, free: Array) -> Array:
         """Control points of q, (n, nq) [rad], in the spline's space, for the free ones (m, r)."""

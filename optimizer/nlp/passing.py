@@ -78,17 +78,17 @@ class Passes:
     def __init__(self, program: NonlinearProgram, configurations: Array) -> None:
         self.p, self.configurations = program, configurations
 
-    def put(self, free: Array, near: Array | None = None) -> tuple[Array, Passing]:
+    def put(self, free: Array, near: Passing | None = None) -> tuple[Array, Passing]:
         """The control points (m, r) put on the passes, and where these are.
 
-        They are looked for close to the times `near` (k,), or everywhere.
+        They are looked for close to where they were in the curve `near`, or everywhere.
         """
         curve, target = self._curve(free), self.configurations
         if near is None:
             times = pass_times(curve, target)
         else:
-            gaps = np.diff(np.concatenate([[0.0], near, [1.0]]))
-            times = nearby(curve, target, near, SLIDE * float(gaps.min()))
+            gaps = np.diff(np.concatenate([[0.0], near.times, [1.0]]))
+            times = nearby(curve, target, near.times, SLIDE * float(gaps.min()))
         # two passes at one time cannot both be kept
         times = _apart(times)
         at = self._columns(times, 0)

@@ -17,6 +17,7 @@ from optimizer.deadline import NEVER, Deadline
 from optimizer.nlp.active_path_constraints import PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from optimizer.nlp.passing import Passes, Passing
+from optimizer.nlp.sliding_ends import Slide, SlidingEnds
 from optimizer.nlp.working_set_qp import MOST_ROUNDS, QP_ROUNDS, QPInputs, QPStep, WorkingSetQP
 
 # relative decrease of the cost that a further step must promise
@@ -77,7 +78,7 @@ class _Point:
     """An iterate: free control points, duration, derivatives of s on the grid, path constraints, and violations.
 
     `violation` (3 r + nq + c,) is the largest excess as a ratio of the limit: per derivative and coordinate, joint
-    torque, and path constraint. `passing` says where it passes the program's passes, if it has any.
+    torque, and path constraint. `held` is what the program's passes, or its sliding ends, let a step do.
     """
 
     free: Array
@@ -85,7 +86,7 @@ class _Point:
     kinematics: Array
     path_values: PathConstraintValues
     violation: Array
-    passing: Passing | None
+    held: Passing | Slide | None
 
 
 class _Multipliers:
@@ -140,12 +141,16 @@ class _Solver:
             self.scale[-1] = T
         if multiplier is None:
             multiplier = np.zeros((len(program.basis.nodes), program.kernel.nq))
-        self.passes, passing = None if program.passes is None else Passes(program, program.passes), None
-        if self.passes is not None:
-            free, passing = self.passes.put(free)
+        self.holding = _holding(program)
+        held: Passing | Slide | None = None
+        if self.holding is not None:
+            put = self.holding.put(free)
+            if put is None:
+                raise ValueError("an end of the initial guess is not near the curve that it is to slide along")
+            free, held = put
         self.line, kinematics = program.derivatives(free, T, multiplier), program.kinematics(free)
         self.cost_scale = 1.0 / max(abs(self.line.cost), 1e-9)
-        self.at = self._point(free, T, kinematics, self._excess(T, kinematics, self.line.tau), passing)
+        self.at = self._point(free, T, kinematics, self._excess(T, kinematics, self.line.tau), held)
         path = np.zeros_like(self.at.path_values.ratios.value)
         self.multipliers = _Multipliers(multiplier, path, len(self.at.violation))
         if program.has_clearance:
@@ -206,11 +211,11 @@ class _Solver:
         torque = np.abs(tau).max(axis=0) / self.p.limits.tau_max
         return np.asarray(np.maximum(np.concatenate([largest.ravel(), torque]) - 1, 0.0))
 
-    def _point(self, free: Array, T: float, kinematics: Array, excess: Array, passing: Passing | None) -> _Point:
+    def _point(self, free: Array, T: float, kinematics: Array, excess: Array, held: Passing | Slide | None) -> _Point:
         """The iterate, from its violations but for those of path constraints."""
         path_values = self.p.path_rows.values(self.p.points(free), T)
         beyond = np.maximum(path_values.ratios.value.max(axis=0, initial=0.0) - self.p.path_bounds, 0.0)
-        return _Point(free, T, kinematics, path_values, np.append(excess, beyond), passing)
+        return _Point(free, T, kinematics, path_values, np.append(excess, beyond), held)
 
     def _qp_inputs(self) -> QPInputs:
         """The QP at the iterate: the Lagrangian's Hessian made positive definite, and the cost's gradient, scaled."""
@@ -220,12 +225,12 @@ class _Solver:
         H = (self.line.hessian + bent) * self.cost_scale
         H[-1, -1] += self.multipliers.curvature
         H = H[:n, :n] * np.outer(self.scale, self.scale)
-        if at.passing is None:
+        if at.held is None:
             H, whitening = _convex(H)
         else:
             pull = (g + self.multipliers.limits)[: self.qp.count].reshape(at.free.shape)
-            kept = at.passing.null_space(n)
-            H, whitening = _convex(kept.T @ (H + at.passing.curvature(pull, n)) @ kept)
+            kept = at.held.null_space(n)
+            H, whitening = _convex(kept.T @ (H + at.held.curvature(pull, n)) @ kept)
             H, whitening = kept @ H @ kept.T, kept @ whitening
         ratio = at.kinematics / self.qp.rates(at.T)[:, :, None]
         return QPInputs(H, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
@@ -243,19 +248,34 @@ class _Solver:
             free = at.free + alpha * dx[: self.qp.count].reshape(at.free.shape)
             T = at.T + alpha * float(dx[-1]) * self.qp.time_scale if self.qp.free_time else at.T
             T = min(max(T, self.p.t_min), self.p.t_max)  # rounding must not leave the bounds
-            passing = at.passing
-            if self.passes is not None and passing is not None:
-                free, passing = self.passes.put(free, passing.times)
-            allowed = merit + ARMIJO * alpha * descent + ROUNDING
-            (cost, tau), kinematics = self.p.value(free, T), self.p.kinematics(free)
-            excess = self._excess(T, kinematics, tau)
-            # path constraints take the longest, and never lower the merit function
-            if cost * self.cost_scale + float(penalty[: len(excess)] @ excess) <= allowed:
-                trial = self._point(free, T, kinematics, excess, passing)
-                if cost * self.cost_scale + float(penalty @ trial.violation) <= allowed:
-                    return trial
+            trial = self._tried(free, T, merit + ARMIJO * alpha * descent + ROUNDING)
+            if trial is not None:
+                return trial
             alpha *= 0.5
         return None
+
+    def _tried(self, free: Array, T: float, allowed: float) -> _Point | None:
+        """The iterate at these variables, put back on what is held; None if its merit function exceeds `allowed`."""
+        held, penalty = self.at.held, self.multipliers.penalty
+        if self.holding is not None:
+            put = self.holding.put(free, held)  # type: ignore[arg-type]
+            if put is None:
+                return None
+            free, held = put
+        (cost, tau), kinematics = self.p.value(free, T), self.p.kinematics(free)
+        excess = self._excess(T, kinematics, tau)
+        # path constraints take the longest, and never lower the merit function
+        if cost * self.cost_scale + float(penalty[: len(excess)] @ excess) > allowed:
+            return None
+        trial = self._point(free, T, kinematics, excess, held)
+        return trial if cost * self.cost_scale + float(penalty @ trial.violation) <= allowed else None
+
+
+def _holding(program: NonlinearProgram) -> Passes | SlidingEnds | None:
+    """What every iterate of the program is put on."""
+    if not program.held:
+        return None
+    return SlidingEnds(program) if program.passes is None else Passes(program, program.passes)
 
 
 def _convex(H: Array) -> tuple[Array, Array]:

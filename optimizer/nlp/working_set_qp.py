@@ -53,7 +53,7 @@ class QPInputs:
     """What the QP is made of at one iterate.
 
     `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n, k) makes it
-    the identity, Wᵀ H W = 1, for steps that keep the passes. `ratio` (3, r, M): rates over their limits on the grid.
+    the identity, Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their limits on the grid.
     """
 
     hessian: Array
@@ -72,7 +72,7 @@ class QPStep:
 
     `relaxed`: the QP was infeasible, and x breaks its constraints as little as possible. `kinematic` are the
     multipliers at `places`, `torque` those at `nodes` (node, joint) of torques with `signs`, `path` those at `passed`
-    (path point, column). `pull` (n,): sum of the constraints' gradients times multipliers; zero without passes.
+    (path point, column). `pull` (n,): sum of the constraints' gradients times multipliers; zero if nothing is held.
     """
 
     x: Array
@@ -222,7 +222,7 @@ class WorkingSetQP:
         mu = np.maximum(multipliers, 0.0)
         _, mu_path, mu_torque, _ = np.split(mu, np.cumsum([len(goal.least), len(path.slack), len(torque.slack)]))
         self._keep(rows, mu)
-        pull = np.zeros(self.n) if self.p.passes is None else multipliers @ np.concatenate(rows.gradients)
+        pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
         return QPStep(
             _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
             torque.nodes, torque.signs, mu_torque, (path.points, path.columns), mu_path, pull,

@@ -13,6 +13,7 @@ from optimizer.methods.duration_intervals import DurationInterval, duration_inte
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.sliding import SLID, moved_to, released
 from optimizer.solution import CandidateStatus
 
 # goals of other candidates that a path may lead to as long as no motion is known
@@ -38,24 +39,52 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
 
     If no interval has a motion, a result that the deadline cut off comes before the others.
     """
-    best, results = incumbent.best(), list[SolveResult]()
+    results, ends = list[SolveResult](), dict[int, Candidate]()
+    attempt = partial(_solved, incumbent, candidate)
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal):
         if interval.t_max < candidate.shortest:
             continue
-        solver = solver_of(incumbent, candidate, interval)
-        if best is not None and best.energy is not None:
-            solver.best_known = best.energy
-        else:
-            solver.other_goals = _other_goals(incumbent, candidate)
-        solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
-        results.append(in_time(incumbent, solver.solve))
+        result, moved = _attempted(incumbent, candidate, interval, attempt)
+        results.append(result)
+        ends[id(result)] = moved
     solved = [result for result in results if result.spline is not None]
     if len(solved) > 1:
         solved.sort(key=lambda result: incumbent.prepared.cost_of(result.spline))
+    if solved:
+        candidate.move(ends[id(solved[0])])
     late = [result for result in results if result.status is SolveStatus.OUT_OF_TIME]
     postponed = [result for result in results if result.status is SolveStatus.POSTPONED]
     incumbent.cut_short |= bool(late) or any(result.cut_short for result in solved)
     return (solved + late + postponed + results)[0]
+
+
+def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> SolveResult:
+    """The result of a solver that knows what the search knows so far."""
+    best = incumbent.best()
+    if best is not None and best.energy is not None:
+        solver.best_known = best.energy
+    else:
+        solver.other_goals = _other_goals(incumbent, candidate)
+    solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
+    return solver.solve()
+
+
+def _attempted(
+    incumbent: Incumbent, candidate: Candidate, interval: DurationInterval, attempt: Callable[[Method], SolveResult]
+) -> tuple[SolveResult, Candidate]:
+    """The result of an attempt, and the candidate with the ends of its motion.
+
+    Ends on self-motions slide, unless this leads to where the problem does not allow them to be.
+    """
+    solver, prepared = solver_of(incumbent, candidate, interval), incumbent.prepared
+    sliding = released(prepared, candidate, solver)
+    result = in_time(incumbent, partial(attempt, solver))
+    if result.spline is None or not sliding:
+        return result, candidate
+    moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)
+    if moved is not None:
+        return replace(result, reason=f"{result.reason}{SLID}"), moved
+    return in_time(incumbent, partial(attempt, solver_of(incumbent, candidate, interval))), candidate
 
 
 def _other_goals(incumbent: Incumbent, candidate: Candidate) -> list[Array]:
@@ -95,7 +124,6 @@ def solve_from(
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal, surplus_value):
         if duration is not None:
             interval = replace(interval, t_min=duration, t_max=duration)
-        solver = solver_of(incumbent, candidate, interval)
-        result = in_time(incumbent, partial(solver.solve_from, q, t, fine))
+        result, moved = _attempted(incumbent, candidate, interval, lambda solver: solver.solve_from(q, t, fine))
         if result.spline is not None:
-            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
+            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline), moved)

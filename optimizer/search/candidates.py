@@ -89,6 +89,11 @@ class Candidate:
         """Duration of the motion found [s]; NaN if there is none."""
         return self.attempt.spline.duration if self.attempt and self.attempt.spline else np.nan
 
+    def move(self, to: Candidate) -> None:
+        """Take the ends and the bounds of another candidate for the same targets."""
+        self.start, self.goal, self.q_start, self.q_goal = to.start, to.goal, to.q_start, to.q_goal
+        self.lower_bound, self.shortest = to.lower_bound, to.shortest
+
     def report(self) -> CandidateReport:
         """The candidate as the answer reports it."""
         return CandidateReport(

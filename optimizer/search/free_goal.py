@@ -139,7 +139,7 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tupl
     prepared, spline = incumbent.prepared, candidate.spline
     space = bspline.uniform(COARSE)
     if incumbent.method is FreeSpline and spline.degree == space.degree:
-        space, points = bspline.Basis.of(spline.knots), spline.control_points
+        space, points = bspline.Basis.of(spline.knots / spline.duration), spline.control_points
     else:
         at = np.linspace(0.0, 1.0, FIT_SAMPLES)
         points = space.fit(sample(spline, at * spline.duration)[0], at)

@@ -76,16 +76,21 @@ class Incumbent:
         self.solves += result.solves
         return result
 
-    def accept_if_better(self, candidate: Candidate, result: SolveResult, energy: Energy) -> None:
+    def accept_if_better(
+        self, candidate: Candidate, result: SolveResult, energy: Energy, moved: Candidate | None = None
+    ) -> None:
         """Take a result as the candidate's own if the candidate has none or one of more energy.
 
-        A candidate that the certificate did not confirm takes no further result.
+        `moved` is the candidate with the ends of the motion, if these have moved. A candidate that the certificate did
+        not confirm takes no further result.
         """
         objective = energy.of(self.problem.objective)
         if candidate.reason is Reason.NOT_CONFIRMED:
             return
         if candidate.energy is None or objective < candidate.energy:
             candidate.attempt, candidate.energy = result, objective
+            if moved is not None:
+                candidate.move(moved)
             candidate.settle(CandidateStatus.SOLVED, Reason.METHOD, result.reason)
             self.tell_best()
 

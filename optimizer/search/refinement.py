@@ -15,6 +15,7 @@ from optimizer.search.incumbent import SLACK, Incumbent
 from optimizer.search.passing import stopping_baselines
 from optimizer.search.path_baselines import path_baselines
 from optimizer.search.sharpening import sharpen
+from optimizer.search.sliding import slides
 from optimizer.solution import Baseline, BaselineName
 from optimizer.trajectories.ruckig_motion import time_optimal_spline
 from optimizer.trajectories.seven_segment import shortest_duration
@@ -35,6 +36,9 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         solve_from(incumbent, candidate, sampled(coarse), fine=tight)
         if tight and candidate.spline is coarse and not incumbent.deadline.passed:
             solve_from(incumbent, candidate, sampled(coarse), fine=False)
+        elif tight and slides(incumbent.prepared, candidate) and not incumbent.deadline.passed:
+            # the posture has moved: with knots at the switches of jerk of the motion to it
+            solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
     if not method.guess_baselines:
         return
     if incumbent.uses_storage:

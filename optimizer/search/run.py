@@ -30,6 +30,8 @@ from optimizer.search.missed_branches import all_known, bound_of_others
 from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.refinement import compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
+from optimizer.search.seeds import activate_seeds
+from optimizer.search.sliding import slides
 from optimizer.search.tight_bound import tighten
 from optimizer.solution import (
     Baseline,
@@ -130,9 +132,7 @@ class Run:
             incumbent.tell_candidates()
             incumbent.tell_best()
         while (best := incumbent.best()) is not None:
-            coarse = best.energy or 0.0
             refine(incumbent, best)
-            self_motions.polish(incumbent, best, coarse)
             best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)
             best = incumbent.best() or best
@@ -166,7 +166,7 @@ class Run:
         """Solve candidates until no lower bound is below the incumbent; deferred ones too while nothing is solved."""
         incumbent = self.incumbent
         candidates, most_solved = incumbent.candidates, incumbent.method.most_solved
-        activate_deferred(candidates)
+        self.activate()
         mechanical = self.problem.objective == "mechanical" and incumbent.method.evenly_spaced
         first = FirstMotions.of(incumbent.prepared, candidates) if mechanical and len(candidates) > 1 else None
         while True:
@@ -179,8 +179,15 @@ class Run:
                 incumbent.tell_tried,
                 first,
             )
-            if incumbent.best() is not None or incumbent.deadline.passed or not activate_deferred(candidates):
+            if incumbent.best() is not None or incumbent.deadline.passed or not self.activate():
                 break
+
+    def activate(self) -> bool:
+        """Activate deferred candidates; false if there are none."""
+        incumbent = self.incumbent
+        if any(slides(incumbent.prepared, each) for each in incumbent.candidates):
+            return activate_seeds(incumbent.prepared, incumbent.candidates)
+        return activate_deferred(incumbent.candidates)
 
     def without_storage(self) -> tuple[Candidate, SolveResult, Energy] | None:
         """The best motion on the same bus without its energy storage, valued with it; None if time is too short.

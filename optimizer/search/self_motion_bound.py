@@ -25,8 +25,11 @@ from optimizer.search.ends import EndConfiguration
 from optimizer.search.least_displacement import least_displacement
 from optimizer.search.lower_bound import LeastBound
 
-# half side of the first cells, and of cells that are not halved again [rad]; pairs halved in a round, rounds
-FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-4, 64, 60
+# half side of the first cells, and of cells that are not halved again [rad]; most pairs halved in a round, rounds
+FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-4, 256, 60
+# no bound of a family exceeds that of a single member: halving ends once it is so near to the least of those seen, at
+# the middles of so many pairs in each round
+CLOSE, MIDDLES = 1e-3, 4
 
 
 def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
@@ -58,6 +61,10 @@ class Cells:
         half = np.where(which, self.half / 2, self.half)
         step = np.where(which, half, 0.0)
         return Cells(self.curve, self.parameter - step, half), Cells(self.curve, self.parameter + step, half)
+
+    def shrunk(self) -> Cells:
+        """The middles of the cells."""
+        return Cells(self.curve, self.parameter, np.zeros_like(self.half))
 
     def joined(self, other: Cells) -> Cells:
         """These cells, then the others."""
@@ -125,21 +132,26 @@ class _CellSearch:
     def run(self, deadline: Deadline) -> float:
         """The least bound [J] of any pair after at most ROUNDS rounds of halving."""
         starts, goals = self.first()
-        value = self.bounds(starts, goals)
+        value, least = self.bounds(starts, goals), np.inf
         for _ in range(ROUNDS):
             order = np.argsort(value, kind="stable")
-            lowest, rest = order[:SPLIT], order[SPLIT:]
-            if (
-                deadline.passed
-                or not np.isfinite(value[order[0]])
-                or max(starts.half[order[0]], goals.half[order[0]]) < LAST_HALF
-            ):
+            wide = np.maximum(starts.half[order], goals.half[order]) >= LAST_HALF
+            due = np.isfinite(value[order]) & (~(value[order] >= least - CLOSE * abs(least)))
+            if deadline.passed or not due[0] or not wide[0]:
                 break
+            split = np.zeros(len(order), dtype=bool)
+            split[np.flatnonzero(due & wide)[:SPLIT]] = True
+            lowest, rest = order[split], order[~split]
             at_start = starts.half[lowest] > goals.half[lowest]
             (s0, s1), (g0, g1) = starts[lowest].halved(at_start), goals[lowest].halved(~at_start)
-            fresh_starts, fresh_goals = s0.joined(s1), g0.joined(g1)
+            fresh_starts, fresh_goals, few = s0.joined(s1), g0.joined(g1), order[:MIDDLES]
+            middles = starts[few].shrunk(), goals[few].shrunk()
+            fresh, reached = np.split(
+                self.bounds(fresh_starts.joined(middles[0]), fresh_goals.joined(middles[1])), [2 * len(lowest)]
+            )
+            least = min(least, float(reached.min()))
             # the bound of a part is at least that of the whole
-            fresh = np.maximum(self.bounds(fresh_starts, fresh_goals), np.tile(value[lowest], 2))
+            fresh = np.maximum(fresh, np.tile(value[lowest], 2))
             starts, goals = starts[rest].joined(fresh_starts), goals[rest].joined(fresh_goals)
             value = np.concatenate([value[rest], fresh])
         return float(value.min())

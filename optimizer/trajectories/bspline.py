@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from models.robot import Array, Mask
 from optimizer.trajectories import quintic
@@ -23,6 +23,8 @@ LEAST_NODES = 31
 GRID_POINTS = 512
 # points at which path constraints are bounded; an excess between them is found afterwards and repaired
 PATH_POINTS = 96
+# weight of the third derivative by τ beside the positions in a smooth fit
+THIRD = 3e-3
 # parts into which the anchors of speed, acceleration and jerk divide a span, where these have degree 4, 3 and 2
 ANCHORS = (2, 4, 4)
 
@@ -55,6 +57,25 @@ def fit(samples: Array, at: Array, knots: Array, resting: int = REST_POINTS) -> 
     points[:resting], points[-resting:] = samples[0], samples[-1]
     inner = slice(resting, len(points) - resting)
     points[inner] = np.linalg.lstsq(matrix[:, inner], samples - matrix @ points, rcond=None)[0]
+    return points
+
+
+def smooth_fit(samples: Array, at: Array, knots: Array) -> Array:
+    """Control points (n, r) of the least-squares fit to samples (k, r) of a smooth motion at (k,) in [0, 1], and to the
+    third derivative of the quintic spline through them; at rest at both ends, where the samples are met exactly.
+
+    Next to repeated knots, a fit to the positions alone has a third derivative of many times the samples'.
+    """
+    _, apart = np.unique(at, return_index=True)
+    motion = make_interp_spline(at[apart], samples[apart], k=DEGREE)
+    # samples may miss short spans
+    nodes, _ = quadrature(knots, 3)
+    matrix = np.concatenate([basis_matrix(knots, at), THIRD * basis_matrix(knots, nodes, 3)])
+    points = np.zeros((matrix.shape[1], samples.shape[1]))
+    points[:REST_POINTS], points[-REST_POINTS:] = samples[0], samples[-1]
+    wanted = np.concatenate([samples, THIRD * motion(nodes, 3)]) - matrix @ points
+    inner = slice(REST_POINTS, len(points) - REST_POINTS)
+    points[inner] = np.linalg.lstsq(matrix[:, inner], wanted, rcond=None)[0]
     return points
 
 

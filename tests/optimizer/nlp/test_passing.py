@@ -43,7 +43,7 @@ def test_a_curve_is_put_on_its_passes_by_a_small_change() -> None:
     motion = spline_of(own.basis, own.joint_points(free), 1.0)
     assert np.abs(motion.curve(at.times) - PASSES).max() < ROUNDING
     assert (np.diff(at.times) > 0).all()
-    again, still = passes.put(free, at.times)
+    again, still = passes.put(free, at)
     assert np.abs(again - free).max() < ROUNDING and np.abs(still.times - at.times).max() < 1e-6
 
 
@@ -79,7 +79,7 @@ def test_the_curvature_is_that_of_the_cost_along_the_curves_that_pass() -> None:
         y = rng.normal(size=kept.shape[1])
         step = (kept @ (y / np.linalg.norm(y))).reshape(free.shape)
         h = 1e-3
-        sides = [passes.put(free + sign * h * step, at.times)[0] for sign in (-1, 1)]
+        sides = [passes.put(free + sign * h * step, at)[0] for sign in (-1, 1)]
         # what the putting back adds along the passes is a first-order change of the cost
         drift = sum(sides) - 2 * free
         along = kept @ (kept.T @ drift.ravel())

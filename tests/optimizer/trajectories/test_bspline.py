@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 
 from models.robot import Array
-from optimizer.trajectories import bspline
+from optimizer.trajectories import bspline, quintic
 from optimizer.trajectories.bspline import DEGREE, REST_POINTS, Basis
 from optimizer.trajectories.quadrature import quadrature
 
@@ -210,3 +210,31 @@ def test_fit_is_the_nearest_motion_at_rest() -> None:
     residual = matrix @ points - samples
     assert np.abs(residual).max() > 1e-3  # samples that move at their ends are out of the space's reach
     assert np.abs(matrix[:, space.free].T @ residual).max() < EXACT * len(t)  # orthogonal to every free direction
+
+
+def test_a_smooth_fit_keeps_positions_and_jerk_where_knots_are_repeated() -> None:
+    """Switches so near to the ends that no sample lies between: a fit to the positions alone has any jerk there."""
+    switches = np.array([0.002, 0.3, 0.302, 0.698, 0.7, 0.998])
+    space = bspline.graded(switches, 3)
+    at = np.linspace(0.0, 1.0, 201)
+    coarse = bspline.uniform(13)
+    points = np.random.default_rng(5).normal(size=(13, 2))
+    points[:REST_POINTS], points[-REST_POINTS:] = 0.0, 1.0
+    samples = BSpline(coarse.knots, points, DEGREE)(at)
+    fitted = bspline.smooth_fit(samples, at, space.knots)
+    assert (fitted[:REST_POINTS] == samples[0]).all() and (fitted[-REST_POINTS:] == samples[-1]).all()
+    curve = BSpline(space.knots, fitted, DEGREE)
+    assert np.abs(curve(at) - samples).max() < 0.02 * np.ptp(samples)
+    peak = np.abs(coarse.at_grid[2] @ points).max()
+    assert np.abs(space.at_grid[2] @ fitted).max() < 1.5 * peak
+    alone = bspline.fit(samples, at, space.knots)
+    assert np.abs(space.at_grid[2] @ alone).max() > 10 * peak
+
+
+def test_a_smooth_fit_takes_samples_at_the_same_instant() -> None:
+    space = SPACES["graded twice"]
+    at = np.sort(np.append(np.linspace(0.0, 1.0, 51), [0.5, 1.0]))
+    samples = quintic.fraction(at)[:, None]
+    fitted = bspline.smooth_fit(samples, at, space.knots)
+    # every space contains the quintic
+    assert np.abs(BSpline(space.knots, fitted, DEGREE)(at) - samples).max() < 1e-9

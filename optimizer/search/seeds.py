@@ -1,0 +1,94 @@
+"""Which samples of self-motions are solved: those from which the ends may slide to motions of least energy.
+
+The energy of every pair is estimated from the rest-to-rest quintic on the straight line, of a few durations. Where the
+estimate is least along the self-motions, a motion begins. An estimate is some tenth too high; for pairs of one problem
+it is so by nearly the same ratio.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from models.robot import Array, Mask
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.ends import EndConfiguration
+from optimizer.solution import CandidateStatus
+from optimizer.trajectories import quintic
+from optimizer.trajectories.quadrature import quadrature
+
+# durations of the quintic, in multiples of the shortest one, and the panels and points of its quadrature
+TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3
+# pairs whose energies are estimated: those of least lower bound
+MOST_ESTIMATED = 1024
+# seeds need at most this ratio of the least estimate, and so many of them are solved at a time
+NEAR, MOST_SEEDS = 1.12, 4
+
+
+def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> bool:
+    """Activate the deferred candidates where the estimated energy is least; false if none is deferred."""
+    known = [each for each in candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    if not known:
+        return False
+    if len(known) > MOST_ESTIMATED:
+        # the others keep their order, in which neighbours are next to each other
+        most = sorted(each.lower_bound for each in known)[MOST_ESTIMATED]
+        known = [each for each in known if each.lower_bound < most]
+    energy = estimates(prepared, known)
+    least = _least(known, energy)
+    order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]
+    chosen = [k for k in order if energy[k] <= NEAR * energy[order[0]]][:MOST_SEEDS]
+    for k in chosen:
+        known[k].deferred = False
+        known[k].settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+    return True
+
+
+def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
+    """Energies (n,) [J] of quintics on straight lines, each of its best duration, raised where a torque is too high."""
+    q_start, q_goal = (np.array([getattr(each, name) for each in candidates]) for name in ("q_start", "q_goal"))
+    shortest = np.array([each.shortest for each in candidates])[:, None, None]
+    (at, rate, acceleration), weights = _quintic()
+    way, best = (q_goal - q_start)[:, None], np.full(len(candidates), np.inf)
+    q = q_start[:, None] + way * at
+    for scale in TIME_SCALES:
+        T = scale * shortest
+        y = np.concatenate([q, way * rate / T, way * acceleration / T**2], axis=2)
+        cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
+        beyond = np.abs(tau / prepared.arm.active_limits.tau_max).max(axis=1).reshape(len(candidates), -1).max(axis=1)
+        best = np.minimum(best, T[:, 0, 0] * (cost.reshape(len(candidates), -1) @ weights) * np.maximum(beyond, 1.0))
+    return best
+
+
+@cache
+def _quintic() -> tuple[Array, Array]:
+    """Fraction of the way and its first two derivatives by the fraction of time (3, k, 1), and weights (k,)."""
+    x, weights = quadrature(np.linspace(0.0, 1.0, PANELS + 1), POINTS)
+    return quintic.derivatives(x)[:, :, None], weights
+
+
+def _least(candidates: Sequence[Candidate], energy: Array) -> Mask:
+    """Which candidates (n,) need no more than their neighbours: the next samples of the same self-motions."""
+    starts, goals = (
+        {id(getattr(each, name)): getattr(each, name) for each in candidates} for name in ("start", "goal")
+    )
+    row, column = ({key: k for k, key in enumerate(ends)} for ends in (starts, goals))
+    table = np.full((len(starts), len(goals)), np.inf)
+    places = np.array([(row[id(each.start)], column[id(each.goal)]) for each in candidates])
+    table[tuple(places.T)] = energy
+    least = _least_along(table, list(starts.values())) & _least_along(table.T, list(goals.values())).T
+    return np.asarray(least[tuple(places.T)])
+
+
+def _least_along(table: Array, ends: Sequence[EndConfiguration]) -> Mask:
+    """Where a table of energies (n, m) is least among neighbours along its first axis, which are samples `ends`."""
+    least = np.ones(table.shape, dtype=bool)
+    same = np.array([a.self_motion is b.self_motion is not None for a, b in pairwise(ends)], dtype=bool)
+    falls = table[1:] < table[:-1]
+    least[:-1] &= ~(falls & same[:, None])
+    least[1:] &= falls | ~same[:, None]
+    return least

@@ -1,0 +1,106 @@
+"""Seeds of redundant arms: where the estimated energy is least along the self-motions; ends slide from there."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from benchmarks.tasks import collision_free
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.optimize import optimize
+from optimizer.problem.arm import Arm
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.search.run import Run
+from optimizer.search.seeds import MOST_SEEDS, NEAR, activate_seeds, estimates
+from optimizer.solution import CandidateStatus
+
+# s: no search comes near it, however busy the machine
+AMPLE = 300.0
+# an estimate is that of a motion of two numbers: it is above the least energy, by less than this ratio
+HIGHEST = 1.4
+# m, rad
+HELD = 1e-9
+
+
+def problem_of(name: str, index: int, both: bool = False) -> Problem:
+    """A random task to a pose, from a pose too if `both`."""
+    robot = load_robot(name)
+    rng = np.random.default_rng([0, index])
+    arm, start, goal = Arm(robot=robot), collision_free(rng, robot), collision_free(rng, robot)
+    pose = [Pose(tcp_pose(arm, q)) for q in (start, goal)]
+    return Problem(arm=arm, start=pose[0] if both else start, goal=pose[1], deadline=AMPLE)
+
+
+@cache
+def prepared(name: str, index: int, both: bool = False) -> Run:
+    run = Run(problem_of(name, index, both))
+    run.prepare()
+    return run
+
+
+@pytest.mark.parametrize("name", ["panda", "gen3"])
+def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: str) -> None:
+    run = prepared(name, 1)
+    known = [each for each in run.incumbent.candidates if each.deferred]
+    energy = estimates(run.incumbent.prepared, known)
+    assert (energy >= np.array([each.lower_bound for each in known])).all()
+    least = optimize(run.problem).energy.electrical.total
+    assert least <= energy.min() <= HIGHEST * least
+
+
+@pytest.mark.parametrize("both", [False, True], ids=["to a pose", "between poses"])
+def test_seeds_are_the_least_along_their_self_motions(both: bool) -> None:
+    run = Run(problem_of("panda", 7, both))
+    run.prepare()
+    incumbent = run.incumbent
+    before = [each for each in incumbent.candidates if each.deferred]
+    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    seeds = [each for each in before if not each.deferred]
+    assert 0 < len(seeds) <= MOST_SEEDS
+    assert all(each.status is CandidateStatus.UNVISITED for each in seeds)
+    energy = dict(zip(map(id, before), estimates(incumbent.prepared, before), strict=True))
+    assert max(energy[id(each)] for each in seeds) <= NEAR * min(energy[id(each)] for each in seeds)
+    ends: list[Array] = [end.q for end in {id(each.goal): each.goal for each in before}.values()]
+    for seed in seeds:
+        beside = [
+            each
+            for each in before
+            if each.start is seed.start and each.goal.self_motion is seed.goal.self_motion and each is not seed
+        ]
+        place = next(k for k, q in enumerate(ends) if q is seed.goal.q)
+        near = [each for each in beside if any(each.goal.q is q for q in ends[max(place - 1, 0) : place + 2])]
+        assert all(energy[id(each)] >= energy[id(seed)] for each in near)
+
+
+def test_the_next_seeds_follow_until_none_is_left() -> None:
+    run = Run(problem_of("panda", 4))
+    run.prepare()
+    incumbent, rounds = run.incumbent, 0
+    while activate_seeds(incumbent.prepared, incumbent.candidates):
+        rounds += 1
+        assert rounds <= len(incumbent.candidates)
+    assert not any(each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates)
+
+
+def test_an_end_may_slide_onto_a_joint_limit() -> None:
+    """The sixth joint of this goal is on its limit: the samples beside it need some percent more."""
+    run = prepared("iiwa14", 4)
+    answer = optimize(run.problem)
+    limits = run.problem.arm.robot.limits
+    on_limit = np.minimum(answer.goal.q - limits.q_min, limits.q_max - answer.goal.q)
+    assert 0 <= on_limit.min() < 1e-9
+    assert answer.certificate.valid and max(answer.certificate.goal_error) < HELD
+
+
+def test_an_answer_between_poses_holds_both() -> None:
+    answer = optimize(problem_of("panda", 6, both=True))
+    assert answer.certificate.valid
+    for end in (answer.certificate.start_error, answer.certificate.goal_error):
+        assert max(end) < HELD
+    fixed = optimize(Problem(arm=Arm(robot=load_robot("panda")), start=answer.start.q, goal=answer.goal.q))
+    assert answer.energy.electrical.total <= fixed.energy.electrical.total * (1 + 1e-3)
