@@ -103,6 +103,13 @@ class CycleRequest(ArmRequest):
         12.0,
         default=None,
     )
+    objective: Objective = described(
+        "`electrical`: the energy drawn by the whole round. `mechanical`: the work of its moves, ∫ Σ |tau_j v_j| dt; "
+        "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
+        None,
+        "electrical",
+        default="electrical",
+    )
     hold: Holding = described(
         "How the arm is held while it dwells and waits.",
         None,
@@ -151,18 +158,13 @@ class CycleRequest(ArmRequest):
             raise PydanticCustomError("order", "`before` and `together` need `order` to be free")
         return self
 
-    @property
-    def objective(self) -> Objective:
-        """The energy that is minimised."""
-        return "electrical"
-
 
 class RoundEnergy(MotionEnergy):
     """Energy of the round: the moves, and dwells and waiting in `electrical.dwell`."""
 
     lower_bound: float = described(
-        "Lower bound of the electrical energy: no round that rests at these stops, or goes through those with `pass`, "
-        "of any configurations, shapes and durations, draws less.",
+        "Lower bound of the objective: no round that rests at these stops, or goes through those with `pass`, of any "
+        "configurations, shapes and durations, needs less.",
         "J",
         536.1,
     )
@@ -203,7 +205,9 @@ class CycleLeg(Response):
     electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
     mechanical: float = described("Mechanical work.", "J", 30.2)
     lower_bound: float = described(
-        "Lower bound of the electrical energy between these configurations; of a rest, its energy.", "J", 64.0
+        "Lower bound of the objective between these configurations; of a rest, what it adds to the objective.",
+        "J",
+        64.0,
     )
     payload_mass: float = described("Mass of the payload that the arm carries.", "kg", 2.0)
     answer: str | None = described(
@@ -228,12 +232,15 @@ class CycleBaseline(Response):
     )
     duration: float = described("Duration of this round.", "s", 9.9)
     electrical: float = described("Electrical energy of this round.", "J", 700.2)
+    mechanical: float | None = described(
+        "Mechanical work of its moves. Null in answers of an earlier version.", "J", 310.4, default=None
+    )
     within_limits: bool = described(
         "Whether every move is within the limits; collisions are checked at sample points.", None, True
     )
-    saving: float = described("1 - energy of the answer / energy of this round.", "1", 0.15)
+    saving: float = described("1 - energy of the answer / energy of this round, of the objective.", "1", 0.15)
     saving_interval: SavingInterval | None = part(
-        "How well the saving is known. Null in answers of an earlier version."
+        "How well the saving is known. Null for the objective `mechanical`, and in answers of an earlier version."
     )
 
 
@@ -273,6 +280,7 @@ class CycleResponse(Answer):
     """The round of least energy, its moves, and its certificate."""
 
     method: MethodName = described("How the moves are parametrised.", None, "bspline")
+    objective: Objective = described("The energy that is minimised.", None, "electrical", default="electrical")
     order: list[str] = described("Names of the stops, as they are visited.", None, ["pick", "place"])
     duration: float = described("Duration of the round, dwells and waiting included.", "s", 8.3)
     status: Literal["optimal", "feasible"] = described(
