@@ -29,6 +29,7 @@ from optimizer.sequence.round_baselines import (
 )
 from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
 from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
+from optimizer.sequence.stored_round import with_storage
 from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Solution
 
@@ -48,29 +49,36 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tel
     with one_thread():
         began, tell = clock(), forward(tell)
         asked = _divided(asked, clock)
-        if asked.order is None:
-            found = _in_given_order(asked, clock, tell)
-            _tell_found(tell, found)
-            return replace(found, wall_time=clock() - began)
-        orders = OrderSearch(asked, clock, tell)
-        ordered = orders.run()
-        left = max(asked.deadline - (clock() - began), LEAST_TIME)
-        # the moves of every order have been told already
-        found = _in_given_order(replace(ordered, deadline=left), clock, only_improved(tell))
-        left = asked.deadline - (clock() - began)
-        baseline = given_order(asked, left, found, clock) if asked.objective == "electrical" else None
-        # unsolved moves weigh more than their bounds on mechanical work
-        by_bounds = asked.objective == "electrical"
-        # the bound of the best order does not hold for the others
-        found = replace(
-            found,
-            status=found.status if orders.exact and found.price_of_time == 0 and by_bounds else "feasible",
-            lower_bound=min(orders.bound, found.lower_bound),
-            baselines=[*found.baselines, *([] if baseline is None else [baseline])],
-            wall_time=clock() - began,
-        )
+        if asked.arm.bus.mode == "storage":
+            # energies on the buses on which it is looked for are not those of the round
+            found = with_storage(asked, lambda other: _optimized(other, clock, nobody), clock)
+        else:
+            found = _optimized(asked, clock, tell)
         _tell_found(tell, found)
-        return found
+        return replace(found, wall_time=clock() - began)
+
+
+def _optimized(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
+    """The round of least energy, in the order that is given or the best one."""
+    began = clock()
+    if asked.order is None:
+        return _in_given_order(asked, clock, tell)
+    orders = OrderSearch(asked, clock, tell)
+    ordered = orders.run()
+    left = max(asked.deadline - (clock() - began), LEAST_TIME)
+    # the moves of every order have been told already
+    found = _in_given_order(replace(ordered, deadline=left), clock, only_improved(tell))
+    left = asked.deadline - (clock() - began)
+    baseline = given_order(asked, left, found, clock) if asked.objective == "electrical" else None
+    # unsolved moves weigh more than their bounds on mechanical work
+    by_bounds = asked.objective == "electrical"
+    # the bound of the best order does not hold for the others
+    return replace(
+        found,
+        status=found.status if orders.exact and found.price_of_time == 0 and by_bounds else "feasible",
+        lower_bound=min(orders.bound, found.lower_bound),
+        baselines=[*found.baselines, *([] if baseline is None else [baseline])],
+    )
 
 
 def _divided(asked: WorkRound, clock: Clock) -> WorkRound:
@@ -195,12 +203,19 @@ def _baselines(search: RoundSearch, found: _Found, ours: Needed) -> list[RoundBa
         return []
     nodes, timing = found.nodes, found.timing
     compared = [
-        None if found.greedy is None else of_chain(search, found.greedy, "move_by_move", ours),
+        None if found.greedy is None else _by_moves(search, found.greedy, ours),
         controller_default(search, nodes[0], ours),
     ]
     if timing is not None:
         compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
     return [each for each in compared if each is not None]
+
+
+def _by_moves(search: RoundSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
+    """The baseline of choosing move by move, with its moves."""
+    baseline = of_chain(search, nodes, "move_by_move", ours)
+    solutions = [search.solutions[each] for each in search.pairs(nodes)]
+    return None if baseline is None else replace(baseline, moves=_moves(search, nodes, solutions, {}))
 
 
 def _is_done(search: RoundSearch, found: _Found) -> bool:

@@ -202,13 +202,14 @@ def _legs(move: Move, objective: Objective, store: Callable[[Solution], str]) ->
             "mechanical": solution.energy.mechanical.total,
             "lower_bound": solution.lower_bound,
             "payload_mass": move.planned.arm.payload.mass,
+            "charge": move.charges[1] if move.charges else None,
             "answer": store(solution),
         }
     ]
     t0 = move.t0 + solution.duration
-    for kind, length, energy in (
-        ("dwell", move.planned.dwell, move.dwell_energy),
-        ("wait", move.wait, move.wait_energy),
+    for kind, length, energy, charge in (
+        ("dwell", move.planned.dwell, move.dwell_energy, move.charges[2:3]),
+        ("wait", move.wait, move.wait_energy, move.charges[3:4]),
     ):
         if length > 0:
             legs.append(
@@ -223,6 +224,7 @@ def _legs(move: Move, objective: Objective, store: Callable[[Solution], str]) ->
                     "mechanical": 0.0,
                     "lower_bound": energy if objective == "electrical" else 0.0,
                     "payload_mass": move.planned.arm_after.payload.mass,
+                    "charge": charge[0] if charge else None,
                     "answer": None,
                 }
             )

@@ -26,6 +26,7 @@ from app.settings import LONGEST_DEADLINE
 from optimizer.problem.free_order import MOST_FREE_STOPS
 from optimizer.problem.problem import MethodName
 from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
+from optimizer.sequence.round_solution import RoundBaselineName
 from optimizer.solution import Objective
 
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
@@ -210,6 +211,9 @@ class CycleLeg(Response):
         64.0,
     )
     payload_mass: float = described("Mass of the payload that the arm carries.", "kg", 2.0)
+    charge: float | None = described(
+        "Charge of the energy storage on the bus when it ends; null without one.", "J", 5.3, default=None
+    )
     answer: str | None = described(
         "Path of the complete answer of `POST /optimize` for this move; null for a rest.", None, ANSWER_PATH
     )
@@ -218,15 +222,14 @@ class CycleLeg(Response):
 class CycleBaseline(Response):
     """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked for."""
 
-    name: Literal[
-        "stopping", "move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"
-    ] = described(
+    name: RoundBaselineName = described(
         "`stopping`: the best round that rests at the stops with `pass`, too; the others then rest there as well. "
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
         "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
         "slowed or sped up alike; `fastest_then_wait`, the fastest moves and a wait. With a free order, where it is "
-        "allowed: `given_order`, the best round in the order of `stops`.",
+        "allowed: `given_order`, the best round in the order of `stops`. With an energy storage on the bus: "
+        "`without_storage`, the best round on the same bus without it, beside `move_by_move` alone.",
         None,
         "move_by_move",
     )

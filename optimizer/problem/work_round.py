@@ -93,8 +93,6 @@ class WorkRound:
                 self._check_passed(k, stop)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
-        if self.arm.bus.mode == "storage":
-            raise InvalidProblem("bus.mode", "A round has no energy storage on the bus: use another mode.")
         for name in ("sample_period", "deadline"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")

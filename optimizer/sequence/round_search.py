@@ -72,7 +72,7 @@ class RoundSearch(LazySearch):
 
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
-        prepared = PreparedProblem.of(self._problem(move, start.q[0], goal.q[0], self.asked.deadline))
+        prepared = PreparedProblem.of(problem_of(self.asked, move, start.q[0], goal.q[0], self.asked.deadline))
         dwells = dwell_costs(self.asked, move, goal)
         if between:
             return PassingLeg.through(prepared, [start, *between, goal], dwells)
@@ -266,23 +266,24 @@ class RoundSearch(LazySearch):
     def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:
         """The problem of a pair, with `time` [s] for it."""
         leg = self.legs[k]
-        problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], time)
+        problem = problem_of(self.asked, self.moves[k], leg.start.q[s], leg.goal.q[g], time)
         return replace(problem, passes=leg.passes(s, g))
 
-    def _problem(self, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
-        asked = self.asked
-        return Problem(
-            arm=move.arm,
-            start=q_start,
-            goal=q_goal,
-            method=asked.method,
-            objective=asked.objective,
-            duration_max=None if asked.objective == "electrical" else asked.longest_move,
-            tool_path=move.tool_path,
-            windings=False,
-            sample_period=asked.sample_period,
-            deadline=max(time, LEAST_TIME),
-        )
+
+def problem_of(asked: WorkRound, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
+    """The problem of a move of a round between joint positions (nq,) [rad], with `time` [s] for it."""
+    return Problem(
+        arm=move.arm,
+        start=q_start,
+        goal=q_goal,
+        method=asked.method,
+        objective=asked.objective,
+        duration_max=None if asked.objective == "electrical" else asked.longest_move,
+        tool_path=move.tool_path,
+        windings=False,
+        sample_period=asked.sample_period,
+        deadline=max(time, LEAST_TIME),
+    )
 
 
 def layers_of(asked: WorkRound) -> dict[str, Layer]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
 from itertools import pairwise
 from operator import add
@@ -23,6 +23,7 @@ from optimizer.solution import (
     SavingInterval,
     Sensitivity,
     Solution,
+    StorageUse,
 )
 
 
@@ -41,7 +42,8 @@ class Move:
 
     It begins at `t0` [s] of the round. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
     draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
-    `solved`. `sensitivity` is that of the energy of all three.
+    `solved`. `sensitivity` is that of the energy of all three. `charges` [J] are those of an energy storage on the
+    bus when the move begins, when it ends, after the dwell and after the wait; none without one.
     """
 
     planned: PlannedMove
@@ -55,6 +57,7 @@ class Move:
     solved: int
     sensitivity: Sensitivity = field(repr=False)
     passes: list[Pass]
+    charges: tuple[float, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -80,14 +83,20 @@ class Needed:
 
 
 RoundBaselineName = Literal[
-    "stopping", "move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"
+    "stopping",
+    "move_by_move",
+    "controller_default",
+    "same_factor",
+    "fastest_then_wait",
+    "given_order",
+    "without_storage",
 ]
 
 
 @dataclass(frozen=True)
 class RoundBaseline:
     """Another way to go round: its duration [s], what it needs [J], our saving 1 - ours / theirs of the objective, and
-    how well that is known (None for mechanical work)."""
+    how well that is known (None for mechanical work). `moves` are its own, where another bus may value them."""
 
     name: RoundBaselineName
     duration: float
@@ -95,6 +104,7 @@ class RoundBaseline:
     saving: float
     saving_interval: SavingInterval | None
     needed: Needed = field(repr=False)
+    moves: Sequence[Move] = field(default=(), repr=False)
 
     @property
     def electrical(self) -> float:
@@ -113,7 +123,8 @@ class RoundSolution:
     that it does not pass, needs less than `lower_bound` [J] of the objective.
 
     `status` is `optimal` if no chain of configurations has a bound below what was found, and every move converged.
-    `price_of_time` [W] is what one more second would save; negative where time is left over.
+    `storage` is what an energy storage on the bus did; None without one. `price_of_time` [W] is what one more second
+    would save; negative where time is left over.
     """
 
     status: Literal["optimal", "feasible"]
@@ -124,6 +135,7 @@ class RoundSolution:
     complete: bool
     wall_time: float
     objective: Objective = "electrical"
+    storage: StorageUse | None = None
 
     @property
     def duration(self) -> float:
@@ -136,7 +148,9 @@ class RoundSolution:
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
         energy = summed([move.solution for move in self.moves], resting)
         known = self.needed.electrical
-        return with_interval(energy, known.sensitivity, known.duration, self.moves[0].planned.arm)
+        return with_interval(
+            replace(energy, storage=self.storage), known.sensitivity, known.duration, self.moves[0].planned.arm
+        )
 
     @property
     def needed(self) -> Needed:
