@@ -104,7 +104,7 @@ def _to_path(k: int, path: StopPathRequest | None, robot: Robot) -> StopPath | N
         return None
     try:
         way = to_tool_path(path, path.points[1:-1], robot)
-        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.max, split=path.split)
+        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.limit, split=path.split)
     except InvalidProblem as error:
         raise at_stop(k, error) from None
 

@@ -37,7 +37,8 @@ def priced_motion(
     `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
     """
     weights = {leg.prepared.problem.objective: 1.0}
-    interval = DurationInterval(leg.prepared.parameters(**weights, time=price), LEAST_DURATION, longest)
+    p = leg.prepared.parameters(**weights, time=price)
+    interval = DurationInterval(p, LEAST_DURATION, longest, price=price)
     return _solved(leg, s, g, interval, deadline, guess)
 
 
