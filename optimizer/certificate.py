@@ -28,7 +28,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Single, single
 from optimizer.problem.tool_cone import ToolCone
-from optimizer.problem.tool_path import ToolPath
+from optimizer.problem.tool_path import SPEED_TOLERANCE, ToolPath
 from optimizer.solution import Certificate, Energy
 from optimizer.trajectories.limit_ratios import limit_ratios
 from optimizer.trajectories.passing import deviations
@@ -185,6 +185,8 @@ class _Replay:
     def _path_speed_ratio(self, path: ToolPath) -> dict[str, float]:
         """The least speed that the path asks for over that of the TCP where it is beyond the ramps at both ends.
 
+        Of a fixed speed, the largest deviation from it over its tolerance, and on the ramps that above it.
+
         Between two samples the speed is less than on the line between them by at most an eighth of its curvature times
         the squared time, which is taken from second differences.
         """
@@ -194,6 +196,10 @@ class _Replay:
         gone = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(self.t)))
         beyond = (gone >= path.ramp) & (gone <= gone[-1] - path.ramp)
         dip = 2 * float(np.abs(np.diff(speed, n=2)[beyond[1:-1]]).max(initial=0.0)) / 8
+        if path.fixed_speed is not None:
+            off = speed - path.fixed_speed
+            worst = float(np.where(beyond, np.abs(off), off).max()) + dip
+            return {"path_speed": worst / (SPEED_TOLERANCE * path.fixed_speed)}
         least = float(speed[beyond].min(initial=np.inf)) - dip
         return {"path_speed": path.least_speed / least if least > 0 else np.inf}
 

@@ -4,11 +4,11 @@ stops that need the least energy together."""
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from optimizer.deadline import Clock, Deadline, DeadlinePassed, watch
-from optimizer.energy.interval import Known
 from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.linear_algebra import one_thread
 from optimizer.problem.work_round import WorkRound
@@ -18,7 +18,7 @@ from optimizer.sequence.divided_paths import with_divided_paths
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.passing_leg import passes_of
 from optimizer.sequence.proven_bound import proven_bound
-from optimizer.sequence.rests import rest_sensitivity
+from optimizer.sequence.rests import dwell_energies, rest_sensitivity
 from optimizer.sequence.round_baselines import (
     controller_default,
     fastest_then_wait,
@@ -28,7 +28,8 @@ from optimizer.sequence.round_baselines import (
     same_factor,
 )
 from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
-from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution, known_of
+from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
+from optimizer.sequence.stored_round import with_storage
 from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Solution
 
@@ -48,27 +49,36 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tel
     with one_thread():
         began, tell = clock(), forward(tell)
         asked = _divided(asked, clock)
-        if asked.order is None:
-            found = _in_given_order(asked, clock, tell)
-            _tell_found(tell, found)
-            return replace(found, wall_time=clock() - began)
-        orders = OrderSearch(asked, clock, tell)
-        ordered = orders.run()
-        left = max(asked.deadline - (clock() - began), LEAST_TIME)
-        # the moves of every order have been told already
-        found = _in_given_order(replace(ordered, deadline=left), clock, only_improved(tell))
-        left = asked.deadline - (clock() - began)
-        baseline = given_order(asked, left, found, clock)
-        # the bound of the best order does not hold for the others
-        found = replace(
-            found,
-            status=found.status if orders.exact and found.price_of_time == 0 else "feasible",
-            lower_bound=min(orders.bound, found.lower_bound),
-            baselines=[*found.baselines, *([] if baseline is None else [baseline])],
-            wall_time=clock() - began,
-        )
+        if asked.arm.bus.mode == "storage":
+            # energies on the buses on which it is looked for are not those of the round
+            found = with_storage(asked, lambda other: _optimized(other, clock, nobody), clock)
+        else:
+            found = _optimized(asked, clock, tell)
         _tell_found(tell, found)
-        return found
+        return replace(found, wall_time=clock() - began)
+
+
+def _optimized(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
+    """The round of least energy, in the order that is given or the best one."""
+    began = clock()
+    if asked.order is None:
+        return _in_given_order(asked, clock, tell)
+    orders = OrderSearch(asked, clock, tell)
+    ordered = orders.run()
+    left = max(asked.deadline - (clock() - began), LEAST_TIME)
+    # the moves of every order have been told already
+    found = _in_given_order(replace(ordered, deadline=left), clock, only_improved(tell))
+    left = asked.deadline - (clock() - began)
+    baseline = given_order(asked, left, found, clock) if asked.objective == "electrical" else None
+    # unsolved moves weigh more than their bounds on mechanical work
+    by_bounds = asked.objective == "electrical"
+    # the bound of the best order does not hold for the others
+    return replace(
+        found,
+        status=found.status if orders.exact and found.price_of_time == 0 and by_bounds else "feasible",
+        lower_bound=min(orders.bound, found.lower_bound),
+        baselines=[*found.baselines, *([] if baseline is None else [baseline])],
+    )
 
 
 def _divided(asked: WorkRound, clock: Clock) -> WorkRound:
@@ -83,7 +93,7 @@ def _divided(asked: WorkRound, clock: Clock) -> WorkRound:
 
 
 def _tell_found(tell: Tell, found: RoundSolution) -> None:
-    tell(Improved(sum(each.energy for each in found.moves), found.duration, found.lower_bound))
+    tell(Improved(found.needed.of(found.objective), found.duration, found.lower_bound))
 
 
 def _in_given_order(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
@@ -119,15 +129,15 @@ def _searched(asked: WorkRound, clock: Clock, tell: Tell, stopping: RoundSolutio
     rested = None if stopping is None else start_from(search, stopping)
     try:
         found = _best_of(search)
-        if rested is not None and rested.nodes and rested.known.energy < known_of(found.moves).energy:
+        if rested is not None and rested.nodes and rested.known.energy < needed_by(found.moves).electrical.energy:
             found = replace(_as_stopping(search, rested), timing=found.timing)
     except JoulepathError:
         if rested is None or not rested.nodes:
             raise
         found = _as_stopping(search, rested, better=False)
-    ours, bound = known_of(found.moves), found.bound
+    ours, bound = needed_by(found.moves), found.bound
     if found.timing is not None:
-        bound = max(bound, found.timing.bound(found.price, ours.energy))
+        bound = max(bound, found.timing.bound(found.price, ours.of(asked.objective)))
     complete = all(layer.complete for leg in search.legs for layer in leg.layers)
     # a path may be divided at other places
     divided = any(move.tool_path is not None and move.tool_path.section is not None for move in asked.moves)
@@ -139,12 +149,18 @@ def _searched(asked: WorkRound, clock: Clock, tell: Tell, stopping: RoundSolutio
         baselines=_baselines(search, found, ours) if rested is None else stopping_baselines(asked, rested, ours),
         complete=complete,
         wall_time=0.0,
+        objective=asked.objective,
     )
 
 
 def _best_of(search: RoundSearch) -> _Found:
     """The best chain that the search finds, in the time that is asked for."""
-    asked, nodes = search.asked, search.run()
+    asked = search.asked
+    if asked.objective == "mechanical":
+        assert asked.duration_max is not None
+        # slower moves do less work: the round has no time of its own
+        return _in_time(search, asked.duration_max, None)
+    nodes = search.run()
     # what passes has the round with rests instead
     greedy = None if asked.passes else move_by_move(search, nodes[0])
     if greedy is not None and search.cost(greedy) < search.cost(nodes):
@@ -152,18 +168,26 @@ def _best_of(search: RoundSearch) -> _Found:
         nodes = greedy
     moving = [search.solutions[each] for each in search.pairs(nodes)]
     own = sum(each.duration for each in moving) + asked.dwelling
-    duration, bound = asked.nearest_duration(own), proven_bound(asked, search.legs, search.end)
+    duration = asked.nearest_duration(own)
     if duration == own:
+        bound = proven_bound(asked, search.legs, search.end)
         return _Found(nodes, _moves(search, nodes, moving, {}), 0.0, bound, greedy=greedy)
+    found = _in_time(search, duration, nodes)
+    # energies of nearly fastest moves are flat: rounding must not turn the price's sign
+    price = max(found.price, 0.0) if duration < own else min(found.price, 0.0)
+    return replace(found, price=price, greedy=greedy)
+
+
+def _in_time(search: RoundSearch, duration: float, nodes: list[int] | None) -> _Found:
+    """The best round found in a duration [s], from a chain on whose motions are known, or from the fastest one."""
     timing = TimedSearch(search, duration)
     timed = timing.run(nodes)
     shares = zip(search.pairs(timed.nodes), timed.shared.lengths, strict=True)
     moving = [search.solve_in(*each, length) for each, length in shares]
-    # energies of nearly fastest moves are flat: rounding must not turn the price's sign
-    price = max(timed.shared.price, 0.0) if duration < own else min(timed.shared.price, 0.0)
+    bound = proven_bound(search.asked, search.legs, search.end)
     waits = {timed.at: (timed.shared.waited, timed.wait_energy)}
-    moves = _moves(search, timed.nodes, moving, waits)
-    return _Found(timed.nodes, moves, price, bound, timing, timing.exact and timed.shared.exact, greedy)
+    moves, exact = _moves(search, timed.nodes, moving, waits, timing.sought), timing.exact and timed.shared.exact
+    return _Found(timed.nodes, moves, timed.shared.price, bound, timing, exact)
 
 
 def _as_stopping(search: RoundSearch, rested: Rested, better: bool = True) -> _Found:
@@ -173,18 +197,25 @@ def _as_stopping(search: RoundSearch, rested: Rested, better: bool = True) -> _F
     return _Found(rested.nodes, moves, rested.solution.price_of_time, bound, shared=False)
 
 
-def _baselines(search: RoundSearch, found: _Found, ours: Known) -> list[RoundBaseline]:
+def _baselines(search: RoundSearch, found: _Found, ours: Needed) -> list[RoundBaseline]:
     """The round in other ways, as far as they are known."""
     if search.asked.passes:
         return []
     nodes, timing = found.nodes, found.timing
     compared = [
-        None if found.greedy is None else of_chain(search, found.greedy, "move_by_move", ours),
+        None if found.greedy is None else _by_moves(search, found.greedy, ours),
         controller_default(search, nodes[0], ours),
     ]
     if timing is not None:
         compared += [same_factor(timing, nodes, ours), fastest_then_wait(timing, nodes, ours)]
     return [each for each in compared if each is not None]
+
+
+def _by_moves(search: RoundSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
+    """The baseline of choosing move by move, with its moves."""
+    baseline = of_chain(search, nodes, "move_by_move", ours)
+    solutions = [search.solutions[each] for each in search.pairs(nodes)]
+    return None if baseline is None else replace(baseline, moves=_moves(search, nodes, solutions, {}))
 
 
 def _is_done(search: RoundSearch, found: _Found) -> bool:
@@ -195,8 +226,17 @@ def _is_done(search: RoundSearch, found: _Found) -> bool:
     return converged and found.shared and not open_
 
 
-def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], waits: dict[int, Wait]) -> list[Move]:
-    """The moves of a chain, in their order, with the waits after some of them."""
+def _moves(
+    search: RoundSearch,
+    nodes: list[int],
+    found: list[Solution],
+    waits: dict[int, Wait],
+    sought: Sequence[set[int]] = (),
+) -> list[Move]:
+    """The moves of a chain, in their order, with the waits after some of them.
+
+    For the kinds `sought` of each leg motions were looked for beside those of the search.
+    """
     asked, t0, moves = search.asked, 0.0, list[Move]()
     for (k, s, g), solution in zip(search.pairs(nodes), found, strict=True):
         leg = search.legs[k]
@@ -207,12 +247,12 @@ def _moves(search: RoundSearch, nodes: list[int], found: list[Solution], waits: 
                 planned=asked.moves[k],
                 solution=solution,
                 t0=t0,
-                dwell_energy=float(leg.dwell[g]),
+                dwell_energy=float(dwell_energies(asked, asked.moves[k], leg.goal)[g]),
                 wait=wait,
                 wait_energy=wait_energy,
                 pairs=int((leg.kind >= 0).sum()),
                 kinds=len(leg.pair),
-                solved=len(leg.solved),
+                solved=len(leg.solved.keys() | (sought[k] if sought else set())),
                 sensitivity=solution.sensitivity + rest_sensitivity(asked, asked.moves[k], rest, leg.goal.q[g]),
                 passes=passes_of(leg, s, g, solution.trajectory.spline),
             )

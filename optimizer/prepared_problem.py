@@ -71,6 +71,12 @@ class PreparedProblem(Plant):
         return {}
 
     @cached_property
+    def even_motions(self) -> dict[tuple[bytes, float, float], tuple[Spline | None, bool]]:
+        """Motions at the tool path's fixed speed, and whether they are within the limits, by the joints' path and the
+        times [s] of both ramps."""
+        return {}
+
+    @cached_property
     def _joint_paths(self) -> dict[bytes, Spline | None]:
         return {}
 

@@ -33,7 +33,7 @@ def cycle(file: str, output: Path | None) -> None:
 def summary_of(answer: dict[str, Any]) -> dict[str, str]:
     """The lines of the summary by their titles."""
     return {
-        "energy": f"{answer['energy']['electrical']['total']:.4g} J electrical",
+        "energy": f"{answer['energy'][answer['objective']]['total']:.4g} J {answer['objective']}",
         **proof(answer),
         **{f"saved against {each['name']}": f"{each['saving']:.1%}" for each in answer["baselines"]},
     }

@@ -28,7 +28,7 @@ from optimizer.problem.stops import Stop
 from optimizer.problem.targets import Target
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.round_solution import Move, RoundSolution
-from optimizer.solution import Solution
+from optimizer.solution import Objective, Solution
 
 _PLACE = ("label", "q", "target")
 
@@ -49,6 +49,7 @@ def to_work_round(request: asked.CycleRequest, deadline: float) -> WorkRound:
         duration_max=most,
         branch=to_branch(request.branch),
         method=request.method,
+        objective=request.objective,
         windings=request.windings,
         hold=request.hold.hold,
         brake_delay=request.hold.brake_delay,
@@ -103,7 +104,7 @@ def _to_path(k: int, path: StopPathRequest | None, robot: Robot) -> StopPath | N
         return None
     try:
         way = to_tool_path(path, path.points[1:-1], robot)
-        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.max, split=path.split)
+        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.limit, split=path.split)
     except InvalidProblem as error:
         raise at_stop(k, error) from None
 
@@ -128,16 +129,19 @@ def to_cycle_response(
     electrical = energy.electrical
     return {
         "id": request_id,
-        **fields(request, "robot", "method"),
+        **fields(request, "robot", "method", "objective"),
         **fields(found, "order", "duration", "status", "price_of_time"),
         "energy": {
             **energy_fields(energy),
             "lower_bound": found.lower_bound,
-            "optimality_gap": optimality_gap(found.lower_bound, electrical.total),
+            "optimality_gap": optimality_gap(found.lower_bound, energy.of(found.objective)),
         },
-        "legs": [leg for move in found.moves for leg in _legs(move, store)],
+        "legs": [leg for move in found.moves for leg in _legs(move, found.objective, store)],
         "baselines": [
-            {**fields(each, *asked.CycleBaseline.model_fields), "saving_interval": vars(each.saving_interval)}
+            {
+                **fields(each, *asked.CycleBaseline.model_fields),
+                "saving_interval": each.saving_interval and vars(each.saving_interval),
+            }
             for each in found.baselines
         ],
         "certificate": {
@@ -181,7 +185,7 @@ def _divided(found: RoundSolution) -> list[tuple[str, float]]:
     return [(name, section.last) for name, section in parts if section.last < 1]
 
 
-def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
+def _legs(move: Move, objective: Objective, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
     """The entries of a move, and of the dwell and the wait after it."""
     solution = move.solution
     start = {**fields(solution.start, *_PLACE), "stop": move.planned.start}
@@ -198,13 +202,14 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
             "mechanical": solution.energy.mechanical.total,
             "lower_bound": solution.lower_bound,
             "payload_mass": move.planned.arm.payload.mass,
+            "charge": move.charges[1] if move.charges else None,
             "answer": store(solution),
         }
     ]
     t0 = move.t0 + solution.duration
-    for kind, length, energy in (
-        ("dwell", move.planned.dwell, move.dwell_energy),
-        ("wait", move.wait, move.wait_energy),
+    for kind, length, energy, charge in (
+        ("dwell", move.planned.dwell, move.dwell_energy, move.charges[2:3]),
+        ("wait", move.wait, move.wait_energy, move.charges[3:4]),
     ):
         if length > 0:
             legs.append(
@@ -217,8 +222,9 @@ def _legs(move: Move, store: Callable[[Solution], str]) -> list[dict[str, Any]]:
                     "duration": length,
                     "electrical": energy,
                     "mechanical": 0.0,
-                    "lower_bound": energy,
+                    "lower_bound": energy if objective == "electrical" else 0.0,
                     "payload_mass": move.planned.arm_after.payload.mass,
+                    "charge": charge[0] if charge else None,
                     "answer": None,
                 }
             )

@@ -34,7 +34,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     return Problem(
         start=to_target(request.start, arm.robot),
         goal=to_target(request.goal, arm.robot),
-        arm=arm if path is None else arm.no_faster_than(path.bounds.max),
+        arm=arm if path is None else arm.no_faster_than(path.bounds.limit),
         tool_path=None if path is None else to_tool_path(path, path.via, arm.robot),
         method=request.method,
         objective=request.objective,
@@ -59,6 +59,7 @@ def to_tool_path(path: Path | StopPath, via: Sequence[BasePose], robot: Robot) -
         rotation_tolerance=path.tolerance.rotation,
         about=path.tolerance.about,
         least_speed=path.bounds.min,
+        fixed_speed=path.bounds.fixed,
         ramp=path.bounds.ramp,
     )
 

@@ -30,6 +30,10 @@ def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, 
         value = getattr(limits, name)
         if (value < getattr(own, name)).any():
             given[public] = value.tolist()
+    # a storage on the bus begins each move with the charge that the last one left
+    stored = request.bus.mode == "storage" and {
+        "bus": request.bus.model_dump(mode="json", exclude_unset=True) | {"initial": arm.bus.initial}
+    }
     given |= {"tcp_speed": arm.tcp_speed, "elbow_speed": arm.elbow_speed}
     counted = [each for each in request.scene.obstacles if each.name in arm.scene.names]
     return arm_fields(
@@ -38,4 +42,5 @@ def _arm(request: CycleRequest, arm: Arm, carried: Payload | None) -> dict[str, 
         payload=None if carried is None else carried.model_dump(mode="json", exclude_unset=True),
         scene=request.scene.model_dump(mode="json", exclude_unset=True)
         | {"obstacles": [each.model_dump(mode="json", exclude_unset=True) for each in counted]},
+        **(stored or {}),
     )

@@ -26,6 +26,7 @@ from app.settings import LONGEST_DEADLINE
 from optimizer.problem.free_order import MOST_FREE_STOPS
 from optimizer.problem.problem import MethodName
 from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
+from optimizer.sequence.round_solution import RoundBaselineName
 from optimizer.solution import Objective
 
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
@@ -103,6 +104,13 @@ class CycleRequest(ArmRequest):
         12.0,
         default=None,
     )
+    objective: Objective = described(
+        "`electrical`: the energy drawn by the whole round. `mechanical`: the work of its moves, ∫ Σ |tau_j v_j| dt; "
+        "rests need none, and slower moves less, so it needs a `time` or a `time.max`.",
+        None,
+        "electrical",
+        default="electrical",
+    )
     hold: Holding = described(
         "How the arm is held while it dwells and waits.",
         None,
@@ -151,18 +159,13 @@ class CycleRequest(ArmRequest):
             raise PydanticCustomError("order", "`before` and `together` need `order` to be free")
         return self
 
-    @property
-    def objective(self) -> Objective:
-        """The energy that is minimised."""
-        return "electrical"
-
 
 class RoundEnergy(MotionEnergy):
     """Energy of the round: the moves, and dwells and waiting in `electrical.dwell`."""
 
     lower_bound: float = described(
-        "Lower bound of the electrical energy: no round that rests at these stops, or goes through those with `pass`, "
-        "of any configurations, shapes and durations, draws less.",
+        "Lower bound of the objective: no round that rests at these stops, or goes through those with `pass`, of any "
+        "configurations, shapes and durations, needs less.",
         "J",
         536.1,
     )
@@ -203,9 +206,14 @@ class CycleLeg(Response):
     electrical: float = described("Electrical energy drawn from the supply.", "J", 71.3)
     mechanical: float = described("Mechanical work.", "J", 30.2)
     lower_bound: float = described(
-        "Lower bound of the electrical energy between these configurations; of a rest, its energy.", "J", 64.0
+        "Lower bound of the objective between these configurations; of a rest, what it adds to the objective.",
+        "J",
+        64.0,
     )
     payload_mass: float = described("Mass of the payload that the arm carries.", "kg", 2.0)
+    charge: float | None = described(
+        "Charge of the energy storage on the bus when it ends; null without one.", "J", 5.3, default=None
+    )
     answer: str | None = described(
         "Path of the complete answer of `POST /optimize` for this move; null for a rest.", None, ANSWER_PATH
     )
@@ -214,26 +222,28 @@ class CycleLeg(Response):
 class CycleBaseline(Response):
     """The same stops with the same payloads and dwells, in another way, and in the `time` that is asked for."""
 
-    name: Literal[
-        "stopping", "move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"
-    ] = described(
+    name: RoundBaselineName = described(
         "`stopping`: the best round that rests at the stops with `pass`, too; the others then rest there as well. "
         "`move_by_move`: at each stop the move that needs the least energy by itself, as successive calls of "
         "`POST /optimize` choose it. `controller_default`: to the nearest configuration each time, by the robot's own "
         "controller with its default speed and acceleration. Where `time` changes the round: `same_factor`, every move "
         "slowed or sped up alike; `fastest_then_wait`, the fastest moves and a wait. With a free order, where it is "
-        "allowed: `given_order`, the best round in the order of `stops`.",
+        "allowed: `given_order`, the best round in the order of `stops`. With an energy storage on the bus: "
+        "`without_storage`, the best round on the same bus without it, beside `move_by_move` alone.",
         None,
         "move_by_move",
     )
     duration: float = described("Duration of this round.", "s", 9.9)
     electrical: float = described("Electrical energy of this round.", "J", 700.2)
+    mechanical: float | None = described(
+        "Mechanical work of its moves. Null in answers of an earlier version.", "J", 310.4, default=None
+    )
     within_limits: bool = described(
         "Whether every move is within the limits; collisions are checked at sample points.", None, True
     )
-    saving: float = described("1 - energy of the answer / energy of this round.", "1", 0.15)
+    saving: float = described("1 - energy of the answer / energy of this round, of the objective.", "1", 0.15)
     saving_interval: SavingInterval | None = part(
-        "How well the saving is known. Null in answers of an earlier version."
+        "How well the saving is known. Null for the objective `mechanical`, and in answers of an earlier version."
     )
 
 
@@ -273,6 +283,7 @@ class CycleResponse(Answer):
     """The round of least energy, its moves, and its certificate."""
 
     method: MethodName = described("How the moves are parametrised.", None, "bspline")
+    objective: Objective = described("The energy that is minimised.", None, "electrical", default="electrical")
     order: list[str] = described("Names of the stops, as they are visited.", None, ["pick", "place"])
     duration: float = described("Duration of the round, dwells and waiting included.", "s", 8.3)
     status: Literal["optimal", "feasible"] = described(

@@ -19,6 +19,7 @@ from optimizer.problem.tool_path import (
     RAMP,
     ROTATION_TOLERANCE,
     SPEED_RANGE,
+    SPEED_TOLERANCE,
     PathShape,
 )
 
@@ -35,7 +36,11 @@ class SpeedRange(Request):
         default=None,
     )
     max: Speed | None = described(
-        "Largest speed, at least 1.05 times `min`. Null: as fast as the limits allow.", "m/s", 0.2, default=None
+        "Largest speed, at least 1.05 times `min`; or equal to it: the speed is fixed then, and held within "
+        f"{SPEED_TOLERANCE:.1%} between the ramps. Null: as fast as the limits allow.",
+        "m/s",
+        0.2,
+        default=None,
     )
     ramp: float = described(
         "Length of the path at either end on which the speed may be below `min`.",
@@ -48,11 +53,23 @@ class SpeedRange(Request):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.min is not None and self.max is not None and self.max < SPEED_RANGE * self.min:
+        between = self.min is not None and self.max is not None and self.fixed is None
+        if between and (self.max or 0.0) < SPEED_RANGE * (self.min or 0.0):
             raise PydanticCustomError(
-                "range", f"`max` must be at least {SPEED_RANGE:g} times `min`: a motion needs some freedom"
+                "range",
+                f"`max` must be at least {SPEED_RANGE:g} times `min`, or equal to it: then the speed is fixed",
             )
         return self
+
+    @property
+    def fixed(self) -> float | None:
+        """The speed that is held [m/s]; None if there is a range."""
+        return self.min if self.min == self.max else None
+
+    @property
+    def limit(self) -> float | None:
+        """The limit on the speed of the TCP [m/s]: none of a fixed speed, which is held from both sides."""
+        return self.max if self.fixed is None else None
 
 
 PathSpeed = Annotated[

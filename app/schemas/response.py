@@ -193,7 +193,8 @@ class WorstRatio(Response):
         default=None,
     )
     path_speed: float | None = described(
-        "`speed.min` of the path / least speed of the TCP between the ramps, between the samples, too.",
+        "`speed.min` of the path / least speed of the TCP between the ramps. Of a fixed speed, the largest deviation "
+        "from it / 0.1 % of it. Between the samples, too.",
         "1",
         0.98,
         default=None,

@@ -63,7 +63,12 @@ def exchange(bus: Bus, regeneration: float, base: float, joints: Array, weights:
         surplus = weights * np.maximum(-joints, 0.0).sum(axis=-1)
         none = np.zeros_like(net)
         return BusFlow(net + surplus, surplus, none, none, np.zeros(len(net) + 1))
-    charge = charges(bus, net, weights)
+    return pooled(bus, regeneration, net, weights)
+
+
+def pooled(bus: Bus, regeneration: float, net: Array, weights: Array, first: float | None = None) -> BusFlow:
+    """Energies on a bus whose joints exchange power, for net demand (k,) [J]; see `exchange` and `charges`."""
+    charge = charges(bus, net, weights, first)
     change = np.diff(charge)
     discharged = np.maximum(-change, 0.0)
     charged = np.maximum(change, 0.0) / bus.efficiency if bus.efficiency > 0 else np.zeros_like(net)
@@ -73,18 +78,23 @@ def exchange(bus: Bus, regeneration: float, base: float, joints: Array, weights:
     return BusFlow(drawn, surplus, charged, discharged, charge)
 
 
-def charges(bus: Bus, net: Array, weights: Array) -> Array:
+def charges(bus: Bus, net: Array, weights: Array, first: float | None = None) -> Array:
     """Charge (k + 1,) [J] of the storage at the ends of intervals with net demand (k,) [J] and lengths (k,) [s].
 
-    Zero without storage.
+    It is `first` at the start, unless given the initial one. Zero without storage.
     """
     if bus.mode != "storage":
         return np.zeros(len(net) + 1)
-    limit = bus.power * weights if np.isfinite(bus.power) else np.inf
-    step = bus.efficiency * np.minimum(np.maximum(-net, 0.0), limit) - np.minimum(np.maximum(net, 0.0), limit)
-    capacity = bus.capacity
-    charge = accumulate(step.tolist(), lambda charge, by: min(max(charge + by, 0.0), capacity), initial=bus.initial)
+    step, capacity = charge_steps(bus, net, weights), bus.capacity
+    first = bus.initial if first is None else first
+    charge = accumulate(step.tolist(), lambda charge, by: min(max(charge + by, 0.0), capacity), initial=first)
     return np.fromiter(charge, dtype=float, count=len(net) + 1)
+
+
+def charge_steps(bus: Bus, net: Array, weights: Array) -> Array:
+    """By how much (k,) [J] the charge would change in intervals as in `charges`, far from full and empty."""
+    limit = bus.power * weights if np.isfinite(bus.power) else np.inf
+    return bus.efficiency * np.minimum(np.maximum(-net, 0.0), limit) - np.minimum(np.maximum(net, 0.0), limit)
 
 
 def drawn_at(bus: Bus, regeneration: float, base: float, joints: Array, charge: Array) -> Array:

@@ -21,7 +21,7 @@ from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 class DurationInterval:
     """Durations from t_min to t_max [s], packed kernel parameters p, and a constant part of the cost [J].
 
-    `minimum_time`: the duration is the cost.
+    `minimum_time`: the duration is the cost. `price` [W]: of time, beside the problem's own objective.
     """
 
     p: Array
@@ -29,6 +29,7 @@ class DurationInterval:
     t_max: float
     constant: float = 0.0
     minimum_time: bool = False
+    price: float = 0.0
 
 
 def duration_intervals(

@@ -12,10 +12,12 @@ from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.kinematics.course_tracing import path_ratios
 from optimizer.methods.duration_intervals import DurationInterval
+from optimizer.methods.even_speed import EvenSpeed
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
 from optimizer.methods.tool_turning import turned_paths
+from optimizer.problem.tool_path import ToolPath
 from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
 from optimizer.trajectories.spline import Spline, sample
@@ -70,7 +72,7 @@ class ToolPathMotion(Method):
             if slow is not None:
                 return SolveResult(SolveStatus.INFEASIBLE, OUT_OF_REACH.format(*slow))
         results = [self._kept(path, interval, self._scaling(1)) for interval in self._intervals()]
-        if all(result.spline is None for result in results):
+        if all(result.spline is None for result in results) and not self._holds_speed:
             # what the first space cannot express, a finer one may: a motion that is nearly the fastest one
             results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
         found = self._clear(min(results, key=lambda result: self.prepared.cost_of(result.spline)))
@@ -86,10 +88,19 @@ class ToolPathMotion(Method):
             return found
         return SolveResult(SolveStatus.FAILED, f"along the path, {hit.message}", collision=hit)
 
+    @property
+    def _tool_path(self) -> ToolPath:
+        assert self.prepared.problem.tool_path is not None
+        return self.prepared.problem.tool_path
+
+    @property
+    def _holds_speed(self) -> bool:
+        """Whether the speed of the TCP is fixed."""
+        return self._tool_path.fixed_speed is not None
+
     def _may_turn(self) -> bool:
         """Whether the tool may turn about an axis, and its turning has not been looked for before."""
-        path = self.prepared.problem.tool_path
-        return path is not None and path.about is not None and not self.prepared.is_chosen(self.q_start)
+        return self._tool_path.about is not None and not self.prepared.is_chosen(self.q_start)
 
     def _turned(self, law: tuple[Array, Array], scaling: Basis, least: float) -> list[SolveResult]:
         """Motions with other turnings of the tool, which are looked for with a law of times [s] and fractions (k,).
@@ -120,7 +131,9 @@ class ToolPathMotion(Method):
         results, law = [SolveResult(SolveStatus.FAILED, NOT_FINER)], _on_path(path, q, t)
         try:
             with watch(self.deadline):
-                if scaling.n > MOST_SPANS + DEGREE:
+                if self._holds_speed:
+                    results.append(self._clear(self._kept(path, self.interval, scaling)))
+                elif scaling.n > MOST_SPANS + DEGREE:
                     scaling = self._scaling(1)
                 else:
                     results.append(self._kept(path, self.interval, scaling, law))
@@ -166,8 +179,13 @@ class ToolPathMotion(Method):
     ) -> SolveResult:
         """The time scaling of least cost, in a space of motions that is fine enough for the tolerance.
 
-        `law` is a guess: times (k,) [s], and the fractions (k,) of the path there.
+        `law` is a guess: times (k,) [s], and the fractions (k,) of the path there. At a fixed speed only the ramps are
+        chosen.
         """
+        if self._holds_speed:
+            speed = self._tool_path.fixed_speed
+            assert speed is not None
+            return EvenSpeed(self.prepared, path, interval, speed, self._keeps_to_path).solve()
         results, x = list[SolveResult](), None
         t, s = law or self._paced(path)
         spans = min(len(np.unique(path.knots)) + MORE_SPANS, FIRST_SPANS)

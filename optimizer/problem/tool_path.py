@@ -23,6 +23,8 @@ POSITION_TOLERANCE, ROTATION_TOLERANCE = 1e-4, 1.745e-3
 TURNING = 0.25
 # m: way at either end of a path on which it may be slower than its least speed, unless given, and least of it
 RAMP, LEAST_RAMP = 0.02, 1e-3
+# a fixed speed is held within this share of it
+SPEED_TOLERANCE = 1e-3
 # a greatest speed must be so many times the least one: a motion needs some freedom between them
 SPEED_RANGE = 1.05
 # poses that are nearer than this [m] along the path are one
@@ -49,7 +51,8 @@ class ToolPath:
     the one pose of `via` and the goal. The motion may be off by at most `position_tolerance` [m] and
     `rotation_tolerance` [rad]. With `about`, an axis (3,) of the TCP, the tool may turn about it between the ends as it
     likes: the tolerance is for the direction of the axis then. The TCP is no slower than `least_speed` [m/s], but
-    within `ramp` [m] of either end. With a `section` only this part of the path is followed.
+    within `ramp` [m] of either end. A `fixed_speed` [m/s] is held between the ramps within SPEED_TOLERANCE of it, and
+    not exceeded by more on them. With a `section` only this part of the path is followed.
 
     Raises InvalidProblem, with the field named.
     """
@@ -61,6 +64,7 @@ class ToolPath:
     rotation_tolerance: float = ROTATION_TOLERANCE
     about: Sequence[float] | None = None
     least_speed: float | None = None
+    fixed_speed: float | None = None
     ramp: float = RAMP
     section: Section | None = None
 
@@ -80,6 +84,10 @@ class ToolPath:
             if not (np.isfinite(value) and value >= LEAST_TOLERANCE):
                 field = f"path.tolerance.{name.removesuffix('_tolerance')}"
                 raise InvalidProblem(field, f"{field} must be at least {LEAST_TOLERANCE:g}.")
+        if self.fixed_speed is not None:
+            if not (np.isfinite(self.fixed_speed) and self.fixed_speed > 0):
+                raise InvalidProblem("path.speed", "path.speed must be a positive number of metres per second.")
+            object.__setattr__(self, "least_speed", self.fixed_speed * (1 - SPEED_TOLERANCE))
         if self.least_speed is not None and not (np.isfinite(self.least_speed) and self.least_speed > 0):
             raise InvalidProblem("path.speed.min", "path.speed.min must be a positive number of metres per second.")
         if not (np.isfinite(self.ramp) and self.ramp >= LEAST_RAMP):
@@ -97,6 +105,14 @@ class ToolPath:
 
     def check_speed(self, most: float | None) -> None:
         """Raises InvalidProblem if the least speed leaves no room below the greatest one, `most` [m/s]."""
+        if self.fixed_speed is not None:
+            if most is not None and most < self.fixed_speed * (1 + SPEED_TOLERANCE):
+                raise InvalidProblem(
+                    "path.speed",
+                    f"On the path the TCP may be no faster than {most:.4g} m/s: give a fixed path.speed of at most "
+                    f"{most / (1 + SPEED_TOLERANCE):.4g} m/s.",
+                )
+            return
         if self.least_speed is not None and most is not None and most < SPEED_RANGE * self.least_speed:
             raise InvalidProblem(
                 "path.speed.min",

@@ -16,10 +16,11 @@ from optimizer.problem.cycle import Cycle, Hold
 from optimizer.problem.free_order import FreeOrder, check_order
 from optimizer.problem.names import check_name, first_repeated
 from optimizer.problem.pose import Pose
-from optimizer.problem.problem import LONGEST_DURATION, MethodName
+from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
 from optimizer.problem.targets import Target, members, validated
+from optimizer.solution import Objective
 
 MOST_STOPS = 100
 # stops that one motion passes through: the effort of its nonlinear program grows with their square and more
@@ -32,7 +33,7 @@ START = "start"
 
 @dataclass(frozen=True, kw_only=True)
 class WorkRound:
-    """A request for the round of least electrical energy: from `start` over all `stops`, in their order or a free one.
+    """A request for the round of least energy: from `start` over all `stops`, in their order or a free one.
 
     `start` is a target like those of the stops, `branch` restricts its branches; `arm` carries its payload from the
     start to the first stop that changes it. A `closed` round ends in the configuration in which it started, full turns
@@ -41,6 +42,9 @@ class WorkRound:
     counts; else the one nearest to the middle of the joints' ranges. `hold`, `brake_delay` [s] and `brake_power` [W]
     say how the arm dwells and waits, as in `Cycle`; it waits at `wait`, a stop or the start (None: where that costs
     least).
+
+    The `objective` "mechanical" is the work of all moves. Slower moves do less, so it needs a `duration_max`; rests do
+    none.
 
     With `stopping` the arm rests at the stops that it would pass through, too: what passing is compared with.
 
@@ -56,6 +60,7 @@ class WorkRound:
     order: FreeOrder | None = None
     branch: BranchFilter | None = None
     method: MethodName = "bspline"
+    objective: Objective = "electrical"
     windings: bool = True
     hold: Hold = "motors"
     brake_delay: float = 0.0
@@ -88,8 +93,6 @@ class WorkRound:
                 self._check_passed(k, stop)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
         self.arm.check_rating("payload.mass", self.arm.payload.mass)
-        if self.arm.bus.mode == "storage":
-            raise InvalidProblem("bus.mode", "A round has no energy storage on the bus: use another mode.")
         for name in ("sample_period", "deadline"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
@@ -139,6 +142,10 @@ class WorkRound:
                 f"The arm passes through stop {stop.name!r} without a rest: leave out its {field}, or set its pass to "
                 "false.",
             )
+        if self.objective == "mechanical":
+            raise InvalidProblem(
+                f"stops.{k}.pass", "A round of least mechanical work rests at every stop: set pass to false."
+            )
         if self.order is not None:
             raise InvalidProblem(
                 f"stops.{k}.pass",
@@ -182,11 +189,22 @@ class WorkRound:
                 raise InvalidProblem("time", f"time must be above 0 and at most {LONGEST_ROUND:g} s.")
         if self.duration_min is not None and self.duration_max is not None and self.duration_min > self.duration_max:
             raise InvalidProblem("time", "time.min must not exceed time.max.")
+        if self.objective == "mechanical" and self.duration_max is None:
+            raise InvalidProblem(
+                "time",
+                "The mechanical objective has no best duration of its own: give the round a time or a time.max.",
+            )
 
     @property
     def dwelling(self) -> float:
         """Time [s] of all dwells."""
         return sum(stop.dwell for stop in self.stops)
+
+    @property
+    def longest_move(self) -> float:
+        """Longest duration [s] of a move."""
+        most = np.inf if self.duration_max is None else self.duration_max - self.dwelling
+        return float(np.clip(most, LEAST_DURATION, LONGEST_DURATION))
 
     def waiting(self, length: float) -> Cycle:
         """A wait of `length` [s], as the wait after a motion of no duration."""

@@ -164,6 +164,60 @@ class EnergyRange:
         links = (v @ self.lengths) ** 2 @ self.masses + np.cumsum(v, axis=1) ** 2 @ spin
         return np.asarray((rotors + links) / 2)
 
+    def fall(self, ends: Array, least: Array, duration: Array) -> tuple[Array, Array]:
+        """Least potential energy and A min(t, T - t), both (P, CELLS), in the cells of motions of `duration` (P,) [s].
+
+        `ends` (P, 2) [J] are the potential energies of start and goal, `least` (P,) [J] is that of all configurations.
+        """
+        limits = self.prepared.problem.arm.active_limits
+        edges = duration[:, None] * np.linspace(0.0, 1.0, CELLS + 1)
+        left, right = edges[:, :-1], edges[:, 1:]
+
+        def fallen(t: Array) -> Array:
+            t = t[..., None]
+            rates = np.minimum(np.minimum(limits.v_max * t, limits.a_max * t**2 / 2), limits.j_max * t**3 / 6)
+            return np.asarray(rates @ self.slopes)
+
+        near = np.maximum(ends[:, :1] - fallen(right), ends[:, 1:] - fallen(duration[:, None] - left))
+        most = float(np.sqrt(limits.a_max**2 @ self.prepared.problem.arm.drives.rotor_inertia))
+        return np.maximum(near, least[:, None]), most * np.minimum(right, duration[:, None] - left)
+
+
+@dataclass(frozen=True)
+class Swing:
+    """How high and how low motions have to go on their way: potential energies (P,) [J].
+
+    `ends` (P, 2) are those of start and goal. Every motion comes to `top` at least, if it does not start or end higher,
+    and down to `bottom` at least, if what it has there is not kinetic (`variation` allows for that). No configuration
+    has less than `least`.
+    """
+
+    arm: EnergyRange
+    ends: Array
+    top: Array
+    bottom: Array
+    least: Array
+
+    @classmethod
+    def of(cls, arm: EnergyRange, q_start: Array, q_goal: Array, ends: Array) -> Swing:
+        """The swing of motions from q_start to q_goal (P, nq) [rad]."""
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        if arm.leading is None:
+            return cls(arm, ends, high, low, np.full(len(ends), -np.inf))
+        wave, constant, beyond = arm.lumped
+        crest, trough = _extremes(wave, q_start[:, arm.leading], q_goal[:, arm.leading])
+        least = np.full(len(ends), constant - float(np.hypot(*wave)) - beyond)
+        return cls(arm, ends, np.maximum(high, constant + crest - beyond), constant + trough + beyond, least)
+
+    def variation(self, duration: Array) -> Array:
+        """(2) (P,) [J] for motions of at most `duration` (P,) [s]."""
+        first, last = self.ends.T
+        low = self.ends.min(axis=1)
+        fast = 0.0 if self.arm.leading is None else self.arm.most_kinetic(duration)
+        bottom = np.minimum(low, self.bottom + fast)
+        span = self.top - bottom
+        return np.asarray(span + np.minimum(self.top - first + last - bottom, first - bottom + self.top - last))
+
 
 def mechanical_bounds(prepared: PreparedProblem, q_start: Array, q_goal: Array, potentials: Array) -> Array:
     """Bounds (P,) [J] on the mechanical work of motions from q_start to q_goal (P, nq) [rad].
@@ -172,19 +226,9 @@ def mechanical_bounds(prepared: PreparedProblem, q_start: Array, q_goal: Array, 
     """
     arm, problem = EnergyRange(prepared), prepared.problem
     longest = np.full(len(q_start), LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
-    low, high = potentials.min(axis=1), potentials.max(axis=1)
-    least = np.full(len(q_start), -np.inf) if arm.leading is not None else low
-    top, bottom = high, low
-    if arm.leading is not None:
-        wave, constant, beyond = arm.lumped
-        crest, trough = _extremes(wave, q_start[:, arm.leading], q_goal[:, arm.leading])
-        top = np.maximum(high, constant + crest - beyond)
-        bottom = np.minimum(low, constant + trough + beyond + arm.most_kinetic(longest))
-        least = np.full(len(q_start), constant - float(np.hypot(*wave)) - beyond)
-    first, last = potentials.T
-    varied = top - bottom + np.minimum(top - first + last - bottom, first - bottom + top - last)
-    travelled = 2 * _least_energy(arm, q_goal - q_start, potentials, least, longest) - first - last
-    return np.asarray(np.maximum(np.maximum(varied, travelled) - 4 * arm.rounding, 0.0))
+    swing = Swing.of(arm, q_start, q_goal, potentials)
+    travelled = 2 * _least_energy(arm, q_goal - q_start, potentials, swing.least, longest) - potentials.sum(axis=1)
+    return np.asarray(np.maximum(np.maximum(swing.variation(longest), travelled) - 4 * arm.rounding, 0.0))
 
 
 def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
@@ -200,32 +244,21 @@ def _extremes(wave: Array, one: Array, other: Array) -> tuple[Array, Array]:
     return crest, np.where(holds(phase + np.pi), -size, ends.min(axis=0))
 
 
+def most_travel(potential: Array, fastest: Array, energy: Array, duration: Array | float) -> Array:
+    """The right-hand side (P,) of (3) with `energy` (P, 1) [J]; the others as `EnergyRange.fall` gives them."""
+    speed = np.minimum(np.sqrt(2 * np.maximum(energy - potential, 0.0)), fastest)
+    return np.asarray(speed.sum(axis=1) * duration / CELLS)
+
+
 def _least_energy(arm: EnergyRange, displacement: Array, potentials: Array, least: Array, duration: Array) -> Array:
     """The least e (P,) [J] for which (3) holds, rounded down, at least the greater potential energy of the ends."""
-    limits, rotors = arm.prepared.problem.arm.active_limits, arm.prepared.problem.arm.drives.rotor_inertia
-    edges = duration[:, None] * np.linspace(0.0, 1.0, CELLS + 1)
-    left, right = edges[:, :-1], edges[:, 1:]
-
-    def fall(t: Array) -> Array:
-        t = t[..., None]
-        return np.asarray(
-            np.minimum(np.minimum(limits.v_max * t, limits.a_max * t**2 / 2), limits.j_max * t**3 / 6) @ arm.slopes
-        )
-
-    ends = np.maximum(potentials[:, :1] - fall(right), potentials[:, 1:] - fall(duration[:, None] - left))
-    potential = np.maximum(ends, least[:, None])
-    fastest = float(np.sqrt(limits.a_max**2 @ rotors)) * np.minimum(right, duration[:, None] - left)
-    needed = np.sqrt(displacement**2 @ rotors)
-
-    def reached(e: Array) -> Array:
-        speed = np.minimum(np.sqrt(2 * np.maximum(e[:, None] - potential, 0.0)), fastest)
-        return np.asarray(speed.sum(axis=1) * duration / CELLS)
-
+    needed = np.sqrt(displacement**2 @ arm.prepared.problem.arm.drives.rotor_inertia)
+    potential, fastest = arm.fall(potentials, least, duration)
     low = potentials.max(axis=1)
     # an average speed of |Δq|_D / T needs this much above the greatest bound of the potential energy, or less
     high = np.maximum(low, potential.max(axis=1)) + 2 * (needed / duration) ** 2
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        enough = reached(middle) >= needed
+        enough = most_travel(potential, fastest, middle[:, None], duration) >= needed
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
     return np.asarray(low)

@@ -73,11 +73,8 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
     Only the method's `guess_baselines` are initial guesses. If one still needs less energy and is of the method's own
     kind (`accepted_baselines`), it becomes the answer itself: what another parametrisation does better is not.
     """
-    if incumbent.problem.tool_path is not None:
-        return path_baselines(incumbent, best)
-    if incumbent.problem.passes:
-        assert best.energy is not None
-        return stopping_baselines(incumbent.prepared, best.spline, best.energy)
+    if incumbent.problem.tool_path is not None or incumbent.problem.passes:
+        return baselines_of(incumbent, best)
     for last, fine in ((False, False), (False, True), (True, True)):
         table, q_nearest = _table(incumbent, best)
         usable = incumbent.method.accepted_baselines if last else incumbent.method.guess_baselines
@@ -104,6 +101,16 @@ def compare_with_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseli
                 solve_from(incumbent, candidate, (motions[name].q, motions[name].t), fine)
         best = incumbent.best() or best
     return _table(incumbent, incumbent.best() or best)[0]
+
+
+def baselines_of(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
+    """The baselines of a solved candidate as they are, whether they need less or not."""
+    if incumbent.problem.tool_path is not None:
+        return path_baselines(incumbent, best)
+    if incumbent.problem.passes:
+        assert best.energy is not None
+        return stopping_baselines(incumbent.prepared, best.spline, best.energy)
+    return _table(incumbent, best)[0]
 
 
 def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Array]:

@@ -28,7 +28,7 @@ from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_others
 from optimizer.search.path_ends import bound_beside, path_candidates
-from optimizer.search.refinement import compare_with_baselines, refine
+from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
 from optimizer.search.seeds import activate_seeds
 from optimizer.search.sliding import slides
@@ -112,7 +112,7 @@ class Run:
         result = SolveResult(SolveStatus.SOLVED, "a known motion", spline=spline, stationarity=stationarity)
         incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(spline))
         incumbent.cut_short = not is_optimal
-        answer = self.answer(candidate, compare_with_baselines(incumbent, candidate))
+        answer = self.answer(candidate, baselines_of(incumbent, candidate))
         if answer is None:
             incumbent.reject(candidate)
             raise self.no_trajectory()

@@ -14,7 +14,7 @@ from optimizer.sequence.layers import Layer
 from optimizer.sequence.passing_leg import PassingLeg
 from optimizer.sequence.round_baselines import compared
 from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
+from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution
 from optimizer.solution import Solution
 from optimizer.trajectories.joined import joined
 
@@ -45,13 +45,14 @@ def moves_between_rests(asked: WorkRound, stopping: RoundSolution) -> Iterator[l
 
 def start_from(search: RoundSearch, stopping: RoundSolution) -> Rested:
     """Solve the pairs of the round with rests first, those with passes from its motions."""
-    chain, energy = list[int](), stopping.known.energy
+    chain, known = list[int](), stopping.needed.electrical
+    energy = known.energy
     for k, moves in enumerate(moves_between_rests(search.asked, stopping)):
         leg = search.legs[k]
         q = [moves[0].solution.start.q, *(move.solution.goal.q for move in moves)]
         nodes = [_node(layer, each) for layer, each in zip(leg.layers, q, strict=True)]
         if any(node is None for node in nodes):
-            return Rested(stopping, [], stopping.known)
+            return Rested(stopping, [], known)
         s, *route, g = (node for node in nodes if node is not None)
         chain += [s, g] if not chain else [g]
         if isinstance(leg, PassingLeg):
@@ -61,7 +62,7 @@ def start_from(search: RoundSearch, stopping: RoundSolution) -> Rested:
             energy -= sum(move.solution.energy.electrical.total for move in moves)
         if not search.search_end.passed and not leg.known(s, g):
             search.try_kind(k, s, g)
-    return Rested(stopping, chain, replace(stopping.known, energy=energy))
+    return Rested(stopping, chain, replace(known, energy=energy))
 
 
 def as_passed(search: RoundSearch, rested: Rested, better: bool = True) -> tuple[list[Solution], dict[int, Wait]]:
@@ -83,18 +84,22 @@ def _node(layer: Layer, q: Array) -> int | None:
     return int(found[0]) if len(found) else None
 
 
-def stopping_baselines(asked: WorkRound, rested: Rested, ours: Known) -> list[RoundBaseline]:
+def stopping_baselines(asked: WorkRound, rested: Rested, ours: Needed) -> list[RoundBaseline]:
     """The round with rests, and its own baselines, compared with ours."""
     solution = rested.solution
-    theirs = compared(asked, "stopping", solution.duration, rested.known, True, ours)
+    theirs = compared(asked, "stopping", solution.duration, _of_rested(rested), True, ours)
     others = [
-        compared(asked, each.name, each.duration, _known(each, rested), each.within_limits, ours)
+        compared(asked, each.name, each.duration, _needed(each, rested), each.within_limits, ours)
         for each in solution.baselines
     ]
     return [theirs, *others]
 
 
-def _known(baseline: RoundBaseline, rested: Rested) -> Known:
-    """Energy of a baseline: that of the round with rests, if it is this round by another name."""
-    is_same = np.isclose(baseline.electrical, rested.solution.known.energy, rtol=SAME, atol=0)
-    return rested.known if is_same else baseline.known
+def _of_rested(rested: Rested) -> Needed:
+    return Needed(rested.known, rested.solution.needed.mechanical)
+
+
+def _needed(baseline: RoundBaseline, rested: Rested) -> Needed:
+    """What a baseline needs: what the round with rests does, if it is this round by another name."""
+    is_same = np.isclose(baseline.electrical, rested.solution.needed.electrical.energy, rtol=SAME, atol=0)
+    return _of_rested(rested) if is_same else baseline.needed

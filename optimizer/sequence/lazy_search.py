@@ -20,6 +20,8 @@ from optimizer.trajectories.spline import Spline
 
 # share of the search's time left that one leg may take: among obstacles, one without a way would take all of it
 SHARE_OF_A_LEG = 1 / 8
+# J: a chain is no better than another one by less
+SAME = 1e-9
 
 
 class LazySearch(ABC):
@@ -57,7 +59,7 @@ class LazySearch(ABC):
             value = self.attempt(k, centre_s, centre_g)
         if value is not None:
             leg.set_kind(kind, value)
-        # a leg with passes weighs more than its bound before it is solved
+        # some legs weigh more than their bounds before they are solved
         if leg.cost[s, g] < before:
             self._chain.lower(before - float(leg.cost[s, g]))
 
@@ -97,6 +99,12 @@ class LazySearch(ABC):
                     return self._least_solved() or nodes
                 self.try_kind(*each)
             self.chain_tried(nodes)
+
+    @property
+    def leaves_chains(self) -> bool:
+        """Whether some chain has a bound below the least one found: if unsolved legs weigh more than their bounds."""
+        costs = [np.where(leg.is_solved, leg.cost, leg.least_costs) for leg in self.legs]
+        return LeastChain(costs, self.closed).find()[0] < self._chain.find()[0] - SAME
 
     @abstractmethod
     def chain_tried(self, nodes: list[int]) -> None:

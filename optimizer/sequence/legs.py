@@ -17,7 +17,9 @@ from models.robot import Array, Mask
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.search.lower_bound import lower_bounds, priced_bounds
+from optimizer.problem.problem import LONGEST_DURATION
+from optimizer.search.lower_bound import priced_bounds
+from optimizer.search.priced_work import priced_work_bounds
 from optimizer.sequence.layers import Layer
 from optimizer.trajectories.spline import Spline
 
@@ -36,10 +38,11 @@ class Leg:
     """All motions from one layer to the next.
 
     `kind` (s, g) numbers the kinds of the pairs; it is -1 for one that no motion may connect. `pair` (k, 2) is the pair
-    of each kind that is farthest from the joints' limits, `displacement` (k, nq) [rad] and `gain` (k,) [J] of potential
-    energy are those of the kinds, and `bound` (k,) [J] is proven. `cost` (s, g) [J] is the bound of a pair that is not
-    solved, the energy found of one that is, and inf of one without a motion; with it comes the `dwell` (g,) [J] at the
-    goal. `solved` has the energies of kinds, `exact` those of pairs, without the dwell.
+    of each kind that is farthest from the joints' limits, `displacement` (k, nq) [rad] and `levels` (k, 2) [J],
+    the potential energies at both ends, are those of the kinds, and `bound` (k,) [J] on the objective is proven. `cost`
+    (s, g) [J] is the bound of a pair that is not solved, or more where bounds are weak, the objective found of one that
+    is, and inf of one without a motion; with it comes what the `dwell` (g,) [J] at the goal adds to it. `solved` has
+    the objectives of kinds, and `exact` those of pairs, without the dwell.
     """
 
     prepared: PreparedProblem
@@ -48,7 +51,7 @@ class Leg:
     kind: npt.NDArray[np.intp]
     pair: npt.NDArray[np.intp]
     displacement: Array
-    gain: Array
+    levels: Array
     bound: Array
     dwell: Array
     cost: Array
@@ -92,20 +95,22 @@ class Leg:
     ) -> Leg:
         """The leg of given kinds, with their bounds."""
         potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
-        gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
+        levels = np.column_stack([potential[0][start.end[pair[:, 0]]], potential[1][goal.end[pair[:, 1]]]])
         displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
-        bound = bounds_of(lambda x, gain: lower_bounds(prepared, x, gain)[0], displacement, gain)
-        return cls(prepared, start, goal, kind, pair, displacement, gain, bound, dwell, _costs(bound, kind, dwell))
+        longest = LONGEST_DURATION if prepared.problem.duration_max is None else prepared.problem.duration_max
+        bound = _kind_bounds(prepared, start.q[pair[:, 0]], displacement, levels, 0.0, longest)
+        cost = _costs(bound + _beyond(prepared, displacement), kind, dwell)
+        return cls(prepared, start, goal, kind, pair, displacement, levels, bound, dwell, cost)
 
     def priced(self, price: float, longest: float) -> Leg:
-        """The same leg with what energy + price · duration needs, of motions of at most `longest` [s]; none solved.
+        """The same leg with what objective + price · duration needs, of motions of at most `longest` [s]; none solved.
 
         `price` [W]; dwells last as long as they do.
         """
-        bound = bounds_of(
-            lambda x, gain: priced_bounds(self.prepared, x, gain, price, longest), self.displacement, self.gain
-        )
-        return replace(self, bound=bound, cost=_costs(bound, self.kind, self.dwell), solved={}, exact={})
+        q_start = self.start.q[self.pair[:, 0]]
+        bound = _kind_bounds(self.prepared, q_start, self.displacement, self.levels, price, longest)
+        cost = _costs(bound + _beyond(self.prepared, self.displacement), self.kind, self.dwell)
+        return replace(self, bound=bound, cost=cost, solved={}, exact={})
 
     def prepared_for(self, s: int, g: int) -> PreparedProblem:
         """The problem of a pair's motion: what reaches another target goes along another line."""
@@ -193,11 +198,35 @@ def _costs(of_kind: Array, kind: npt.NDArray[np.intp], dwell: Array) -> Array:
     return np.where(kind < 0, np.inf, of_kind[kind] + dwell)
 
 
-def bounds_of(bound: Callable[[Array, Array], Array], displacement: Array, gain: Array) -> Array:
-    """Proven lower bounds (k,) [J] of the kinds, by a `bound` on joint displacements and gains of potential energy."""
+def _beyond(prepared: PreparedProblem, displacement: Array) -> Array:
+    """How much more than its bound a kind weighs while it is not solved (k,) [J]: an estimate, for mechanical work.
+
+    The bounds on work hardly tell long ways from short ones. What friction takes on the way, which is no part of this
+    work, does.
+    """
+    if prepared.problem.objective == "electrical":
+        return np.zeros(len(displacement))
+    return np.asarray(np.abs(displacement) @ prepared.arm.friction_law.coulomb)
+
+
+def _kind_bounds(
+    prepared: PreparedProblem, q_start: Array, displacement: Array, levels: Array, price: float, longest: float
+) -> Array:
+    """Proven lower bounds (k,) [J] on objective + price · duration of kinds, of motions of at most `longest` [s]."""
+    if prepared.problem.objective == "mechanical":
+        return bounds_of(
+            lambda q, x, ends: priced_work_bounds(prepared, q, q + x, ends, price, longest),
+            q_start, displacement, levels,
+        )  # fmt: skip
+    return bounds_of(
+        lambda x, ends: priced_bounds(prepared, x, ends[:, 1] - ends[:, 0], price, longest), displacement, levels
+    )
+
+
+def bounds_of(bound: Callable[..., Array], *rows: Array) -> Array:
+    """Proven lower bounds (k,) [J], by a `bound` on rows (k, ...) of some quantities."""
     bounds = []
-    for low in range(0, len(gain), KINDS_PER_CHECK):
+    for low in range(0, len(rows[0]), KINDS_PER_CHECK):
         checkpoint()
-        part = slice(low, low + KINDS_PER_CHECK)
-        bounds.append(bound(displacement[part], gain[part]))
+        bounds.append(bound(*(each[low : low + KINDS_PER_CHECK] for each in rows)))
     return np.concatenate(bounds)

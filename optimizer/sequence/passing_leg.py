@@ -78,8 +78,8 @@ class PassingLeg(Leg):
         beyond = (LIKELY - 1) * np.abs(least) if beyond is None else beyond
         return cls(
             prepared, start, goal, kind, np.column_stack(np.unravel_index(np.arange(least.size), least.shape)),
-            np.zeros((0, start.q.shape[1])), np.zeros(0), least.ravel(), direct.dwell, least + beyond + direct.dwell,
-            between=between, direct=direct, travel=travel, beyond=beyond,
+            np.zeros((0, start.q.shape[1])), np.zeros((0, 2)), least.ravel(), direct.dwell,
+            least + beyond + direct.dwell, between=between, direct=direct, travel=travel, beyond=beyond,
         )  # fmt: skip
 
     def priced(self, price: float, longest: float) -> PassingLeg:

@@ -1,4 +1,4 @@
-"""Motions and chains at a price of time: what needs the least energy + price · duration."""
+"""Motions and chains at a price of time: what needs the least objective + price · duration."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from optimizer.trajectories.spline import Spline, sampled
 
 @dataclass(frozen=True)
 class PricedMotion:
-    """A motion of `energy` [J]."""
+    """A motion with its objective, `energy` [J]."""
 
     spline: Spline
     energy: float
@@ -34,11 +34,13 @@ class PricedMotion:
 def priced_motion(
     leg: Leg, s: int, g: int, price: float, longest: float, deadline: Deadline, guess: Spline | None = None
 ) -> PricedMotion | None:
-    """The motion of a pair of least energy + price · duration; None if none is found before the deadline.
+    """The motion of a pair of least objective + price · duration; None if none is found before the deadline.
 
     `price` [W], `longest` [s]; `guess` is a motion of the same pair, of another duration perhaps.
     """
-    interval = DurationInterval(leg.prepared.parameters(electrical=1.0, time=price), LEAST_DURATION, longest)
+    weights = {leg.prepared.problem.objective: 1.0}
+    p = leg.prepared.parameters(**weights, time=price)
+    interval = DurationInterval(p, LEAST_DURATION, longest, price=price)
     return _solved(leg, s, g, interval, deadline, guess)
 
 
@@ -59,7 +61,7 @@ def _solved(
         return None
     if not result.cut_short:
         motions.keep(key, KnownMotion(result.spline, result.stationarity))
-    return PricedMotion(result.spline, leg.prepared.energy(result.spline).electrical.total)
+    return PricedMotion(result.spline, leg.prepared.cost_of(result.spline))
 
 
 def _looked_for(
@@ -83,7 +85,7 @@ class PricedSearch(LazySearch):
         self.motions: dict[tuple[int, int, int], PricedMotion] = {}
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Energy + price · duration of a pair's motion [J]; inf if none is found, None once the time is up."""
+        """Objective + price · duration of a pair's motion [J]; inf if none is found, None once the time is up."""
         deadline = self.search_end.within(SHARE_OF_A_LEG * self.search_end.left)
         found = priced_motion(self.legs[k], s, g, self.price, self.longest, deadline)
         if found is None and deadline.passed:

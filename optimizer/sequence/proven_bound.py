@@ -23,7 +23,7 @@ from optimizer.sequence.rests import least_holding_power, rest_energy
 
 
 def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> float:
-    """Lower bound [J] on the electrical energy of all rounds with rests at the stops.
+    """Lower bound [J] on the objective of all rounds with rests at the stops.
 
     Where configurations are samples of infinitely many, or some may be missing, one more stands for all that are not
     known, with a bound that holds for each of them.
@@ -48,7 +48,8 @@ def bounded_costs(asked: WorkRound, move: PlannedMove, leg: Leg, deadline: Deadl
     if not open_start and not open_goal:
         return costs
     least = _of_curves(leg, deadline) if leg.start.complete and leg.goal.complete else _of_any(leg)
-    dwell = rest_energy(asked, move, move.dwell, least_holding_power(move))
+    electrical = asked.objective == "electrical"
+    dwell = rest_energy(asked, move, move.dwell, least_holding_power(move)) if electrical else 0.0
     if open_goal:
         costs = np.hstack([costs, np.full((len(costs), 1), least + dwell)])
     if open_start:

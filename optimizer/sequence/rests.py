@@ -56,3 +56,9 @@ def rest_sensitivity(asked: WorkRound, move: PlannedMove, length: float, q: Arra
 def dwell_energies(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:
     """Energy (n,) [J] of the dwell after a move, in each configuration of its goal."""
     return np.array([rest_energy(asked, move, move.dwell, hold) for hold in holding_powers(move, goal).tolist()])
+
+
+def dwell_costs(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:
+    """What the dwell after a move adds to the objective (n,) [J], in each configuration of its goal: standing still
+    needs no work."""
+    return dwell_energies(asked, move, goal) if asked.objective == "electrical" else np.zeros(len(goal.q))

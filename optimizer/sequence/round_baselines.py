@@ -15,9 +15,9 @@ from optimizer.exceptions import DeadlineExceeded, JoulepathError
 from optimizer.problem.free_order import is_given_order_allowed
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.baselines import baselines, nearest, saving
-from optimizer.sequence.rests import rest_sensitivity
+from optimizer.sequence.rests import dwell_energies, rest_sensitivity
 from optimizer.sequence.round_search import RoundSearch
-from optimizer.sequence.round_solution import RoundBaseline, RoundBaselineName, RoundSolution
+from optimizer.sequence.round_solution import Needed, RoundBaseline, RoundBaselineName, RoundSolution
 from optimizer.sequence.time_sharing import duration_of
 from optimizer.sequence.timed_round import TimedSearch
 from optimizer.solution import Baseline, Sensitivity, Solution
@@ -53,18 +53,24 @@ def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
     return nodes if all(each in search.solutions for each in search.pairs(nodes)) else None
 
 
-def same_factor(timing: TimedSearch, nodes: list[int], ours: Known) -> RoundBaseline | None:
-    """The chain's moves of least energy, all of them slowed or sped up by one factor; None if some are not known."""
+def same_factor(timing: TimedSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
+    """The chain's moves of least energy, all of them slowed or sped up by one factor; None if some are not known.
+
+    Of least mechanical work no move has a duration of its own: the fastest moves are slowed.
+    """
     search = timing.search
-    free = [search.solutions.get(each) for each in search.pairs(nodes)]
-    own = [each.trajectory.spline for each in free if each is not None]
-    if len(own) < len(free):
+    if search.asked.objective == "mechanical":
+        own = [each.spline for each in timing.fastest(nodes) or []]
+    else:
+        free = [search.solutions.get(each) for each in search.pairs(nodes)]
+        own = [each.trajectory.spline for each in free if each is not None]
+    if len(own) < len(search.legs):
         return None
     factor = timing.time / sum(spline.duration for spline in own)
     return _in_time(timing, "same_factor", nodes, [lasting(spline, spline.duration * factor) for spline in own], ours)
 
 
-def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: Known) -> RoundBaseline | None:
+def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: Needed) -> RoundBaseline | None:
     """The chain's moves as fast as they can be, all the time that is left waited out; None if some are not found."""
     fast = timing.fastest(nodes)
     if fast is None or duration_of(fast) > timing.time:
@@ -73,7 +79,7 @@ def fastest_then_wait(timing: TimedSearch, nodes: list[int], ours: Known) -> Rou
 
 
 def _in_time(
-    timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: Known
+    timing: TimedSearch, name: RoundBaselineName, nodes: list[int], splines: list[Spline], ours: Needed
 ) -> RoundBaseline | None:
     """The baseline of a chain with given motions; the time that they leave is waited out where it draws least.
 
@@ -84,10 +90,11 @@ def _in_time(
     waited = timing.time - sum(spline.duration for spline in splines)
     at, wait = timing.cheapest_wait(nodes, waited)
     prepared = [search.legs[k].prepared for (k, _, _), _ in pairs]
-    moving = sum(leg.energy(spline).electrical.total for leg, spline in zip(prepared, splines, strict=True))
-    total = moving + search.dwells(nodes) + wait
+    moving = [leg.energy(spline) for leg, spline in zip(prepared, splines, strict=True)]
+    total = sum(each.electrical.total for each in moving) + dwelling(search, nodes) + wait
     sensitivity = reduce(add, [leg.sensitivity(spline) for leg, spline in zip(prepared, splines, strict=True)])
-    theirs = Known(total, sensitivity + resting(search, nodes, at, waited), sum(each.duration for each in splines))
+    known = Known(total, sensitivity + resting(search, nodes, at, waited), sum(each.duration for each in splines))
+    theirs = Needed(known, sum(each.mechanical.total for each in moving))
     try:
         with watch(search.end):
             held = all(search.confirms(*pair, spline) for pair, spline in pairs)
@@ -106,39 +113,41 @@ def given_order(asked: WorkRound, left: float, ours: RoundSolution, clock: Clock
         return None
     try:
         search = RoundSearch(replace(asked, order=None, deadline=left), clock)
-        return of_chain(search, search.run(), "given_order", ours.known)
+        return of_chain(search, search.run(), "given_order", ours.needed)
     except JoulepathError:
         return None
 
 
-def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, ours: Known) -> RoundBaseline | None:
+def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, ours: Needed) -> RoundBaseline | None:
     """The baseline of a chain whose motions are known; `ours` is what it is compared with.
 
     None if it takes another time than is asked for.
     """
     moves = [search.solutions[each] for each in search.pairs(nodes)]
-    theirs = search.cost(nodes)
+    energy = sum(move.energy.electrical.total for move in moves) + dwelling(search, nodes)
     duration = sum(move.duration for move in moves) + search.asked.dwelling
     if search.asked.nearest_duration(duration) != duration:
         return None
     sensitivity = reduce(add, [move.sensitivity for move in moves]) + resting(search, nodes)
-    known = Known(theirs, sensitivity, sum(move.duration for move in moves))
-    return compared(search.asked, name, duration, known, True, ours)
+    known = Known(energy, sensitivity, sum(move.duration for move in moves))
+    theirs = Needed(known, sum(move.energy.mechanical.total for move in moves))
+    return compared(search.asked, name, duration, theirs, True, ours)
 
 
-def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBaseline | None:
+def controller_default(search: RoundSearch, start: int, ours: Needed) -> RoundBaseline | None:
     """The round by the robot's own controller: to the nearest configuration each time, at its default speed.
 
     None for a robot whose default is not known, or if it takes another time than is asked for.
     """
-    node, total, duration, held, nodes, sensitivities = start, 0.0, 0.0, True, [start], list[Sensitivity]()
+    node, total, work, duration, held = start, 0.0, 0.0, 0.0, True
+    nodes, sensitivities = [start], list[Sensitivity]()
     for k, leg in enumerate(search.legs):
         if search.asked.moves[k].tool_path is not None:
             # a controller's own line or path is not known: it is ours
             own = _on_way(search, k, node)
             if own is None:
                 return None
-            total += float(leg.cost[node, node])
+            total, work = total + own.energy.electrical.total, work + own.energy.mechanical.total
             duration += own.duration
             nodes.append(node)
             sensitivities.append(own.sensitivity)
@@ -157,7 +166,7 @@ def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBas
         if "controller_default" not in found:
             return None
         move = found["controller_default"]
-        total += move.electrical + float(leg.dwell[node])
+        total, work = total + move.electrical, work + move.mechanical
         duration += move.duration
         held &= move.within_limits
         nodes.append(node)
@@ -165,16 +174,25 @@ def controller_default(search: RoundSearch, start: int, ours: Known) -> RoundBas
     duration += search.asked.dwelling
     if search.asked.nearest_duration(duration) != duration:
         return None
-    theirs = Known(total, reduce(add, sensitivities) + resting(search, nodes), duration - search.asked.dwelling)
-    return compared(search.asked, "controller_default", duration, theirs, held, ours)
+    sensitivity = reduce(add, sensitivities) + resting(search, nodes)
+    known = Known(total + dwelling(search, nodes), sensitivity, duration - search.asked.dwelling)
+    return compared(search.asked, "controller_default", duration, Needed(known, work), held, ours)
 
 
 def compared(
-    asked: WorkRound, name: RoundBaselineName, duration: float, theirs: Known, held: bool, ours: Known
+    asked: WorkRound, name: RoundBaselineName, duration: float, theirs: Needed, held: bool, ours: Needed
 ) -> RoundBaseline:
     """The baseline of a round that takes `duration` [s], rests included, and needs `theirs`."""
-    interval = saving_interval(ours, theirs, asked.arm)
-    return RoundBaseline(name, duration, theirs.energy, held, saving(ours.energy, theirs.energy), interval, theirs)
+    electrical = asked.objective == "electrical"
+    interval = saving_interval(ours.electrical, theirs.electrical, asked.arm) if electrical else None
+    own = saving(ours.of(asked.objective), theirs.of(asked.objective))
+    return RoundBaseline(name, duration, held, own, interval, theirs)
+
+
+def dwelling(search: RoundSearch, nodes: list[int]) -> float:
+    """Electrical energy [J] of the dwells of a chain."""
+    moves = zip(search.asked.moves, search.legs, nodes[1:], strict=True)
+    return sum(float(dwell_energies(search.asked, move, leg.goal)[node]) for move, leg, node in moves)
 
 
 def resting(search: RoundSearch, nodes: list[int], at: int = -1, waited: float = 0.0) -> Sensitivity:

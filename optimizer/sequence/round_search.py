@@ -25,10 +25,10 @@ from optimizer.search.run import Run
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.known_motions import KnownMotion, known_motions
 from optimizer.sequence.layers import Layer, layer_of
-from optimizer.sequence.lazy_search import SHARE_OF_A_LEG, LazySearch
+from optimizer.sequence.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg
 from optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
-from optimizer.sequence.rests import dwell_energies
+from optimizer.sequence.rests import dwell_costs
 from optimizer.sequence.ways import layers_of_stop
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
@@ -37,8 +37,6 @@ from optimizer.trajectories.spline import Spline
 RESERVED, LEAST_TIME = 0.3, 1e-3
 # routes through passes that are tried for a pair at most, and while none has a motion
 MOST_ROUTES, MOST_FAILED = 3, 10
-# J: a chain is no better than another one by less
-SAME = 1e-9
 
 
 class RoundSearch(LazySearch):
@@ -76,8 +74,8 @@ class RoundSearch(LazySearch):
 
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
-        prepared = PreparedProblem.of(self._problem(move, start.q[0], goal.q[0], self.asked.deadline))
-        dwells = dwell_energies(self.asked, move, goal)
+        prepared = PreparedProblem.of(problem_of(self.asked, move, start.q[0], goal.q[0], self.asked.deadline))
+        dwells = dwell_costs(self.asked, move, goal)
         if between:
             return PassingLeg.through(prepared, [start, *between, goal], dwells)
         return (Leg.of if move.tool_path is None else Leg.of_way)(prepared, start, goal, dwells)
@@ -96,7 +94,7 @@ class RoundSearch(LazySearch):
                 self.finish(*each)
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
-        """Energy [J] of a first motion of a pair, whose run is kept; inf if none is found in its share of the time.
+        """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found in its share of the time.
 
         None once the time is up.
         """
@@ -192,8 +190,7 @@ class RoundSearch(LazySearch):
         """Whether some chain through passes has a bound below the best one: such legs weigh more than their bounds."""
         if not self.asked.passes or self.routes_left:
             return self.routes_left
-        costs = [np.where(leg.is_solved, leg.cost, leg.least_costs) for leg in self.legs]
-        return LeastChain(costs, self.closed).find()[0] < self._chain.find()[0] - SAME
+        return self.leaves_chains
 
     def motion(self, k: int, s: int, g: int) -> Spline | None:
         """The first motion of a pair; None if there is none."""
@@ -240,7 +237,7 @@ class RoundSearch(LazySearch):
             leg.set_pair(s, g, np.inf)
             return
         self.solutions[k, s, g] = found
-        leg.set_pair(s, g, found.energy.electrical.total)
+        leg.set_pair(s, g, found.energy.of(self.asked.objective))
         self._chain.lower(max(before - float(leg.cost[s, g]), 0.0) + SAME)
 
     def _kept(self, key: str, found: Solution) -> Solution:
@@ -297,21 +294,24 @@ class RoundSearch(LazySearch):
     def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:
         """The problem of a pair, with `time` [s] for it."""
         leg = self.legs[k]
-        problem = self._problem(self.moves[k], leg.start.q[s], leg.goal.q[g], time)
+        problem = problem_of(self.asked, self.moves[k], leg.start.q[s], leg.goal.q[g], time)
         return replace(problem, passes=leg.passes(s, g))
 
-    def _problem(self, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
-        asked = self.asked
-        return Problem(
-            arm=move.arm,
-            start=q_start,
-            goal=q_goal,
-            method=asked.method,
-            tool_path=move.tool_path,
-            windings=False,
-            sample_period=asked.sample_period,
-            deadline=max(time, LEAST_TIME),
-        )
+
+def problem_of(asked: WorkRound, move: PlannedMove, q_start: Array, q_goal: Array, time: float) -> Problem:
+    """The problem of a move of a round between joint positions (nq,) [rad], with `time` [s] for it."""
+    return Problem(
+        arm=move.arm,
+        start=q_start,
+        goal=q_goal,
+        method=asked.method,
+        objective=asked.objective,
+        duration_max=None if asked.objective == "electrical" else asked.longest_move,
+        tool_path=move.tool_path,
+        windings=False,
+        sample_period=asked.sample_period,
+        deadline=max(time, LEAST_TIME),
+    )
 
 
 def layers_of(asked: WorkRound) -> dict[str, Layer]:

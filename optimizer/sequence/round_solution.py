@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, reduce
 from itertools import pairwise
 from operator import add
@@ -19,9 +19,11 @@ from optimizer.solution import (
     Energy,
     JointEnergy,
     MechanicalEnergy,
+    Objective,
     SavingInterval,
     Sensitivity,
     Solution,
+    StorageUse,
 )
 
 
@@ -40,7 +42,8 @@ class Move:
 
     It begins at `t0` [s] of the round. The dwell after it draws `dwell_energy` [J]; then it waits for `wait` [s], which
     draws `wait_energy` [J]. `pairs` of configurations were possible, of so many `kinds`, of which so many were
-    `solved`. `sensitivity` is that of the energy of all three.
+    `solved`. `sensitivity` is that of the energy of all three. `charges` [J] are those of an energy storage on the
+    bus when the move begins, when it ends, after the dwell and after the wait; none without one.
     """
 
     planned: PlannedMove
@@ -54,6 +57,7 @@ class Move:
     solved: int
     sensitivity: Sensitivity = field(repr=False)
     passes: list[Pass]
+    charges: tuple[float, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -66,32 +70,61 @@ class Move:
         return self.solution.energy.electrical.total + self.dwell_energy + self.wait_energy
 
 
+@dataclass(frozen=True)
+class Needed:
+    """What a round needs: electrical energy, how well that is known, and the mechanical work of its moves [J]."""
+
+    electrical: Known
+    mechanical: float
+
+    def of(self, objective: Objective) -> float:
+        """The part that an objective minimises [J]."""
+        return self.electrical.energy if objective == "electrical" else self.mechanical
+
+
 RoundBaselineName = Literal[
-    "stopping", "move_by_move", "controller_default", "same_factor", "fastest_then_wait", "given_order"
+    "stopping",
+    "move_by_move",
+    "controller_default",
+    "same_factor",
+    "fastest_then_wait",
+    "given_order",
+    "without_storage",
 ]
 
 
 @dataclass(frozen=True)
 class RoundBaseline:
-    """Another way to go round: its duration [s], electrical energy [J], our saving 1 - ours / theirs, and how well that
-    is known; `known` is that energy, and how it hangs on the arm's figures."""
+    """Another way to go round: its duration [s], what it needs [J], our saving 1 - ours / theirs of the objective, and
+    how well that is known (None for mechanical work). `moves` are its own, where another bus may value them."""
 
     name: RoundBaselineName
     duration: float
-    electrical: float
     within_limits: bool
     saving: float
-    saving_interval: SavingInterval
-    known: Known = field(repr=False)
+    saving_interval: SavingInterval | None
+    needed: Needed = field(repr=False)
+    moves: Sequence[Move] = field(default=(), repr=False)
+
+    @property
+    def electrical(self) -> float:
+        """Electrical energy [J]."""
+        return self.needed.electrical.energy
+
+    @property
+    def mechanical(self) -> float:
+        """Mechanical work [J]."""
+        return self.needed.mechanical
 
 
 @dataclass(frozen=True)
 class RoundSolution:
     """The round of least energy. No round over these stops, of any configurations and shapes, with rests at the stops
-    that it does not pass, needs less than `lower_bound` [J].
+    that it does not pass, needs less than `lower_bound` [J] of the objective.
 
     `status` is `optimal` if no chain of configurations has a bound below what was found, and every move converged.
-    `price_of_time` [W] is what one more second would save; negative where time is left over.
+    `storage` is what an energy storage on the bus did; None without one. `price_of_time` [W] is what one more second
+    would save; negative where time is left over.
     """
 
     status: Literal["optimal", "feasible"]
@@ -101,6 +134,8 @@ class RoundSolution:
     baselines: list[RoundBaseline]
     complete: bool
     wall_time: float
+    objective: Objective = "electrical"
+    storage: StorageUse | None = None
 
     @property
     def duration(self) -> float:
@@ -112,13 +147,15 @@ class RoundSolution:
         """Energy of the round [J], with dwells and waiting."""
         resting = sum(move.dwell_energy + move.wait_energy for move in self.moves)
         energy = summed([move.solution for move in self.moves], resting)
-        known = known_of(self.moves)
-        return with_interval(energy, known.sensitivity, known.duration, self.moves[0].planned.arm)
+        known = self.needed.electrical
+        return with_interval(
+            replace(energy, storage=self.storage), known.sensitivity, known.duration, self.moves[0].planned.arm
+        )
 
     @property
-    def known(self) -> Known:
-        """The round's energy [J] and how it hangs on the arm's figures."""
-        return known_of(self.moves)
+    def needed(self) -> Needed:
+        """What the round needs."""
+        return needed_by(self.moves)
 
     @property
     def order(self) -> list[str]:
@@ -136,10 +173,11 @@ class RoundSolution:
         return max((float(np.abs(b[0] - a[1]).max()) for a, b in pairwise(ends)), default=0.0)
 
 
-def known_of(moves: Sequence[Move]) -> Known:
-    """The energy [J] of moves and their rests, and how it hangs on the arm's figures."""
+def needed_by(moves: Sequence[Move]) -> Needed:
+    """What moves and their rests need."""
     sensitivity = reduce(add, [move.sensitivity for move in moves])
-    return Known(sum(move.energy for move in moves), sensitivity, sum(move.solution.duration for move in moves))
+    known = Known(sum(move.energy for move in moves), sensitivity, sum(move.solution.duration for move in moves))
+    return Needed(known, sum(move.solution.energy.mechanical.total for move in moves))
 
 
 def summed(solutions: Sequence[Solution], dwell: float) -> Energy:

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from optimizer.deadline import Deadline
 from optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from optimizer.sequence.legs import Leg
@@ -22,6 +24,8 @@ PRICES = (20.0, 100.0, 500.0, 2500.0)
 WORTH_SLOWING = 2e-3
 # relative: durations that add up to the time within this are stretched by the rest; and most prices tried
 SHARED, MOST_PRICES = 1e-3, 14
+# W: a second that saves less mechanical work than this is waited out; and factor from one price to the next
+LEAST_PRICE, STEP = 1e-3, 6.0
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,27 @@ class TimeSharing:
                 return self._between(slow, fast, time)
             slow = fast
         return _mixed(slow, Shared.of(PRICES[-1], fastest), time)
+
+    def fill_for_work(self, time: float, fastest: Sequence[PricedMotion]) -> Shared:
+        """The moves that do the least mechanical work within `time` [s], as in `fill`: rests do none, and every second
+        more saves work, but less and less.
+
+        The work of acceleration falls with the square of the duration: by this, the first price is guessed.
+        """
+        fast = Shared.of(PRICES[-1], fastest)
+        price = np.clip(2 * fast.energy / fast.moving * (fast.moving / time) ** 3, LEAST_PRICE, PRICES[-1])
+        found = self.at(float(price))
+        if found.moving <= time:
+            while found.moving <= time:
+                if found.price <= LEAST_PRICE:
+                    return Shared(0.0, found.lengths, found.energy, time - found.moving)
+                fast, found = found, self.at(max(found.price / STEP, LEAST_PRICE))
+            return self._between(found, fast, time)
+        while found.price < PRICES[-1]:
+            slow, found = found, self.at(min(found.price * STEP, PRICES[-1]))
+            if found.moving <= time:
+                return self._between(slow, found, time)
+        return _mixed(found, fast, time)
 
     def _between(self, slow: Shared, fast: Shared, time: float) -> Shared:
         """The moves at a price between two, one of which is too slow: by the Illinois method."""

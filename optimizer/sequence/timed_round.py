@@ -32,7 +32,7 @@ BETTER = 1e-4
 class Timed:
     """A chain whose time is shared. It waits after move `at`, which draws `wait_energy` [J] beside the dwell there.
 
-    With it, the round draws `energy` [J], nearly.
+    The objective of the round is `energy` [J], nearly.
     """
 
     nodes: list[int]
@@ -45,28 +45,36 @@ class Timed:
 class TimedSearch:
     """The search for the round of least energy in a time [s], from the `search` of the round in its own time.
 
-    `exact`: no other chain can be better, as far as the price tells.
+    `exact`: no other chain can be better, as far as the price tells. `sought` are the kinds of each leg for which a
+    motion was sought at some price.
     """
 
     def __init__(self, search: RoundSearch, duration: float) -> None:
         self.search, self.asked, self.legs = search, search.asked, search.legs
         self.time = duration - self.asked.dwelling
-        self.longest = _longest_move(self.time)
+        self.longest = min(max(self.time, LEAST_DURATION), LONGEST_DURATION)
         # of the routes through passes, only those found in the round's own time are followed
         self.exact = not self.asked.passes
         # moves after which it may wait
         self.places = [k for k, move in enumerate(self.asked.moves) if self.asked.may_wait_after(move)]
+        self.sought = [set[int]() for _ in self.legs]
         self._fastest: dict[tuple[int, int, int], PricedMotion | None] = {}
 
-    def run(self, nodes: list[int]) -> Timed:
-        """The best round found from that of a chain on. Raises RoundTooShort, NoTrajectory or DeadlineExceeded."""
-        best = self._of(nodes, [self.search.solutions[each].trajectory.spline for each in self.search.pairs(nodes)])
+    def run(self, nodes: list[int] | None) -> Timed:
+        """The best round found from that of a chain on, whose motions are known, or from the fastest one.
+
+        Raises RoundTooShort, NoTrajectory or DeadlineExceeded.
+        """
+        best = None
+        if nodes is not None:
+            own = [self.search.solutions[each].trajectory.spline for each in self.search.pairs(nodes)]
+            best = self._of(nodes, own)
         if best is None:
             best = self._of_the_fastest()
         for _ in range(MOST_CHAINS):
             priced = self._priced(best.shared.price, self.longest)
-            chain = priced.explore()
-            self.exact &= not (priced.cut_short or priced.failed)
+            chain = self._explored(priced)
+            self.exact &= not (priced.cut_short or priced.failed or (not self._rests_count and priced.leaves_chains))
             if chain == best.nodes:
                 return best
             other = self._of(chain, [priced.motion(*each) for each in self.search.pairs(chain)])
@@ -81,10 +89,16 @@ class TimedSearch:
     def _priced(self, price: float, longest: float) -> PricedSearch:
         return PricedSearch(self.legs, self.asked.closed, price, longest, self.search.search_end)
 
+    def _explored(self, priced: PricedSearch) -> list[int]:
+        chain = priced.explore()
+        for sought, leg in zip(self.sought, priced.legs, strict=True):
+            sought.update(leg.solved)
+        return chain
+
     def _of_the_fastest(self) -> Timed:
         """The chain that is nearly the fastest, with its time shared. Raises RoundTooShort or NoTrajectory."""
         priced = self._priced(PRICES[-1], LONGEST_DURATION)
-        chain = priced.explore()
+        chain = self._explored(priced)
         fast = self.fastest(chain)
         if fast is None:
             raise NoTrajectory([])
@@ -115,13 +129,23 @@ class TimedSearch:
         if fast is None or duration_of(fast) > self.time:
             return None
         pairs, end = list(self.search.pairs(nodes)), self.search.search_end
-        waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
+        sharing = TimeSharing(self.legs, pairs, guesses, self.longest, end)
         try:
-            shared = TimeSharing(self.legs, pairs, guesses, self.longest, end).fill(self.time, waiting, fast)
+            if self._rests_count:
+                waiting = min(float(self._powers(k)[nodes[k + 1]]) for k in self.places)
+                shared = sharing.fill(self.time, waiting, fast)
+            else:
+                shared = sharing.fill_for_work(self.time, fast)
         except NoTrajectory:
             return None
         at, wait = self.cheapest_wait(nodes, shared.waited)
-        return Timed(nodes, shared, at, wait, shared.energy + self.search.dwells(nodes) + wait)
+        resting = self.search.dwells(nodes) + (wait if self._rests_count else 0.0)
+        return Timed(nodes, shared, at, wait, shared.energy + resting)
+
+    @property
+    def _rests_count(self) -> bool:
+        """Whether what the arm draws at rest is in the objective."""
+        return self.asked.objective == "electrical"
 
     def cheapest_wait(self, nodes: list[int], waited: float) -> tuple[int, float]:
         """The move after which a wait [s] draws least, and its energy [J] beside the dwell there."""
@@ -135,7 +159,8 @@ class TimedSearch:
             return 0.0
         node, leg, planned = nodes[move + 1], self.legs[move], self.asked.moves[move]
         hold = float(holding_powers(planned, leg.goal)[node])
-        return rest_energy(self.asked, planned, planned.dwell + waited, hold) - float(leg.dwell[node])
+        dwell = rest_energy(self.asked, planned, planned.dwell, hold)
+        return rest_energy(self.asked, planned, planned.dwell + waited, hold) - dwell
 
     def _powers(self, move: int) -> Array:
         return long_wait_powers(self.asked, self.asked.moves[move], self.legs[move].goal)
@@ -149,15 +174,20 @@ class TimedSearch:
         """
         if not all(leg.closed for leg in self.legs):
             return -np.inf
-        # neither a wait on motors nor one on brakes may gain by the price
-        powers = [
-            power
-            for move, leg in zip(self.asked.moves, self.legs, strict=True)
-            for power in (holding_powers(move, leg.goal), long_wait_powers(self.asked, move, leg.goal))
-        ]
-        price = max(price, -min(float(each.min()) for each in powers))
+        price = max(price, -self._least_waiting())
         longest = self._longest_below(ours)
         return min(self._least(price, longest) - price * self.time, ours)
+
+    def _least_waiting(self) -> float:
+        """What a second of waiting adds to the objective at least [W]: neither on motors nor on brakes may a wait gain
+        by the price of time."""
+        if not self._rests_count:
+            return 0.0
+        return min(
+            float(power.min())
+            for move, leg in zip(self.asked.moves, self.legs, strict=True)
+            for power in (holding_powers(move, leg.goal), long_wait_powers(self.asked, move, leg.goal))
+        )
 
     def _longest_below(self, ours: float) -> float:
         """Longest duration [s] of a move in any round that needs less than `ours` [J] and takes no longer than asked.
@@ -165,9 +195,8 @@ class TimedSearch:
         Every second draws at least what the electronics do: a round with a move of duration T needs base · T more than
         the least chain of Σ (E - base · T).
         """
-        most = self.asked.duration_max
-        longest = LONGEST_DURATION if most is None else _longest_move(most - self.asked.dwelling)
-        base = self.asked.arm.base_power
+        longest = self.asked.longest_move
+        base = self.asked.arm.base_power if self._rests_count else 0.0
         if longest <= self.longest or base <= 0:
             return longest
         beside = self._least(-base, longest)
@@ -177,8 +206,3 @@ class TimedSearch:
         """Least sum [J] of bounds on energy + price · duration of a chain's moves, each of at most `longest` [s]."""
         costs = [leg.priced(price, longest).least_costs for leg in self.legs]
         return LeastChain(costs, self.asked.closed).find()[0]
-
-
-def _longest_move(time: float) -> float:
-    """Longest duration [s] of one move where all of them take `time` [s]."""
-    return min(max(time, LEAST_DURATION), LONGEST_DURATION)

@@ -254,3 +254,31 @@ def test_the_round_as_a_table(client: TestClient, answer: dict[str, Any]) -> Non
     assert {(row["leg"], row["kind"]) for row in rows} == {
         (str(k), leg["kind"]) for k, leg in enumerate(answer["legs"])
     }
+
+
+def test_a_round_of_least_work_has_its_own_gap(client: TestClient) -> None:
+    content = answered(client, a_round(objective="mechanical", time={"max": 8.0}))
+    energy = content["energy"]
+    work = energy["mechanical"]["total"]
+    assert content["objective"] == "mechanical" and energy["lower_bound"] < work
+    assert energy["optimality_gap"] == pytest.approx(1 - energy["lower_bound"] / work)
+    assert work == pytest.approx(sum(leg["mechanical"] for leg in content["legs"]), rel=ROUNDING)
+    for each in content["baselines"]:
+        assert each["saving"] == pytest.approx(1 - work / each["mechanical"]) and each["saving_interval"] is None
+    refused = client.post("/cycle", json=a_round(objective="mechanical"))
+    assert refused.status_code == 422 and refused.json()["errors"][0]["loc"] == ["body", "time"]
+
+
+def test_a_storage_is_charged_from_leg_to_leg(client: TestClient) -> None:
+    bus = {"mode": "storage", "capacity": 30.0, "power": 500.0, "efficiency": 0.9}
+    content = answered(client, a_round(bus=bus))
+    legs, use = content["legs"], content["energy"]["storage"]
+    assert legs[-1]["charge"] == pytest.approx(use["final"]) == pytest.approx(use["initial"])
+    assert {each["name"] for each in content["baselines"]} == {"without_storage", "move_by_move"}
+    charge = use["initial"]
+    for leg in legs:
+        if leg["answer"]:
+            own = client.get(leg["answer"]).json()["answer"]
+            assert own["energy"]["storage"]["initial"] == pytest.approx(charge)
+            assert own["arm"]["bus"]["initial"] == pytest.approx(charge)
+        charge = leg["charge"]

@@ -25,7 +25,6 @@ from optimizer.optimize import optimize
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
-from optimizer.problem.bus import Bus
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -252,10 +251,6 @@ WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "free": (
         "stops.0.target",
         {"stops": [Stop(name="a", target=ConeOrientedPose(np.array([0.4, 0.0, 0.3])))]},
-    ),
-    "storage": (
-        "bus.mode",
-        {"arm": Arm(robot=ROBOT, bus=Bus("storage", efficiency=0.9, capacity=100.0))},
     ),
     "hold": ("hold.brake_delay", {"brake_delay": -1.0}),
     "deadline": ("deadline", {"deadline": 0.0}),

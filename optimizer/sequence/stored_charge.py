@@ -1,0 +1,77 @@
+"""The charge of an energy storage over a round: it runs on from leg to leg, through dwells and waits.
+
+A step by a net surplus or demand takes a charge E to min(max(E + s, 0), capacity). One such step after the other is
+again of the form min(max(E + S, low), high), with the sum S of all steps. So a round that is repeated comes to a charge
+that it ends with as well: to that of a round begun full where S > 0, to that of one begun empty where S < 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.energy.bus_flow import BusFlow, charge_steps, charges, pooled
+from optimizer.energy.dwell import brake_power, holding_power, waits
+from optimizer.energy.losses import power_flow
+from optimizer.energy.plant import REPORT_NODES, Plant
+from optimizer.problem.arm import Arm
+from optimizer.problem.bus import Bus
+from optimizer.problem.stops import PlannedMove
+from optimizer.problem.work_round import WorkRound
+from optimizer.trajectories.spline import Spline, fine_samples
+
+
+@dataclass(frozen=True)
+class Demand:
+    """Net demand `net` (k,) [J] on the bus in intervals of `lengths` (k,) [s], in their order."""
+
+    net: Array
+    lengths: Array
+
+    @classmethod
+    def of_motion(cls, plant: Plant, spline: Spline) -> Demand:
+        """That of a motion, in the intervals of its reported energy."""
+        weights, q, v, a = fine_samples(spline, REPORT_NODES)
+        joints = power_flow(plant.torques(q, v, a), v, a, plant.arm.drives, plant.friction).joints
+        return cls(weights * (plant.arm.base_power + joints.sum(axis=1)), weights)
+
+    @classmethod
+    def of_rest(cls, asked: WorkRound, move: PlannedMove, before: float, length: float, q: Array) -> Demand:
+        """That of `length` [s] of rest at q (nq,) [rad], `before` [s] after a move: by motors, then by brakes."""
+        if length <= 0:
+            return cls(np.zeros(0), np.zeros(0))
+        arm, still = move.arm_after, np.zeros((1, len(q)))
+        hold = float(holding_power(arm, Plant(arm).torques(q[None], still, still))[0])
+        cycle = asked.waiting(before + length)
+        done = waits(asked.waiting(before), 0.0) if before > 0 else (0.0, 0.0)
+        lengths = np.array(waits(cycle, 0.0)) - done
+        return cls(np.array([hold, brake_power(cycle, arm)]) * lengths, lengths)
+
+    def flow(self, arm: Arm, first: float) -> BusFlow:
+        """Where its energy comes from and goes to, with a charge `first` [J] at the start."""
+        return pooled(arm.bus, arm.regeneration, self.net, self.lengths, first)
+
+
+def charges_of(bus: Bus, demands: Sequence[Demand], closed: bool) -> list[float]:
+    """Charge [J] of the storage before each of the demands, and after the last.
+
+    A `closed` round begins with the charge that it ends with.
+    """
+    net, lengths = (np.concatenate([getattr(each, name) for each in demands]) for name in ("net", "lengths"))
+    ends = np.cumsum([0, *(len(each.net) for each in demands)])
+    first = bus.initial
+    if closed:
+        by = float(charge_steps(bus, net, lengths).sum())
+        begun = first if by == 0 else bus.capacity if by > 0 else 0.0
+        first = float(charges(bus, net, lengths, begun)[-1])
+    charge = charges(bus, net, lengths, first)
+    return [float(charge[k]) for k in ends]
+
+
+def drawn(arm: Arm, demands: Sequence[Demand], charges: Sequence[float]) -> float:
+    """Energy [J] that demands draw, the decrease of the charge included; `charges` as `charges_of` gives them."""
+    flows = [each.flow(arm, first) for each, first in zip(demands, charges, strict=False)]
+    return sum(float(each.drawn.sum()) for each in flows) + charges[0] - charges[-1]

@@ -1,0 +1,200 @@
+"""Rounds with an energy storage on the bus, whose charge couples the legs.
+
+What the storage saves depends on the whole round, so no leg has a value of its own. The round is looked for on two
+buses where each has: on one that takes every surplus back as well as the storage would, and on the same bus without the
+storage. On the first, no round draws more than with the storage, which has limits: so its lower bound holds. Then each
+round is valued as one, with the exact charge, and so are the rounds that choose move by move. The best one counts.
+Where it has surplus that the storage does not take, its moves are optimised again, with the charge that they find.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from optimizer.deadline import Clock, Deadline
+from optimizer.energy.plant import Plant
+from optimizer.exceptions import DeadlineExceeded, JoulepathError
+from optimizer.problem.bus import Bus
+from optimizer.problem.problem import Problem
+from optimizer.problem.stops import PlannedMove
+from optimizer.problem.work_round import WorkRound
+from optimizer.search.run import Run
+from optimizer.sequence.rests import rest_sensitivity
+from optimizer.sequence.round_baselines import compared
+from optimizer.sequence.round_search import LEAST_TIME, problem_of
+from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundBaselineName, RoundSolution, needed_by
+from optimizer.sequence.stored_charge import Demand, charges_of, drawn
+from optimizer.solution import StorageUse
+from optimizer.trajectories.spline import Spline
+
+# shares of the deadline for the first search, and of what is left for the second one and for the moves
+FIRST, SECOND, REFINED = 0.5, 0.5, 0.5
+# J: less surplus than this need not be stored; and relative: energies that are the same but for quadrature
+SPILLED, SAME = 0.05, 1e-6
+# demands of a move: its motion, the dwell and the wait
+PARTS = 3
+
+Search = Callable[[WorkRound], RoundSolution]
+
+
+@dataclass(frozen=True)
+class Valued:
+    """A round as one: its `moves`, as they were found on another bus, the `motions` that stand for theirs, and the
+    `charges` [J] before each motion and after it, before and after the rest that follows. Its objective is `value` [J].
+    """
+
+    moves: Sequence[Move]
+    motions: list[Spline]
+    charges: list[float]
+    value: float
+
+
+def with_storage(asked: WorkRound, search: Search, clock: Clock) -> RoundSolution:
+    """The round of least energy with the storage of its bus; `search` finds the round of a bus without storage.
+
+    Raises the errors of `search`.
+    """
+    began, end, bus = clock(), Deadline.after(asked.deadline, clock), asked.arm.bus
+    share = max(bus.efficiency, asked.arm.regeneration)
+    stored = search(_on(asked, Bus("recuperating", share), FIRST * asked.deadline))
+    rounds = [stored]
+    if asked.objective == "electrical":
+        with suppress(DeadlineExceeded):
+            rounds.append(search(_on(_ordered(asked, stored), Bus(), SECOND * end.left)))
+    valued = [_valued(asked, each.moves) for each in rounds]
+    others = [each for one in rounds for each in one.baselines if each.moves]
+    greedy = [_valued(asked, each.moves) for each in others]
+    best = min([*valued, *greedy], key=lambda each: each.value)
+    best = _refined(asked, best, end.within(REFINED * end.left), clock)
+    moves = _moves(asked, best, end, clock)
+    needed = needed_by(moves)
+    met = needed.of(asked.objective) <= stored.needed.of(asked.objective) * (1 + SAME)
+    found = replace(
+        next((one for one, own in zip(rounds, valued, strict=True) if own.moves is best.moves), stored),
+        status=stored.status if met else "feasible",
+        moves=moves,
+        lower_bound=min(stored.lower_bound, needed.of(asked.objective)),
+        baselines=[],
+        wall_time=clock() - began,
+        storage=_use(asked, best),
+    )
+    theirs: list[tuple[RoundBaselineName, Valued]] = [("without_storage", each) for each in valued[1:]]
+    theirs += [("move_by_move", each) for each in greedy[:1]]
+    return replace(found, baselines=[_baseline(asked, *each, needed) for each in theirs])
+
+
+def _on(asked: WorkRound, bus: Bus, deadline: float) -> WorkRound:
+    return replace(asked, arm=replace(asked.arm, bus=bus), deadline=max(deadline, LEAST_TIME))
+
+
+def _ordered(asked: WorkRound, found: RoundSolution) -> WorkRound:
+    """The round in the order that was found."""
+    stops = {stop.name: stop for stop in asked.stops}
+    return replace(asked, stops=[stops[name] for name in found.order], order=None)
+
+
+def _stored(asked: WorkRound, move: PlannedMove, charge: float) -> PlannedMove:
+    """The move with the storage on the bus, charged with `charge` [J]."""
+    bus = replace(asked.arm.bus, initial=min(charge, asked.arm.bus.capacity))
+    return replace(move, arm=replace(move.arm, bus=bus), arm_after=replace(move.arm_after, bus=bus))
+
+
+def _demands(asked: WorkRound, moves: Sequence[Move], motions: Sequence[Spline]) -> list[Demand]:
+    """The demands of the motions, and of the rest after each of them."""
+    return [
+        demand
+        for move, motion in zip(moves, motions, strict=True)
+        for demand in (
+            Demand.of_motion(Plant(_stored(asked, move.planned, 0.0).arm), motion),
+            Demand.of_rest(asked, move.planned, 0.0, move.planned.dwell, motion.control_points[-1]),
+            Demand.of_rest(asked, move.planned, move.planned.dwell, move.wait, motion.control_points[-1]),
+        )
+    ]
+
+
+def _valued(asked: WorkRound, moves: Sequence[Move], motions: list[Spline] | None = None) -> Valued:
+    """A round as one, with the exact charge; its motions are those of its moves unless given."""
+    motions = [move.solution.trajectory.spline for move in moves] if motions is None else motions
+    demands = _demands(asked, moves, motions)
+    charges = charges_of(asked.arm.bus, demands, asked.closed)
+    if asked.objective == "mechanical":
+        value = sum(move.solution.energy.mechanical.total for move in moves)
+    else:
+        value = drawn(asked.arm, demands, charges)
+    return Valued(moves, motions, charges, value)
+
+
+def _refined(asked: WorkRound, best: Valued, end: Deadline, clock: Clock) -> Valued:
+    """The round with motions that spill less of what the storage has no room for, each in its charge and duration."""
+    if asked.objective == "mechanical" or not asked.arm.bus.capacity * asked.arm.bus.efficiency:
+        return best
+    for k, move in enumerate(best.moves):
+        motion, charge = best.motions[k], best.charges[PARTS * k]
+        planned = _stored(asked, move.planned, charge)
+        surplus = Demand.of_motion(Plant(planned.arm), motion).flow(planned.arm, charge).surplus.sum()
+        if surplus <= SPILLED or end.passed:
+            continue
+        problem = _problem(asked, planned, move, end.left)
+        fixed = replace(problem, duration_min=motion.duration, duration_max=motion.duration)
+        with suppress(JoulepathError):
+            found = Run(fixed, [motion], clock).solution().trajectory.spline
+            other = _valued(asked, best.moves, [*best.motions[:k], found, *best.motions[k + 1 :]])
+            best = min(best, other, key=lambda each: each.value)
+    return best
+
+
+def _problem(asked: WorkRound, planned: PlannedMove, move: Move, time: float) -> Problem:
+    problem = problem_of(asked, planned, move.solution.start.q, move.solution.goal.q, time)
+    return replace(problem, passes=[each.at.q for each in move.passes])
+
+
+def _moves(asked: WorkRound, best: Valued, end: Deadline, clock: Clock) -> list[Move]:
+    """The moves with their motions, certified with the charge that they begin with.
+
+    Raises DeadlineExceeded or NoTrajectory.
+    """
+    found, t0 = list[Move](), 0.0
+    for k, (move, motion) in enumerate(zip(best.moves, best.motions, strict=True)):
+        charges = tuple(best.charges[PARTS * k : PARTS * (k + 1) + 1])
+        planned = _stored(asked, move.planned, charges[0])
+        solution = Run(_problem(asked, planned, move, end.left), clock=clock).as_it_is(motion)
+        solution = replace(
+            solution,
+            status=move.solution.status,
+            start=move.solution.start,
+            goal=move.solution.goal,
+        )
+        rest = rest_sensitivity(asked, planned, planned.dwell + move.wait, solution.goal.q)
+        found.append(
+            replace(
+                move,
+                planned=planned,
+                solution=solution,
+                t0=t0,
+                sensitivity=solution.sensitivity + rest,
+                charges=charges,
+            )
+        )
+        t0 += found[-1].duration
+    return found
+
+
+def _use(asked: WorkRound, best: Valued) -> StorageUse:
+    demands = _demands(asked, best.moves, best.motions)
+    flows = [each.flow(asked.arm, first) for each, first in zip(demands, best.charges, strict=False)]
+    return StorageUse(
+        initial=best.charges[0],
+        final=best.charges[-1],
+        charged=sum(float(each.charged.sum()) for each in flows),
+        discharged=sum(float(each.discharged.sum()) for each in flows),
+    )
+
+
+def _baseline(asked: WorkRound, name: RoundBaselineName, theirs: Valued, ours: Needed) -> RoundBaseline:
+    """Another round, valued with the storage like ours; but for `without_storage`, which has none."""
+    needed = needed_by(theirs.moves)
+    if name != "without_storage":
+        needed = replace(needed, electrical=replace(needed.electrical, energy=theirs.value))
+    return compared(asked, name, sum(move.duration for move in theirs.moves), needed, True, ours)
