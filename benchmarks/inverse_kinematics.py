@@ -24,7 +24,8 @@ from models.registry import load_robot, robot_names
 from models.robot import Array, Robot
 from optimizer.exceptions import JoulepathError
 from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.inverse import IKSolution, InverseKinematics, required_inverse_kinematics
+from optimizer.kinematics.ik_solutions import IKSolution
+from optimizer.kinematics.inverse import InverseKinematics, required_inverse_kinematics
 
 # m and rad: what a solution may miss its pose by, and a configuration itself or its curve
 ACCURACY, FOUND = 1e-9, 1e-6

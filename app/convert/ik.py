@@ -10,7 +10,7 @@ from app.convert.scene import to_attachment, to_scene, to_tool
 from app.schemas.ik import IKRequest
 from models.robot import Robot
 from optimizer.collision.model import ClosestPair
-from optimizer.kinematics.inverse import IKSolution
+from optimizer.kinematics.ik_solutions import IKSolution
 from optimizer.problem.arm import Arm, Payload
 
 

@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.redundant_boxes import with_shoulder
-from optimizer.kinematics.redundant_curve import RedundantCurve
+from optimizer.kinematics.redundant_curve import RedundantCurve, last_angle
 from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.problem.branches import Label
 
@@ -27,6 +27,8 @@ IN_LINE, STRETCHED = 1e-10, 1e-10
 # points of a curve from which a crossing is sought, steps of the search, the difference of parameters in it, and how
 # many steps it has before it is given up, if one leaves more than a ratio of the lean
 POINTS, STEPS, STEP, FIRST_STEPS, SLOW = 32, 20, 1e-6, 3, 0.7
+# how far the lean may pass zero for a zero to be near, of its second difference between points
+BENT = 4.0
 # rounding of a box [rad]; and half the width of the loops on which an arm that is stretched to within STRETCHED, but
 # not quite, holds a pose: its elbow is bent by up to 4e-5, and rounding of the pose hides the loops
 ROUNDING, LOOPS = 1e-8, 2e-4
@@ -95,52 +97,86 @@ def stretched(pose: RedundantPose, label: Label) -> list[FreeTurn]:
 
 
 def crossing(curves: Sequence[RedundantCurve]) -> list[FreeTurn]:
-    """The motions with the third axis in line with the first, where these whole curves of one pose pass that
-    singularity.
+    """The motions with the third axis in line with the first, where these curves of one pose pass that singularity,
+    on their arcs or not.
 
     A pass may be overlooked next to an end of a curve, where the lean hardly changes (1 of 300 poses drawn on the
     singularity). The boxes of the curves hold its configurations all the same, so that bounds cover them.
     """
-    # those of the other shoulder pass it at the same points
-    curves = [curve for curve in curves if curve.sheet[0] > 0]
-    if not curves:
+    # both shoulders pass it at the same points
+    different = list({(curve.interval, *curve.sheet[1:].tolist()): curve for curve in curves}.values())
+    if not different:
         return []
-    pose = curves[0].pose
-    lower, upper = np.array([curve.arcs[0] for curve in curves]).T
-    u = lower[:, None] + (upper - lower)[:, None] * (np.arange(POINTS) + 0.5) / POINTS
-    q7 = np.array([curve.last_angle(each) for curve, each in zip(curves, u, strict=True)])
-    sheet = np.repeat([curve.sheet for curve in curves], POINTS, axis=0)
-    lean = _lean(pose, pose.configurations(q7.ravel(), sheet)).reshape(u.shape)
-    size, step = np.abs(lean), np.abs(np.diff(lean, axis=1))
-    reach = 2 * np.maximum(np.pad(step, ((0, 0), (0, 1)), "edge"), np.pad(step, ((0, 0), (1, 0)), "edge"))
-    beside = np.pad(size, ((0, 0), (1, 1)), constant_values=np.inf)
+    sheets = _Sheets.of(different)
+    lower = np.where(sheets.whole, -np.pi, 0.0)[:, None]
+    u = lower + (np.pi - lower) * (np.arange(POINTS) + 0.5) / POINTS
+    rows, k = np.nonzero(_may_be_zero(sheets.lean(u.ravel(), np.repeat(np.arange(len(u)), POINTS)).reshape(u.shape)))
     found = []
-    for row, k in np.argwhere((size <= reach) & (size <= beside[:, :-2]) & (size <= beside[:, 2:])).tolist():
-        curve = curves[row]
-        at = _zero(curve, float(u[row, k]))
-        if at is not None:
+    for row, at in zip(rows.tolist(), sheets.zeros(u[rows, k], rows).tolist(), strict=True):
+        if np.isfinite(at):
+            curve = different[row]
             last = curve.last_angle(np.array([at]))
-            theta, psi = pose.angles(last, curve.sheet[1:2], curve.sheet[2:3])
-            found.append(FreeTurn(pose, (float(last[0]), float(theta[0]), float(psi[0])), 1.0, 0, curve.label))
+            theta, psi = curve.pose.angles(last, curve.sheet[1:2], curve.sheet[2:3])
+            found.append(FreeTurn(curve.pose, (float(last[0]), float(theta[0]), float(psi[0])), 1.0, 0, curve.label))
     return found
 
 
-def _lean(pose: RedundantPose, q: Array) -> NDArray[np.complex128]:
-    """How the third axis leans (n,) from the first at q (n, 7), its two components as a complex number."""
-    return np.asarray(np.sin(pose.form.lean(q[:, 1])) * np.exp(1j * q[:, 0]))
+def _may_be_zero(lean: NDArray[np.complex128]) -> Mask:
+    """Next to which of points along curves (m, n) the lean may be zero, by the leans there (m, n)."""
+    size, step = np.abs(lean), np.abs(lean[:, 1:] - lean[:, :-1])
+    near = np.ones(lean.shape, dtype=bool)
+    near[:, 1:] &= size[:, 1:] <= size[:, :-1]
+    near[:, :-1] &= size[:, :-1] <= size[:, 1:]
+    near[:, 1:-1] &= size[:, 1:-1] <= 2 * np.maximum(step[:, 1:], step[:, :-1])
+    near[:, [0, -1]] &= size[:, [0, -1]] <= 2 * step[:, [0, -1]]
+    # a zero within a step is passed at a distance that the bend of the way explains
+    ahead, bend = lean[:, 2:] - lean[:, :-2], np.abs(lean[:, 2:] - 2 * lean[:, 1:-1] + lean[:, :-2])
+    aside = np.abs((np.conj(ahead) * lean[:, 1:-1]).imag)
+    near[:, 1:-1] &= aside <= BENT * bend * np.abs(ahead) + IN_LINE
+    return np.asarray(near)
 
 
-def _zero(curve: RedundantCurve, u: float) -> float | None:
-    """The parameter next to u at which the third axis is in line, by Gauss and Newton; None if there is none."""
-    (lower, upper), best = curve.arcs[0], np.inf
-    for n in range(STEPS):
-        before, here, after = _lean(curve.pose, curve.at(np.array([u - STEP, u, u + STEP])))
-        if abs(here) < IN_LINE:
-            return u
-        slope = (after - before) / (2 * STEP)
-        # next to a zero the steps converge quadratically; elsewhere they end where the lean is least
-        if abs(slope) == 0 or (n > FIRST_STEPS and abs(here) > SLOW * best):
-            return None
-        best = abs(here)
-        u = float(np.clip(u - (np.conj(slope) * here).real / abs(slope) ** 2, lower, upper))
-    return None
+@dataclass(frozen=True, eq=False)
+class _Sheets:
+    """The sheets of some curves of one pose: intervals (2, m) of q7, which are `whole` (m,), signs (2, m) of elbow and
+    wrist."""
+
+    pose: RedundantPose
+    intervals: Array
+    whole: Mask
+    signs: Array
+
+    @classmethod
+    def of(cls, curves: Sequence[RedundantCurve]) -> _Sheets:
+        """Those of curves of one pose."""
+        return cls(
+            curves[0].pose,
+            np.array([curve.interval for curve in curves]).T,
+            np.array([curve.whole for curve in curves]),
+            np.array([curve.sheet[1:] for curve in curves]).T,
+        )
+
+    def lean(self, u: Array, rows: NDArray[np.intp]) -> NDArray[np.complex128]:
+        """The lean (n,), a complex number, of the third axis from the first at parameters u (n,) of sheets (n,)."""
+        q7 = last_angle(u, self.intervals[:, rows], self.whole[rows])
+        x, y, _ = self.pose.third_axis(q7, *self.pose.angles(q7, *self.signs[:, rows]))
+        return np.asarray(x + 1j * y)
+
+    def zeros(self, u: Array, rows: NDArray[np.intp]) -> Array:
+        """The parameters (n,) next to u (n,) at which the third axis is in line, by Gauss and Newton; nan if there is
+        none."""
+        u, found, best = u.copy(), np.full(len(u), np.nan), np.full(len(u), np.inf)
+        going = np.arange(len(u))
+        for n in range(STEPS):
+            if not len(going):
+                break
+            at, three = u[going], np.tile(rows[going], 3)
+            before, here, after = self.lean(np.concatenate([at - STEP, at, at + STEP]), three).reshape(3, -1)
+            size, slope = np.abs(here), (after - before) / (2 * STEP)
+            found[going[size < IN_LINE]] = at[size < IN_LINE]
+            # next to a zero the steps converge quadratically; elsewhere they end where the lean is least
+            on = (size >= IN_LINE) & (np.abs(slope) > 0) & ((n <= FIRST_STEPS) | (size <= SLOW * best[going]))
+            best[going], going = size, going[on]
+            moved = u[going] - (np.conj(slope[on]) * here[on]).real / np.abs(slope[on]) ** 2
+            u[going] = np.clip(moved, np.where(self.whole[rows[going]], -np.pi, 0.0), np.pi)
+        return found

@@ -27,6 +27,7 @@ from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics import redundant_curve, traced_curve
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.decomposition import DecomposedArm
+from optimizer.kinematics.ik_solutions import IKSolution, PrincipalSolution, Singularities
 from optimizer.kinematics.isolated import distinct
 from optimizer.kinematics.multi_start import MultiStart
 from optimizer.kinematics.redundant_arm import RedundantArm
@@ -45,35 +46,6 @@ ACCURACY = 1e-9
 # members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
 # least so many
 MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
-
-
-@dataclass(frozen=True, eq=False)
-class IKSolution:
-    """One configuration q (nq,) [rad] that reaches a pose.
-
-    `smallest_singular_value` is that of the flange's geometric Jacobian (m and rad mixed, as usual), `limit_distance`
-    [rad] the least distance of any joint to its limits. `singular` names the parts of the label that are singular: the
-    configuration is on both branches of such a part. `self_motion` is the curve of solutions that it is a member of,
-    if any.
-    """
-
-    q: Array
-    label: BranchLabel
-    smallest_singular_value: float
-    limit_distance: float
-    singular: tuple[str, ...] = ()
-    self_motion: SelfMotion | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class PrincipalSolution:
-    """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits. See `IKSolution`."""
-
-    q: Array
-    label: BranchLabel
-    smallest_singular_value: float
-    singular: tuple[str, ...] = ()
-    self_motion: SelfMotion | None = None
 
 
 class InverseKinematics(Protocol):
@@ -174,6 +146,24 @@ class ClosedForm(Protocol):
         ...
 
 
+@dataclass(frozen=True, eq=False)
+class _Reached:
+    """Configurations q (n, nq) [rad] of one pose that forward kinematics confirms, and the curve of each, if any."""
+
+    q: Array
+    labels: list[BranchLabel]
+    curves: list[SelfMotion | None]
+
+    def principal(self, form: ClosedForm, chain: Chain) -> list[PrincipalSolution]:
+        """All of them; nobody may write to q from here on."""
+        self.q.setflags(write=False)
+        singularities = Singularities(chain, self.q, form.singular_parts)
+        return [
+            PrincipalSolution(q, label, curve, singularities, k)
+            for k, (q, label, curve) in enumerate(zip(self.q, self.labels, self.curves, strict=True))
+        ]
+
+
 class ClosedFormInverseKinematics:
     """`InverseKinematics` by a closed form, each solution confirmed by forward kinematics."""
 
@@ -193,38 +183,35 @@ class ClosedFormInverseKinematics:
 
     def branches(self, T_base_flange: Array, members: int = MEMBERS) -> list[PrincipalSolution]:
         """Every branch that reaches the flange pose (4, 4), and members of every self-motion: `InverseKinematics`."""
-        return self._branches(T_base_flange, members, None)
+        return self._reached(T_base_flange, members, None).principal(self._form, self._chain)
 
-    def _branches(self, T_base_flange: Array, members: int, limits: Limits | None) -> list[PrincipalSolution]:
-        """`branches`, less the arcs of self-motions that are outside the limits."""
+    def _reached(self, T_base_flange: Array, members: int, limits: Limits | None) -> _Reached:
+        """What `branches` returns, less the arcs of self-motions that are outside the limits."""
         T = _orthonormal(T_base_flange)
-        isolated, labels = self._form.solve(T)
-        found: list[tuple[Array, BranchLabel, SelfMotion | None]]
-        found = [(q, label, None) for q, label in zip(isolated, labels, strict=True)]
+        q, known = self._form.solve(T)
+        labels = list(known)
+        curves: list[SelfMotion | None] = [None] * len(labels)
         motions = self._form.self_motions(T, limits)
-        each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // max(len(motions), 1)))
-        configurations = _members(motions, [spread(motion, each) for motion in motions])
-        for motion, of_motion in zip(motions, configurations, strict=True):
-            curve = None if is_point(motion) else motion
-            found += [(q, motion.label, curve) for q in of_motion]
-        if not found:
-            return []
-        q = np.array([each for each, _, _ in found])
-        T_reached, jacobian = self._chain.flange_and_jacobian(q)
-        singular_values = np.linalg.svd(jacobian, compute_uv=False)[:, -1].tolist()
+        if motions:
+            each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // len(motions)))
+            configurations = _members(motions, [spread(motion, each) for motion in motions])
+            for motion, of_motion in zip(motions, configurations, strict=True):
+                labels += [motion.label] * len(of_motion)
+                curves += [None if is_point(motion) else motion] * len(of_motion)
+            q = np.vstack([q, *configurations])
         # never a wrong answer: a solution that forward kinematics does not confirm is dropped
-        position = np.linalg.norm(T_reached[:, :3, 3] - T[:3, 3], axis=1)
-        rotation = np.linalg.norm(T_reached[:, :3, :3] - T[:3, :3], axis=(1, 2)) / np.sqrt(2)
+        off = self._chain.flange(q) - T
+        if len(motions) < 2 and np.abs(off).max(initial=0.0) < ACCURACY / 4:
+            return _Reached(q, labels, curves)
+        position = np.linalg.norm(off[:, :3, 3], axis=1)
+        rotation = np.linalg.norm(off[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
         missed = np.maximum(position, rotation)
         chosen = np.flatnonzero(missed < ACCURACY)
         if len(motions) > 1:
             # two of a redundant arm's curves meet at an end that both have
             chosen = chosen[distinct(q[chosen], missed[chosen])]
-        q.setflags(write=False)
-        return [
-            PrincipalSolution(q[k], found[k][1], singular_values[k], self._form.singular_parts(q[k]), found[k][2])
-            for k in chosen.tolist()
-        ]
+        kept = chosen.tolist()
+        return _Reached(q[chosen], [labels[k] for k in kept], [curves[k] for k in kept])
 
     def solve(
         self,
@@ -239,27 +226,24 @@ class ClosedFormInverseKinematics:
         T = T_base_tcp if T_flange_tcp is None else flange_pose(T_base_tcp, T_flange_tcp)
         limits = self._limits if limits is None else limits
         try:
-            branches = self._branches(T, members, limits)
-            reachable = bool(branches) or bool(self.branches(T, members))
+            reached = self._reached(T, members, limits)
+            reachable = len(reached.q) > 0 or bool(self.branches(T, members))
         except SingularPose as error:
             raise SingularPose(target, error.smallest_singular_value) from None
         if not reachable:
             raise self._out_of_reach(T, target)
-        solutions = []
-        nearest, held = _nearest_turns(np.array([each.q for each in branches]), limits)
-        for k, branch in enumerate(branches):
-            if not held[k]:
+        nearest, held = _nearest_turns(reached.q, limits)
+        solutions = list[IKSolution]()
+        for branch, near, inside in zip(reached.principal(self._form, self._chain), nearest, held, strict=True):
+            if not inside:
                 continue
-            every_turn = windings and branch.self_motion is None
-            choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max) if every_turn else None
-            wound = nearest[k][None] if choices is None else np.array(list(product(*choices)))
-            wound.setflags(write=False)
-            distances = np.minimum(wound - limits.q_min, limits.q_max - wound).min(axis=1).tolist()
-            rest = branch.smallest_singular_value, branch.singular, branch.self_motion
-            solutions += [
-                IKSolution(q, branch.label, rest[0], distance, *rest[1:])
-                for q, distance in zip(wound, distances, strict=True)
-            ]
+            if windings and branch.self_motion is None:
+                choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
+                wound = np.array(list(product(*choices)))
+                wound.setflags(write=False)
+                solutions += [IKSolution(q, branch, limits) for q in wound]
+            else:
+                solutions.append(IKSolution(near, branch, limits))
         if not solutions:
             raise UnreachablePose(
                 target,
@@ -319,14 +303,17 @@ _TOGETHER: dict[type, Callable[[Any, Sequence[Array]], list[Array]]] = {
 }
 
 
-def _nearest_turns(q: Array, limits: Limits) -> tuple[Array, Mask]:
+def _nearest_turns(q: Array, limits: Limits) -> tuple[Array, Sequence[bool]]:
     """The first of `full_turn_alternatives` of every joint of q (n, nq) [rad] in [-π, π], and which rows (n,) have
     all."""
-    q = q.reshape(-1, len(limits.q_min))
+    if len(q) and (limits.q_min <= q.min(axis=0)).all() and (q.max(axis=0) <= limits.q_max).all():
+        return q, [True] * len(q)
     least = np.ceil((limits.q_min - ROUNDING - q) / tau)
     most = np.floor((limits.q_max + ROUNDING - q) / tau)
     near = np.clip(q + tau * np.clip(0.0, least, np.maximum(most, least)), limits.q_min, limits.q_max)
-    return np.asarray(near), np.asarray((least <= most).all(axis=1))
+    near.setflags(write=False)
+    held: Mask = np.asarray((least <= most).all(axis=1))
+    return np.asarray(near), held.tolist()
 
 
 def _orthonormal(T: Array) -> Array:

@@ -32,13 +32,20 @@ def distinct(q: Array, missed: Array, smallest: Array | None = None) -> list[int
     same = np.maximum(SAME, FOLD * np.sqrt(missed))
     if smallest is not None:
         same = np.maximum(same, ROUNDED / np.maximum(smallest, 1e-12))
-    apart = np.abs(wrapped(q[:, None] - q)).max(axis=2) > np.maximum(same[:, None], same)
-    if apart.sum() == len(q) * (len(q) - 1):
+    # a wave changes by no more than the sum of what its joints do: few pairs are left
+    wave = np.sin(q + np.arange(q.shape[1])).sum(axis=1)
+    i, j = np.nonzero(np.triu(np.abs(wave[:, None] - wave) <= q.shape[1] * same.max(initial=0.0), 1))
+    alike = np.abs(wrapped(q[i] - q[j])).max(axis=1) <= np.maximum(same[i], same[j])
+    if not alike.any():
         return list(range(len(q)))
-    chosen = list[int]()
+    others: list[set[int]] = [set() for _ in q]
+    for first, second in zip(i[alike].tolist(), j[alike].tolist(), strict=True):
+        others[first].add(second)
+        others[second].add(first)
+    chosen = set[int]()
     for k in np.argsort(missed, kind="stable").tolist():
-        if apart[k, chosen].all():
-            chosen.append(k)
+        if not others[k] & chosen:
+            chosen.add(k)
     return sorted(chosen)
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array
-from optimizer.kinematics.redundant_pose import RedundantPose
+from optimizer.kinematics.redundant_pose import RedundantPose, to_cosine
 
 # what cosines [1] and half sides [rad] are widened by, for rounding; the former is a root's
 COSINE, ROUNDING = 1e-14, 1e-9
@@ -37,29 +37,23 @@ class Cells:
 
 def boxes_of(pose: RedundantPose, cells: Cells) -> tuple[Array, Array]:
     """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells."""
-    form, (square, height) = pose.form, pose.waves
+    form = pose.form
     low, high, (side, elbow, wrist) = cells.low, cells.high, cells.sheet.T
     middle, half = (low + high) / 2, (high - low) / 2
-    distance = _wave_range(square, low, high)
-    cos = [np.clip((form.squares - d) / (2 * form.rho * form.nu), -1.0, 1.0) for d in reversed(distance)]
+    distance, v_z = np.stack(_wave_range(np.array(pose.waves).T[:, :, None], low, high), axis=1)
+    cos = to_cosine((form.squares - distance[::-1]) / (2 * form.rho * form.nu))
     # an angle at most this much beyond its cosine's: arccos is steepest, as a root, at 1
-    theta_low, theta_high = (np.arccos(np.clip(c + s, -1.0, 1.0)) for c, s in ((cos[1], COSINE), (cos[0], -COSINE)))
+    theta_low, theta_high = np.arccos(to_cosine(np.array([cos[1] + COSINE, cos[0] - COSINE])))
     theta, theta_half = elbow * (theta_low + theta_high) / 2, (theta_high - theta_low) / 2
-    v_z = _wave_range(height, low, high)
     along = _wave_range(np.array(form.along_fifth), theta - theta_half, theta + theta_half)
     radius = _radii(distance, v_z)
     psi, psi_half = _wrist_angle(form.fifth_in_6[2], form.inclined, along, v_z, radius)
-    v = pose.from_wrist(middle)
+    last, (v_from_6, S_from_5, seen_from_5) = pose.wrist(middle, theta, wrist * psi)
+    centre = pose.completed(last, side)
     moved = 2 * np.hypot(*pose.shoulder[:2]) * np.sin(np.minimum(half, np.pi) / 2)
-    q6_half = psi_half + _turned(moved, np.hypot(v[:, 0], v[:, 1]))
-    centre = pose.at_angles(middle, theta, wrist * psi, side)
-    q6 = centre[:, 5]
-    S = form.shoulder_about_fifth(theta)
-    axis = form.placements[5][:3, :3]
-    seen = np.stack([np.cos(q6) * v[:, 0] - np.sin(q6) * v[:, 1], np.sin(q6) * v[:, 0] + np.cos(q6) * v[:, 1], v[:, 2]])
-    seen = axis[:2] @ seen
+    q6_half = psi_half + _turned(moved, v_from_6)
     far = moved + 2 * radius[1] * np.sin(np.minimum(q6_half, np.pi) / 2)
-    q5_half = _turned(form.rho * theta_half, np.hypot(S[:, 0], S[:, 1])) + _turned(far, np.hypot(seen[0], seen[1]))
+    q5_half = _turned(form.rho * theta_half, S_from_5) + _turned(far, seen_from_5)
     sides = np.zeros((len(low), 7))
     sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, q5_half, q6_half, half
     return centre, with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
@@ -76,9 +70,12 @@ def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
 
 
 def _wave_range(wave: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Least and greatest (n,) of a + b cos x + c sin x over [low, high] (n,); widened for rounding."""
+    """Least and greatest of a + b cos x + c sin x over [low, high] (n,); widened for rounding.
+
+    Of a wave (3,) they are (n,), of waves (3, m, 1) they are (m, n).
+    """
     a, b, c = wave
-    size, phase = float(np.hypot(b, c)), float(np.arctan2(c, b))
+    size, phase = np.hypot(b, c), np.arctan2(c, b)
     start, length = (low - phase) % (2 * np.pi), high - low
     ends = np.cos(start), np.cos(start + length)
     most = np.where(start + length >= 2 * np.pi, 1.0, np.maximum(*ends))
@@ -87,7 +84,7 @@ def _wave_range(wave: Array, low: Array, high: Array) -> tuple[Array, Array]:
     return a + size * least - COSINE, a + size * most + COSINE
 
 
-def _radii(distance: tuple[Array, Array], v_z: tuple[Array, Array]) -> tuple[Array, Array]:
+def _radii(distance: Array, v_z: Array) -> tuple[Array, Array]:
     """Range of r = sqrt(|v|² - v_z²) [m]."""
     largest = np.maximum(np.abs(v_z[0]), np.abs(v_z[1]))
     smallest = np.where(v_z[0] * v_z[1] <= 0, 0.0, np.minimum(np.abs(v_z[0]), np.abs(v_z[1])))
@@ -98,7 +95,7 @@ def _radii(distance: tuple[Array, Array], v_z: tuple[Array, Array]) -> tuple[Arr
 
 
 def _wrist_angle(
-    cosine: float, sine: float, along: tuple[Array, Array], v_z: tuple[Array, Array], radius: tuple[Array, Array]
+    cosine: float, sine: float, along: tuple[Array, Array], v_z: Array, radius: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Middle and half range (n,) [rad] of |ψ|, whose cosine is (c - e v_z) / (r sine), e the given cosine."""
     ends = [cosine * v_z[0], cosine * v_z[1]]
@@ -106,7 +103,7 @@ def _wrist_angle(
     near, far = (np.maximum(each * sine, 1e-300) for each in radius)
     low = np.where(least < 0, least / near, least / far)
     high = np.where(most > 0, most / near, most / far)
-    wide, narrow = (np.arccos(np.clip(x, -1.0, 1.0)) for x in (low - COSINE, high + COSINE))
+    wide, narrow = np.arccos(to_cosine(np.array([low - COSINE, high + COSINE])))
     return (wide + narrow) / 2, (wide - narrow) / 2
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.kinematics.angles import nearest_turn, wrapped
@@ -60,7 +61,7 @@ class RedundantCurve:
 
     def last_angle(self, parameter: Array) -> Array:
         """q7 (n,) [rad] at parameters (n,)."""
-        return _last_angle(np.asarray(parameter, dtype=float), np.array(self.interval), np.asarray(self.whole))
+        return last_angle(np.asarray(parameter, dtype=float), np.array(self.interval), np.asarray(self.whole))
 
     def parameter(self, q: Array) -> float:
         """The parameter of the member nearest to q (7,), nearly: that with its last angle, then on along the tangent.
@@ -130,52 +131,85 @@ def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> li
 def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list[RedundantCurve]:
     """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every member that is.
 
-    What is left out is proven to be outside by its box. The arcs reach beyond the limits by some thousandths.
+    Each is given with both shoulders. What is left out is proven to be outside by its box. The arcs reach beyond the
+    limits by some thousandths.
     """
     if not curves:
         return []
-    # curve, lower and upper end of parts that may be within the limits, and of those that are
-    arcs = [(k, lower, upper) for k, curve in enumerate(curves) for lower, upper in curve.arcs]
-    part = np.array(arcs)
-    done: list[Array] = []
+    owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
+    pairs = _Pairs.of([curves[k] for k in owner[0]])
+    lower, upper = np.array([curves[k].arcs[0] for k in owner[0]]).T
+    # parts of the curves of pairs, and which of the two are not decided there
+    pair, undecided = np.arange(len(lower)), np.ones((2, len(lower)), dtype=bool)
+    kept = list[Array]()
     for count in PARTS:
-        step = (part[:, 2] - part[:, 1]) / count
-        lower = (part[:, 1, None] + step[:, None] * np.arange(count)).ravel()
-        upper = np.append(lower[1:], 0.0)
-        upper[count - 1 :: count] = part[:, 2]
-        part = np.column_stack([np.repeat(part[:, 0], count), lower, upper])
-        held, inside = _judged(curves, part, q_min, q_max)
-        done.append(part[inside])
-        part = part[held & ~inside]
-        if not len(part):
+        ends = lower[:, None] + ((upper - lower) / count)[:, None] * np.arange(count + 1)
+        ends[:, -1] = upper
+        lower, upper = ends[:, :-1].ravel(), ends[:, 1:].ravel()
+        pair, undecided = np.repeat(pair, count), np.repeat(undecided, count, axis=1)
+        held, inside = pairs.judged(pair, lower, upper, q_min, q_max)
+        side, row = np.nonzero(inside & undecided)
+        kept.append(np.array([owner[side, pair[row]], lower[row], upper[row]]))
+        undecided &= held & ~inside
+        left = undecided.any(axis=0)
+        pair, lower, upper, undecided = pair[left], lower[left], upper[left], undecided[:, left]
+        if not len(pair):
             break
-    rows = np.concatenate([*done, part])
-    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    side, row = np.nonzero(undecided)
+    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row]]))
+    return _joined(curves, np.concatenate(kept, axis=1))
+
+
+def _joined(curves: Sequence[RedundantCurve], parts: Array) -> list[RedundantCurve]:
+    """The curves, cut to parts (3, n): index of a curve, lower and upper end."""
+    owner, lower, upper = parts[:, np.lexsort((parts[1], parts[0]))]
+    goes_on = (owner[1:] == owner[:-1]) & (lower[1:] == upper[:-1])
+    starts, stops = np.append(True, ~goes_on), np.append(~goes_on, True)
     found: list[list[tuple[float, float]]] = [[] for _ in curves]
-    for k, low, high in rows.tolist():
-        own = found[int(k)]
-        if own and own[-1][1] == low:
-            own[-1] = (own[-1][0], high)
-        else:
-            own.append((low, high))
+    if len(owner):
+        for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
+            found[int(k)].append((low, high))
     return [replace(curve, arcs=own) for curve, own in zip(curves, found, strict=True) if own]
 
 
-def _judged(curves: Sequence[RedundantCurve], part: Array, q_min: Array, q_max: Array) -> tuple[Mask, Mask]:
-    """Which parts (n, 3) may have members within the limits, and which have no others."""
-    owner = part[:, 0].astype(int)
-    interval = np.array([curve.interval for curve in curves])[owner].T
-    whole = np.array([curve.whole for curve in curves])[owner]
-    low, high = (_last_angle(u, interval, whole) for u in (part[:, 1], part[:, 2]))
-    centre, half = boxes_of(curves[0].pose, Cells(low, high, np.array([curve.sheet for curve in curves])[owner]))
-    middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
-    away = np.abs(wrapped(centre - middle))
-    held = (away <= width + half).all(axis=1)
-    inside = ((away + half <= width) | (width >= np.pi)).all(axis=1)
-    return np.asarray(held), np.asarray(inside)
+@dataclass(frozen=True, eq=False)
+class _Pairs:
+    """Curves of one pose over intervals (2, m) of q7, which are `whole` (m,), on sheets (m, 3) and on their
+    counterparts with the other shoulder."""
+
+    pose: RedundantPose
+    interval: Array
+    whole: Mask
+    sheet: Array
+
+    @classmethod
+    def of(cls, curves: Sequence[RedundantCurve]) -> _Pairs:
+        """Those of curves on the right shoulder."""
+        return cls(
+            curves[0].pose,
+            np.array([curve.interval for curve in curves]).T,
+            np.array([curve.whole for curve in curves]),
+            np.array([curve.sheet for curve in curves]),
+        )
+
+    def judged(self, pair: NDArray[np.intp], low: Array, high: Array, q_min: Array, q_max: Array) -> tuple[Mask, Mask]:
+        """Which parts, low … high (n,) of pairs (n,), may have members within the limits, and which have no others;
+        (2, n) each, the first row for the right shoulder."""
+        interval, whole = self.interval[:, pair], self.whole[pair]
+        start, end = last_angle(np.array([low, high]), interval, whole)
+        right, half = boxes_of(self.pose, Cells(start, end, self.sheet[pair]))
+        # with the other shoulder, the third axis leans to the other side
+        left = right.copy()
+        left[:, 0], left[:, 2] = right[:, 0] + np.pi, right[:, 2] + np.pi
+        left[:, 1] = -right[:, 1] - 2 * self.pose.form.lean_at_zero
+        middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
+        away = np.abs(wrapped(np.array([right, left]) - middle))
+        held = (away <= width + half).all(axis=2)
+        inside = ((away + half <= width) | (width >= np.pi)).all(axis=2)
+        return np.asarray(held), np.asarray(inside)
 
 
-def _last_angle(u: Array, interval: Array, whole: Mask) -> Array:
-    """q7 (n,) [rad] at parameters u (n,) of curves over intervals (2,) or (2, n) [rad]."""
+def last_angle(u: Array, interval: Array, whole: Mask) -> Array:
+    """q7 (…, n) [rad] at parameters u (…, n) of curves over intervals (2,) or (2, n) [rad]."""
     a, b = interval
     return np.where(whole, u, (a + b) / 2 - (b - a) / 2 * np.cos(u))

@@ -46,19 +46,22 @@ class RedundantPose:
 
     def from_wrist(self, q7: Array) -> Array:
         """v (n, 3) [m] at q7 (n,) [rad]."""
+        (still, cos, sin), c, s = self._wrist_waves, np.cos(q7)[:, None], np.sin(q7)[:, None]
+        return np.asarray(still + c * cos + s * sin)
+
+    @cached_property
+    def _wrist_waves(self) -> tuple[Array, Array, Array]:
+        """Coefficients (3,) [m] of 1, cos q7 and sin q7 in v."""
         x, y, z = self.shoulder
-        c, s = np.cos(q7), np.sin(q7)
-        turned = np.stack([c * x - s * y, s * x + c * y, np.full_like(c, z)], axis=-1)
         P = self.form.placements[6]
-        return np.asarray(turned @ P[:3, :3].T + (P[:3, 3] - [0.0, 0.0, self.form.sixth]))
+        R = P[:3, :3]
+        still = P[:3, 3] - [0.0, 0.0, self.form.sixth] + R[:, 2] * z
+        return still, R[:, 0] * x + R[:, 1] * y, R[:, 1] * x - R[:, 0] * y
 
     @cached_property
     def waves(self) -> tuple[Array, Array]:
         """Coefficients (3,) of 1, cos q7 and sin q7 in |v|² [m²] and in v_z [m]."""
-        x, y, z = self.shoulder
-        P = self.form.placements[6]
-        R, p = P[:3, :3], P[:3, 3] - [0.0, 0.0, self.form.sixth]
-        still, cos, sin = p + R[:, 2] * z, R[:, 0] * x + R[:, 1] * y, R[:, 1] * x - R[:, 0] * y
+        still, cos, sin = self._wrist_waves
         # cos and sin are at right angles, and as long as each other
         square = np.array([still @ still + cos @ cos, 2 * still @ cos, 2 * still @ sin])
         return square, np.array([still[2], cos[2], sin[2]])
@@ -72,7 +75,7 @@ class RedundantPose:
         c, s = np.cos(q7), np.sin(q7)
         distance = square[0] + square[1] * c + square[2] * s
         v_z = height[0] + height[1] * c + height[2] * s
-        cos = np.clip((form.squares - distance) / (2 * form.rho * form.nu), -1.0, 1.0)
+        cos = to_cosine((form.squares - distance) / (2 * form.rho * form.nu))
         k0, kc, ks = form.along_fifth
         along = k0 + kc * cos + ks * elbow * np.sqrt((1 - cos) * (1 + cos))
         radius = np.sqrt(np.maximum(distance - v_z**2, 0.0))
@@ -94,42 +97,61 @@ class RedundantPose:
     ) -> Array:
         """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint (0) or the fifth (4)
         may have any angle (n,): that in `free`."""
-        form, P = self.form, self.form.placements[:, :3, :3]
-        v, fifth = self.from_wrist(q7), form.fifth_in_6
-        q = np.empty((len(q7), 7))
-        q[:, 6], q[:, 3] = q7, form.q4_at_zero - theta
-        q[:, 5] = psi - np.arctan2(v[:, 1], v[:, 0]) + np.arctan2(fifth[1], fifth[0])
-        wrist = P[5] @ _about_z(q[:, 5])
+        last = self.wrist(q7, theta, psi)[0]
         free = {} if free is None else free
         if 4 in free:
-            q[:, 4] = free[4]
-        else:
-            seen, S = np.einsum("nxy,ny->nx", wrist, v), form.shoulder_about_fifth(theta)
-            q[:, 4] = np.arctan2(S[:, 1], S[:, 0]) - np.arctan2(seen[:, 1], seen[:, 0])
-        rest = P[3] @ _about_z(q[:, 3]) @ (P[4] @ _about_z(q[:, 4])) @ wrist @ (P[6] @ _about_z(q[:, 6]))
-        q[:, :3] = self._shoulder_angles(self.orientation @ rest.transpose(0, 2, 1), shoulder, free.get(0))
-        return np.clip(wrapped(q), -np.pi, np.pi)
+            last[1] = free[4]
+        return self.completed(last, shoulder, free.get(0))
 
-    def _shoulder_angles(self, R: Array, side: Array, q1: Array | None) -> Array:
-        """The first three angles (n, 3) [rad] that give link 3 the orientation R (n, 3, 3)."""
-        P = self.form.placements[:, :3, :3]
-        u = P[0].T @ R
-        third, first = P[2][:, 2], P[1][2]
-        chi = side * np.arctan2(np.hypot(u[:, 0, 2], u[:, 1, 2]), u[:, 2, 2])
-        q = np.empty((len(R), 3))
-        q[:, 1] = chi - np.arctan2(third[1], third[0]) + np.arctan2(first[1], first[0])
-        # the third axis leans towards this direction of the first joint's frame if χ > 0
-        lean = P[1] @ [-first[1], first[0], 0.0]
-        q[:, 0] = np.arctan2(side * u[:, 1, 2], side * u[:, 0, 2]) - np.arctan2(lean[1], lean[0]) if q1 is None else q1
-        first_two = _about_z(q[:, 0]) @ P[1] @ _about_z(q[:, 1]) @ P[2]
-        turn = first_two.transpose(0, 2, 1) @ u
-        q[:, 2] = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
-        return q
+    def wrist(self, q7: Array, theta: Array, psi: Array) -> tuple[Array, Array]:
+        """The last four joint positions (4, n) [rad] at the given angles (n,), and three distances (3, n) [m].
+
+        They are that of v from the sixth axis, and that of S from the fifth, seen from either side of it.
+        """
+        form, v, S = self.form, self.from_wrist(q7).T, self.form.shoulder_about_fifth(theta).T
+        last = np.empty((4, len(q7)))
+        last[0], last[3] = form.q4_at_zero - theta, q7
+        last[2] = psi - np.arctan2(v[1], v[0]) + form.fifth_azimuth
+        # the fifth angle is between the azimuths of S, seen from both sides
+        x, y, _ = form.rotations[5] @ _turned(v, np.cos(last[2]), np.sin(last[2]))
+        last[1] = np.arctan2(S[1] * x - S[0] * y, S[0] * x + S[1] * y)
+        return last, np.hypot(np.array([v[0], S[0], x]), np.array([v[1], S[1], y]))
+
+    def completed(self, last: Array, shoulder: Array, q1: Array | None = None) -> Array:
+        """Configurations (n, 7) [rad] in [-π, π] with the last four joints (4, n) and signs of the shoulder (n,)."""
+        form, q = self.form, np.empty((7, last.shape[1]))
+        q[3:] = last
+        first, third = self._axes(last, [0, 2]).transpose(1, 0, 2)
+        q[1] = shoulder * np.arctan2(np.hypot(third[0], third[1]), third[2]) - form.lean_at_zero
+        q[0] = np.arctan2(shoulder * third[1], shoulder * third[0]) - form.lean_azimuth if q1 is None else q1
+        # what is left of the first axis of link 3 is turned by the third angle
+        c, s = np.cos(q[:2]), np.sin(q[:2])
+        for j in (0, 1):
+            first = form.rotations[j + 1].T @ _turned(first, c[j], -s[j])
+        q[2] = np.arctan2(first[1], first[0])
+        return np.ascontiguousarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi).T)
+
+    def third_axis(self, q7: Array, theta: Array, psi: Array) -> Array:
+        """The third axis (3, n) in the frame of joint 1 at q1 = 0, at angles (n,)."""
+        return self._axes(self.wrist(q7, theta, psi)[0], [2])[:, 0]
+
+    def _axes(self, last: Array, which: list[int]) -> Array:
+        """Axes (3, k, n) of link 3, 0 … 2 its x, y, z, in the frame of joint 1 at q1 = 0, at the last joints (4, n)."""
+        R, c, s = self.form.rotations, np.cos(last), np.sin(last)
+        seen = np.repeat(R[3][which].T[:, :, None], last.shape[1], axis=2)
+        for j, placement in enumerate((*R[4:], self._from_last)):
+            seen = (placement.T @ _turned(seen, c[j], -s[j]).reshape(3, -1)).reshape(seen.shape)
+        return np.asarray(seen)
+
+    @cached_property
+    def _from_last(self) -> Array:
+        """Rotation (3, 3) of joint 1 at q1 = 0 in the frame of the last link."""
+        return np.asarray(self.orientation.T @ self.form.rotations[0])
 
     def intervals(self, elbow: float) -> list[tuple[float, float]]:
         """The intervals [rad] of q7, each within a turn, in which both sheets of this elbow are; (-π, π) if nothing
         bounds them. An interval may be one angle."""
-        edges = self._edges()
+        edges = self._edges
         if not len(edges):
             return [(-np.pi, np.pi)] if self._excess(np.array([0.0]), elbow)[0] >= -ROUNDING else []
         ends = np.append(edges, edges[0] + 2 * np.pi)
@@ -163,6 +185,7 @@ class RedundantPose:
         _, along, reach = self.cosines(q7, np.full_like(q7, elbow))
         return np.asarray(np.minimum(1 - cos**2, (reach**2 - along**2) / np.maximum(distance, TINY)))
 
+    @cached_property
     def _edges(self) -> Array:
         """Angles (k,) [rad] in [-π, π), sorted, at which a sheet of any sign may end."""
         form, (square, height) = self.form, self.waves
@@ -176,19 +199,32 @@ class RedundantPose:
         P = _sum(form.inclined**2 * _sum(d2, -np.convolve(v_z, v_z)), -np.convolve(flat, flat), -(ks**2) * sin2)
         if abs(ks) > ROUNDING:
             P = _sum(np.convolve(P, P), -4 * ks**2 * np.convolve(np.convolve(flat, flat), sin2))
-        found = np.sort(np.concatenate([_angles(P), _angles(sin2)]))
+        found = np.sort(np.concatenate([_angles(P), self._straight()]))
         if not len(found):
             return found
         return np.asarray(found[np.append(True, np.diff(found) > APART)])
 
+    def _straight(self) -> Array:
+        """Angles (k,) [rad] at which the elbow is stretched or folded, or nearly: |cos θ| = 1."""
+        square, reach = self.waves[0], 2 * self.form.rho * self.form.nu
+        size, phase = float(np.hypot(square[1], square[2])), float(np.arctan2(square[2], square[1]))
+        if size <= NEGLIGIBLE * reach:
+            return np.zeros(0)
+        cosines = (self.form.squares - square[0] + np.array([reach, -reach])) / size
+        turned = np.arccos(to_cosine(cosines[np.abs(cosines) < 1 + NEAR_CIRCLE**2 / 2]))
+        return np.asarray(wrapped(np.concatenate([phase + turned, phase - turned])))
 
-def _about_z(angle: Array) -> Array:
-    """Rotations (n, 3, 3) about z."""
-    R = np.zeros((len(angle), 3, 3))
-    R[:, 0, 0] = R[:, 1, 1] = np.cos(angle)
-    R[:, 1, 0] = np.sin(angle)
-    R[:, 0, 1], R[:, 2, 2] = -R[:, 1, 0], 1.0
-    return R
+
+def to_cosine(x: Array) -> Array:
+    """x clipped to [-1, 1]: several times as fast as numpy's for few numbers."""
+    return np.asarray(np.minimum(np.maximum(x, -1.0), 1.0))
+
+
+def _turned(v: Array, c: Array, s: Array) -> Array:
+    """Vectors (3, …, n), each turned about z by the angle of cosine c and sine s (n,)."""
+    turned = np.empty(v.shape)
+    turned[0], turned[1], turned[2] = c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
+    return turned
 
 
 def _wave(coefficients: Array) -> Array:

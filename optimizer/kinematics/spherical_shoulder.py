@@ -67,6 +67,11 @@ class SphericalShoulder:
         return form if min(form.rho * form.nu, form.inclined) > EQUAL else None
 
     @cached_property
+    def rotations(self) -> tuple[Array, ...]:
+        """Those (3, 3) of the placements."""
+        return tuple(self.placements[:, :3, :3])
+
+    @cached_property
     def _wrist_in_4(self) -> Array:
         """W in the frame of link 4."""
         return np.asarray(self.placements[4][:3, 3] + self.fifth * self.placements[4][:3, 2])
@@ -139,6 +144,13 @@ class SphericalShoulder:
         """χ [rad], the angle of the third axis from the first, at a second angle of zero."""
         first, third = self.placements[1][2], self.placements[2][:, 2]
         return float(np.arctan2(third[1], third[0]) - np.arctan2(first[1], first[0]))
+
+    @cached_property
+    def lean_azimuth(self) -> float:
+        """Azimuth [rad], in the frame of link 1, of the direction that the third axis leans towards if χ > 0."""
+        first = self.placements[1][2]
+        lean = self.placements[1][:3, :3] @ [-first[1], first[0], 0.0]
+        return float(np.arctan2(lean[1], lean[0]))
 
     def lean(self, q2: Array) -> Array:
         """χ (n,) [rad] at the second angle q2 (n,)."""

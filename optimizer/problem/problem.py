@@ -98,10 +98,6 @@ class Problem:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise InvalidProblem(name, f"{name} must be a positive number of seconds.")
 
-    def allows(self, label: object, singular: Sequence[str] = ()) -> bool:
-        """Whether `branch` allows a configuration of this label that is singular in these parts: see `BranchFilter`."""
-        return self.branch is None or self.branch.allows(label, singular)
-
 
 def narrowed(problem: Problem, start: int, goal: int) -> Problem:
     """The same problem with only one target each: those of index `start` and `goal` among its own."""

@@ -107,7 +107,8 @@ def _ends_of(
     solutions = kinematics.solve(
         target.T, problem.arm.T_flange_tcp, limits, windings=False, target=name, members=on_curve
     )
-    solutions = [s for s in solutions if problem.allows(s.label, s.singular)]
+    if problem.branch is not None:
+        solutions = [s for s in solutions if problem.branch.allows(s.label, s.singular)]
     if not solutions:
         raise UnreachablePose(
             name, None, f"The branch asked for does not reach the {name} pose: leave `branch` out to try them all."

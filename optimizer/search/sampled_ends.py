@@ -128,7 +128,8 @@ def _branches_of(prepared: PreparedProblem, pose: ConeOrientedPose, q: Array) ->
         branches = kinematics.branches(flange_pose(T_base_tcp, arm.T_flange_tcp))
     except SingularPose:
         return []
-    return [each.q for each in branches if prepared.problem.allows(each.label, each.singular)]
+    wanted = prepared.problem.branch
+    return [each.q for each in branches if wanted is None or wanted.allows(each.label, each.singular)]
 
 
 def _reaches(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> bool:

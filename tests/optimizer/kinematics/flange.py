@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from optimizer.kinematics.inverse import IKSolution, required_inverse_kinematics
+from optimizer.kinematics.ik_solutions import IKSolution
+from optimizer.kinematics.inverse import required_inverse_kinematics
 from tests.optimizer.moves import ROBOT
 
 IK = required_inverse_kinematics(ROBOT, "goal")

@@ -10,7 +10,8 @@ import pinocchio as pin
 from models.registry import load_robot
 from models.robot import Array, Robot
 from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.inverse import PrincipalSolution, required_inverse_kinematics
+from optimizer.kinematics.ik_solutions import PrincipalSolution
+from optimizer.kinematics.inverse import required_inverse_kinematics
 
 # m and rad: what an answer may miss its pose by, and a configuration itself; and what two of them differ by at least
 ACCURACY, FOUND, SAME = 1e-9, 1e-6, 1e-6

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from models.robot import Array
-from optimizer.kinematics.inverse import MEMBERS, IKSolution
+from optimizer.kinematics.ik_solutions import IKSolution
+from optimizer.kinematics.inverse import MEMBERS
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.kinematics.ur_closed_form import LEAST_AHEAD, URClosedForm
 from optimizer.problem.branches import BranchFilter
