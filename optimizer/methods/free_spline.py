@@ -18,7 +18,6 @@ from optimizer.energy.plant import has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
-from optimizer.nlp.coordinates import Coordinates
 from optimizer.nlp.sqp import PROGRESS
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
@@ -63,8 +62,7 @@ class FreeSpline(SqpMethod):
         tried: list[SolveResult] = []
         if not self.interval.minimum_time and self.t_max >= TIGHT * shortest:
             space = bspline.uniform(COARSE)
-            points = smoothed(space, self.coordinates)
-            tried.append(self.improve(Guess(space, points, 0.0, rough=True, progress=self._progress)))
+            tried.append(self.improve(Guess(space, self._smoothed(space), 0.0, rough=True, progress=self._progress)))
         if not tried or (tried[-1].status is SolveStatus.FAILED and tried[-1].collision is None):
             tried.append(self.improve(self.time_optimal_guess()))
         if tried[-1].status is SolveStatus.FAILED and tried[-1].collision is not None:
@@ -149,12 +147,12 @@ class FreeSpline(SqpMethod):
         line = self.coordinates
         return bspline.graded(seven_segment.switches(line.goal - line.start, duration, line.limits), repeat)
 
+    def _smoothed(self, space: Basis) -> Array:
+        """Control points (n, r) of the smoothed time-optimal motion: its positions at the Greville points.
 
-def smoothed(space: Basis, line: Coordinates) -> Array:
-    """Control points (n, r) of the smoothed time-optimal motion: its positions at the Greville points.
-
-    A spline with a function's values there as control values varies less than the function (Schoenberg).
-    """
-    points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
-    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
-    return points
+        A spline with a function's values there as control values varies less than the function (Schoenberg).
+        """
+        line = self.coordinates
+        points = time_optimal_positions(line.limits, line.start, line.goal, bspline.greville(space.knots))
+        points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = line.start, line.goal
+        return points

@@ -8,7 +8,6 @@ from optimizer.deadline import Deadline
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate, Reason
-from optimizer.search.first_motions import FirstMotions
 from optimizer.solution import CandidateStatus
 
 
@@ -19,25 +18,20 @@ def explore(
     deadline: Deadline,
     most_solved: int | None = None,
     ended: Callable[[Candidate], None] = lambda _: None,
-    first: FirstMotions | None = None,
 ) -> Candidate | None:
     """Solve candidates in order of lower bound until none is below the incumbent; returns it, None if there is none.
 
     After `most_solved` solved candidates the others are not solved. A candidate that is postponed comes again after the
-    one whose path was found instead. `ended` gets every candidate that was solved, or tried in vain. With `first`, they
-    are solved in order of their first motions, until those leave the others no hope.
+    one whose path was found instead. `ended` gets every candidate that was solved, or tried in vain.
     """
     best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
-    queue = sorted(candidates, key=lambda e: (first.of_candidate(e) if first else e.lower_bound, e.shortest))
+    queue = sorted(candidates, key=lambda e: (e.lower_bound, e.shortest))
     while queue:
         candidate = queue.pop(0)
         if candidate.status is not CandidateStatus.UNVISITED or candidate.deferred:
             continue
         if best is not None and best.energy is not None and candidate.lower_bound >= best.energy:
             candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
-            continue
-        if first is not None and first.are_better(candidate):
-            candidate.settle(CandidateStatus.PRUNED, Reason.FIRST_MOTION)
             continue
         if most_solved is not None and sum(e.status is CandidateStatus.SOLVED for e in candidates) >= most_solved:
             message = f"the method solves no more than {most_solved} candidates"

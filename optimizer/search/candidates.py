@@ -40,7 +40,6 @@ class Reason(Enum):
     DEFERRED = "other samples of the target have smaller lower bounds"
     ENOUGH_SOLVED = "the method solves no more candidates"
     BOUND = "its lower bound is not below the best energy found"
-    FIRST_MOTION = "not solved: others need much less work for their first motions"
     INVALID_END = "the arm cannot be at one of its ends"
     TOO_SLOW = "takes longer than allowed"
     METHOD = "as the method says"

@@ -23,7 +23,6 @@ from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
-from optimizer.search.first_motions import FirstMotions
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_others
@@ -167,8 +166,6 @@ class Run:
         incumbent = self.incumbent
         candidates, most_solved = incumbent.candidates, incumbent.method.most_solved
         self.activate()
-        mechanical = self.problem.objective == "mechanical" and incumbent.method.evenly_spaced
-        first = FirstMotions.of(incumbent.prepared, candidates) if mechanical and len(candidates) > 1 else None
         while True:
             explore(
                 incumbent.prepared,
@@ -177,7 +174,6 @@ class Run:
                 incumbent.deadline,
                 most_solved,
                 incumbent.tell_tried,
-                first,
             )
             if incumbent.best() is not None or incumbent.deadline.passed or not self.activate():
                 break
