@@ -11,6 +11,7 @@ which few control points hardly show. Coarse solves from random motions are chea
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -35,8 +36,9 @@ PROGRESS, LAST_PROGRESS = 1e-3, 2e-4
 # first solves are rough and coarse: those that need at most this ratio of the least energy are solved in the middle
 # space, and so many of them
 CONTENDING, CONTENDERS = 1.35, 6
-# then other candidates are followed if they need at most this ratio of the least energy, and so many of them
-NEAR, RIVALS = 1.03, 2
+# then other candidates are followed if they need at most this ratio of the least energy, and so many of them; they are
+# given up once they need more than the last ratio of what the best one needed at the same width
+NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
 # half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
 WAVES, AMPLITUDES = 3, (0.1, 1.5)
 # a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
@@ -59,13 +61,12 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     if best.spline.duration < LEAST_FREEDOM * shortest:
         return
     for rough in _near(incumbent, best, CONTENDING)[:CONTENDERS]:
-        follower = _Follower(incumbent, rough)
-        follower.solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
+        _Follower(incumbent, rough).solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
     best = incumbent.best() or best
     rivals = _near(incumbent, best, NEAR)[1 : RIVALS + 1]
-    _Follower(incumbent, best).follow(restarts=RESTARTS if problem.objective == "mechanical" else 0)
+    ahead = _Follower(incumbent, best).follow(restarts=RESTARTS if problem.objective == "mechanical" else 0)
     for rival in rivals:
-        _Follower(incumbent, rival).follow(restarts=0)
+        _Follower(incumbent, rival).follow(restarts=0, ahead=ahead)
 
 
 def _near(incumbent: Incumbent, best: Candidate, ratio: float) -> list[Candidate]:
@@ -86,15 +87,23 @@ class _Follower:
     incumbent: Incumbent
     candidate: Candidate
 
-    def follow(self, restarts: int) -> None:
-        """Solve with sharper and sharper corners, from the candidate's motion or from the best of random ones."""
-        coarse = sorted(self._restarted(restarts), key=self.incumbent.prepared.cost_of)[:FOLLOWED]
+    def follow(self, restarts: int, ahead: Sequence[float] = ()) -> list[float]:
+        """Solve with sharper and sharper corners, from the candidate's motion or from the best of random ones.
+
+        Returns the energies [J] at each width, inf without a motion. Ends early if one is far above that of `ahead`.
+        """
+        cost_of = self.incumbent.prepared.cost_of
+        coarse = sorted(self._restarted(restarts), key=cost_of)[:FOLLOWED]
         middle = [self.solved(motion, WIDTH, MIDDLE, PROGRESS) for motion in coarse]
-        motions = [self.candidate.spline, *(motion for motion in middle if motion is not None)]
-        best: Spline | None = min(motions, key=self.incumbent.prepared.cost_of)
+        best: Spline | None = min([self.candidate.spline, *(each for each in middle if each is not None)], key=cost_of)
+        energies: list[float] = []
         for width in SHARPER_WIDTHS:
             progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
             best = None if best is None else self.solved(best, width, DENSE, progress)
+            energies.append(cost_of(best))
+            if ahead and energies[-1] > BEHIND * ahead[len(energies) - 1]:
+                break
+        return energies
 
     def _restarted(self, count: int) -> list[Spline]:
         """Coarse motions from random displacements of the rest-to-rest quintic."""
