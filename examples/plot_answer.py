@@ -1,6 +1,6 @@
 """Draws an answer: joint positions, speeds and motor torques, and the power drawn from the bus, over time.
 
-    .venv/bin/python examples/plot_answer.py examples/optimize/paper_pose_1.json   asks the service, draws its answer
+    .venv/bin/python examples/plot_answer.py examples/optimize/paper_pose_1.json   asks the service and draws its answer
     .venv/bin/python examples/plot_answer.py answer.json                           draws an answer that was saved
 
 The service is asked for the robot's limits either way. Needs matplotlib.

@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 from models.registry import load_robot
 from tests.app.live import CLIENT, Server
 from tests.browser.pages import SHOWN, opened, show, state, until
+from tests.browser.test_reading import CONTRASTS, LEAST
 from tests.browsers import BROWSER, MISSING
 from tests.identification_logs import csv_of, recorded, truth_of
 
@@ -81,6 +82,7 @@ def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Ser
     assert cells[1] == "shoulder lift" and cells[5:] == ["B", "N·m"]
     told = [coulomb[name] for name in ("value", "sd", "previous")]
     assert [float(cell) for cell in cells[2:5]] == pytest.approx(told, rel=DIGITS)
+    assert not [found for found in page.evaluate(CONTRASTS) if found[1] < LEAST]
     page.get_by_role("button", name="Use these figures").click()
     assert state(page, "request.figures") == found["figures"] and not page.evaluate(OPENED)
     before = state(page, "answer.id")

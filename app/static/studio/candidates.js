@@ -46,9 +46,10 @@ function row(candidate) {
     set({ chosen: box.checked ? [...others, candidate].slice(-MOST) : others });
   };
   const best = candidate.q_goal.every((x, j) => Math.abs(x - state.answer.branch.goal.q[j]) < 1e-6) && candidate.q_start.every((x, j) => Math.abs(x - state.answer.branch.start.q[j]) < 1e-6);
-  const name = [candidate.goal, candidate.start === candidate.goal ? null : el("small", {}, ` from ${candidate.start}`)];
-  const compute_ = best || embedded() ? "" : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute");
-  return { title: candidate.reason, class: best ? "best" : candidate.status, cells: [box, name, best ? "this motion" : candidate.status, candidate.lower_bound, candidate.energy, candidate.duration, compute_] };
+  const [goal, start] = [candidate.goal, candidate.start].map((text) => text.replaceAll("/", "/\u200b")); // may break there
+  const name = [goal, start === goal ? null : el("small", {}, ` from ${start}`)];
+  const button = best || embedded() ? "" : el("button", { type: "button", onclick: () => beside(candidate).catch(problem) }, "compute");
+  return { title: candidate.reason, class: best ? "best" : candidate.status, cells: [box, name, best ? "this motion" : candidate.status, candidate.lower_bound, candidate.energy, candidate.duration, button] };
 }
 
 /** Computes one branch, and lets its arm move beside the answer's. Throws Problem. */

@@ -42,10 +42,10 @@ function draw() {
     node.style.top = `${(100 * (y[1] - energy)) / (y[1] - y[0])}%`;
     return node;
   };
-  plot.over.append(place(el("i", { class: "present", title: "the motion shown" }), own), ...points.map((point) => {
+  plot.over.append(...points.map((point) => {
     const text = `${figure(point.duration)} s, ${figure(point.energy)} J`;
     return place(el("button", { type: "button", class: "point", title: text, "aria-label": `Load the motion of ${text}`, onclick: () => load(point.answer).catch(problem) }), point);
-  }));
+  }), place(el("i", { class: "present", title: "the motion shown" }), own));
   box.append(el("p", { class: "hint" }, "J over s: each point is the least energy of its duration. The large one is shown; click another to load it."));
 }
 

@@ -34,7 +34,8 @@ export async function showKept(after) {
     ...(next ? [button("older", () => showKept(next))] : []),
     ...group("Jobs", jobs.map(({ id, name, state: now, created }) => entry(`${name ?? id.slice(0, 8)}: ${now}`, when(created), () => opened(id, `jobs/${id}?limit=${MOST}`, "requests")))),
     ...group("Identifications", identifications.map(({ id, robot, state: now, created }) => entry(`${robot ?? id.slice(0, 8)}: ${now}`, when(created), () => openIdentification(id)))),
-    ...group("Logs", logs.map(({ id, name, robot, created }) => entry(`${robot}: ${name ?? id.slice(0, 8)}`, when(created), async () => ask({ logs: [...new Set([...(state.request?.logs ?? []), id])] })))),
+    ...group("Logs", logs.map(({ id, name, robot, created }) =>
+      entry(`${robot}: ${name ?? id.slice(0, 8)}`, when(created), async () => ask({ logs: [...new Set([...(state.request?.logs ?? []), id])] })))),
     el("label", { class: "row small" }, "Add a log", el("input", { type: "file", accept: ".csv,.gz,.txt", onchange: chooseLog })),
     ...group("Studies", studies.map(({ id, name, created }) => entry(name, when(created), () => opened(id, `studies/${id}`, "history")))),
   );

@@ -4,13 +4,6 @@ import * as THREE from "three";
 const RAMP = ["#2c4fa3", "#2a8bb5", "#3bb58a", "#b9c53a", "#f0a13a", "#d9423c"].map((colour) => new THREE.Color(colour));
 const MOST = 300;
 
-/** The colour of a share of the range. */
-export function colourOf(share) {
-  const place = Math.max(0, Math.min(1, share)) * (RAMP.length - 1);
-  const index = Math.min(Math.floor(place), RAMP.length - 2);
-  return RAMP[index].clone().lerp(RAMP[index + 1], place - index);
-}
-
 export const rampStops = RAMP.map((colour) => `#${colour.getHexString()}`);
 
 /** A tube of `radius` [m] along the TCP of a trajectory; `tcp` maps joint positions to its pose. */
@@ -27,7 +20,9 @@ export function pathOfPower({ q, power }, tcp, radius) {
   const geometry = new THREE.TubeGeometry(curve, segments, radius, 8);
   const around = geometry.attributes.position.count / (segments + 1);
   const colours = kept.flatMap((k) => {
-    const colour = colourOf((power[k] - least) / (most - least || 1)).toArray();
+    const place = ((RAMP.length - 1) * (power[k] - least)) / (most - least || 1);
+    const index = Math.min(Math.floor(place), RAMP.length - 2);
+    const colour = RAMP[index].clone().lerp(RAMP[index + 1], place - index).toArray();
     return Array.from({ length: around }, () => colour).flat();
   });
   geometry.setAttribute("color", new THREE.Float32BufferAttribute(colours, 3));

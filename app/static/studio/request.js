@@ -155,7 +155,7 @@ function falling(incumbents, began) {
   const column = (key) => all.map((each) => each[key]);
   const line = (colour, dash) => ({ stroke: style(colour), width: 2, dash, paths: steps, points: { show: false } });
   const data = [column("at").map((at) => (at - began) / 1000), column("energy"), column("bound")];
-  chart($("progress-chart"), [line("--good"), line("--bound", [5, 3])], data, { x: [0, data[0].at(-1)], y: (_, least, most) => [least, most + 1e-9] });
+  chart($("progress-chart"), [line("--good"), line("--bound", [5, 3])], data, { x: [0, data[0].at(-1)] });
 }
 
 /** Figures of a robot, asked for once. */

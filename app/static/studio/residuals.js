@@ -8,6 +8,7 @@ import { follow, set, state } from "./store.js";
 
 const PAUSE = 500; // between two looks at work that runs [ms]
 const APART = 1e-6; // after a move, where its curve ends [s]
+const COLOURS = { measured: "ink-2", modelled: "good", residual: "bad", "held out: predicted by a fit without it": "held" };
 const UNITS = { offset: "N·m", payload_mass: "kg", link_mass_scale: "1" }; // of what no document has
 const box = $("identification");
 
@@ -66,14 +67,17 @@ async function useFigures(robot, figures) {
 function curves(moves, logs, robot) {
   if (!moves.length) return el("article", {}, el("h2", {}, "Residuals"), el("p", { class: "hint" }, "None are kept: an earlier version identified these figures."));
   const groups = logs.map(({ id, name }) => ({ name: name ?? `log ${id.slice(0, 8)}`, own: moves.filter(({ log }) => log === id).toSorted((a, b) => a.t[0] - b.t[0]) }));
-  const options = groups.flatMap(({ name, own }) => [[`${name}: all moves`, own], ...own.map((move, k) => [`${name}: move ${k + 1}${move.held_out ? ", held out" : ""}`, [move]])]);
+  const single = (name) => (move, k) => [`${name}: move ${k + 1}${move.held_out ? ", held out" : ""}`, [move]];
+  const options = groups.flatMap(({ name, own }) => [[`${name}: all moves`, own], ...own.map(single(name))]);
   const choice = el("select", { "aria-label": "Moves shown" }, options.map(([text], k) => el("option", { value: k }, text)));
-  const quantities = [...robot.joints.map((name, j) => ({ name: jointName(name), unit: "N·m", of: ({ torque }) => torque && { measured: torque.measured[j], modelled: torque.modelled[j] } })), { name: "power", unit: "W", of: ({ power }) => power }];
-  const plots = quantities.map(({ name, unit, of }) => ({ of, unit, title: el("h3", {}, name), plot: el("div", { class: "plot" }) }));
+  const plotOf = (name, unit, of) => ({ of, unit, title: el("h3", {}, name), plot: el("div", { class: "plot" }) });
+  const torqueOf = (j) => ({ torque }) => torque && { measured: torque.measured[j], modelled: torque.modelled[j] };
+  const plots = robot.joints.map((name, j) => plotOf(jointName(name), "N·m", torqueOf(j)));
+  plots.push(plotOf("power", "W", ({ power }) => power));
   choice.onchange = () => plots.forEach((each) => draw(each, options[choice.value][1]));
   return el("article", { class: "wide" },
     el("h2", { class: "split" }, el("span", {}, "Measured and modelled ", el("small", {}, "drag to zoom, double click to see all")), choice),
-    el("p", { class: "keys" }, [["measured", "ink-2"], ["modelled", "good"], ["residual", "bad"], ["held out: predicted by a fit without it", "held"]].map(([text, colour]) => el("span", { class: `key ${colour}` }, text))),
+    el("p", {}, Object.entries(COLOURS).map(([text, colour]) => el("span", { class: `key ${colour}` }, text))),
     el("div", { class: "columns" }, plots.map(({ title, plot }) => el("div", {}, title, plot))));
 }
 

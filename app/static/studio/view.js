@@ -37,7 +37,7 @@ export function createView() {
   follow("request", () => view.preview());
   follow("chosen best", () => view.buildGhosts());
   follow("time show", () => view.pose());
-  follow("playing", () => view.draw());
+  follow("playing", () => view.draw(true));
   return view;
 }
 
@@ -46,13 +46,13 @@ class View {
     this.box = box;
     this.renderer = new THREE.WebGLRenderer({ antialias: false, alpha: true });
     // softer shadows cost a machine without a graphics card a third of its frames
-    Object.assign(this.renderer.shadowMap, { enabled: true, type: THREE.BasicShadowMap });
+    Object.assign(this.renderer.shadowMap, { enabled: true, type: THREE.BasicShadowMap, autoUpdate: false });
     box.prepend(this.renderer.domElement);
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(32, 1, 0.02, 60);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.addEventListener("change", () => this.draw());
+    this.controls.addEventListener("change", () => this.draw(true));
     this.controls.addEventListener("start", () => { this.turned = true; });
     this.parts = Object.fromEntries(["arms", "ghosts", "obstacles", "margins", "path", "nearest", "axes"].map((name) => {
       const group = new THREE.Group();
@@ -254,8 +254,9 @@ class View {
     this.draw();
   }
 
-  /** Draws once, at the next frame of the browser. */
-  draw() {
+  /** Draws once, at the next frame of the browser. The shadows are as before if nothing moved but the eye. */
+  draw(onlyEye = false) {
+    if (!onlyEye) this.renderer.shadowMap.needsUpdate = true;
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame(() => {
