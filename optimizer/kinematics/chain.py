@@ -34,6 +34,14 @@ class Chain:
         """Number of joints."""
         return len(self.placements)
 
+    def mirrored(self) -> Chain:
+        """The chain from the flange to the base.
+
+        With -q in the other order, it has the base where q has the flange, each seen from the other end.
+        """
+        back = np.linalg.inv(np.concatenate([self.placements, self.T_last_flange[None]]))[::-1]
+        return Chain(back[:-1], back[-1])
+
     def flange(self, q: Array) -> Array:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
         waves = self._waves

@@ -8,13 +8,13 @@ advance together. One that another passes is on a curve that is followed already
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.robot import Array, Mask
-from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.angles import nearest_turn, wrapped
 from optimizer.kinematics.chain import Chain, pose_error
 from optimizer.kinematics.hermite import hermite
 
@@ -25,8 +25,9 @@ FIRST, LONGEST, LEAST, LONGER, SHORTER = 0.15, 0.4, 1e-3, 1.6, 0.4
 CORRECTED, ASIDE, BENT, STRAIGHT = 1e-5, 0.3, 0.85, 0.97
 # corrections of a step, and steps along one curve
 CORRECTIONS, STEPS = 2, 400
-# how near [rad] a step passes a start that is on its curve, and the least cosine of their tangents
-PASSED, ALIKE = 2e-3, 0.9
+# how near [rad] a step passes a start that is on its curve, and the least cosine of their tangents; of a start within a
+# step of length s, the cosines of the angles to it fall short of their number by at most this times s² in all
+PASSED, ALIKE, BESIDE = 2e-3, 0.9, 0.6
 # steps before a curve may be back at its start
 AWAY = 3
 # added to the diagonal of a system that may be singular
@@ -45,34 +46,77 @@ class TracedPath:
     q: list[Array]
     tangents: list[Array]
     closed: bool = False
-    backwards: bool = field(default=False, repr=False)
 
     def turned(self) -> None:
         """Go on from the other end."""
         self.q.reverse()
         self.tangents = [-each for each in reversed(self.tangents)]
-        self.backwards = True
+
+    def joined(self, other: TracedPath) -> None:
+        """Go on along a path whose start is next."""
+        shift = nearest_turn(other.q[0], self.q[-1]) - other.q[0]
+        if np.abs(other.q[0] + shift - self.q[-1]).max() < LEAST:
+            self.q.pop()
+            self.tangents.pop()
+        self.q += [each + shift for each in other.q]
+        self.tangents += other.tangents
 
 
 def traced(chain: Chain, starts: Array, T: Array) -> list[TracedPath]:
     """The different curves through configurations (n, nq) [rad] that put the flange at T (4, 4)."""
-    return _Tracing(chain, starts, T).run()
+    return _Tracing(chain, starts, T).run() if len(starts) else []
 
 
 class _Tracing:
-    """The paths of all starts, and where they are: position, tangent, bend and step of each."""
+    """The paths of all starts, and where they are: position, tangent, bend and step of each.
+
+    `follows` (n,) is the start that a path has come to, -1 if none.
+    """
 
     def __init__(self, chain: Chain, starts: Array, T: Array) -> None:
         self.chain, self.T, self.starts = chain, T, starts
-        self.first = np.linalg.svd(chain.flange_and_jacobian(starts)[1])[2][:, -1]
+        jacobian = chain.flange_and_jacobian(starts)[1]
+        null = np.linalg.svd(jacobian)[2][:, -1]
+        # the sign of this determinant does not change along a curve: all of its starts go the same way
+        side = np.linalg.slogdet(np.concatenate([jacobian, null[:, None]], axis=1))[0]
+        self.first = null * side[:, None]
+        self.waves = np.hstack([np.cos(starts), np.sin(starts)])
         self.paths = [TracedPath([q], [t]) for q, t in zip(starts, self.first, strict=True)]
         self.q, self.tangent = starts.copy(), self.first.copy()
         self.bend, self.step = np.zeros_like(starts), np.full(len(starts), FIRST)
-        self.alive = np.ones(len(starts), dtype=bool)
+        self.alive, self.follows = np.ones(len(starts), dtype=bool), np.full(len(starts), -1)
 
     def run(self) -> list[TracedPath]:
-        given_up = np.zeros(len(self.starts), dtype=bool)
-        for _ in range(2 * STEPS):
+        self.follow(True)
+        loops, chains = cycles(self.follows.tolist())
+        found = [self.whole(rows) for rows in loops]
+        for path in found:
+            path.q[-1], path.tangents[-1] = path.q[0] + _turns(path.q[-1] - path.q[0]), path.tangents[0]
+            path.closed = True
+        # a curve that ends goes on in the other direction from where the first of its parts began
+        for rows in chains:
+            path, row = self.whole(rows), rows[0]
+            path.turned()
+            self.paths[row] = path
+            self.q[row], self.tangent[row] = path.q[-1], path.tangents[-1]
+            self.bend[row], self.step[row], self.alive[row] = 0.0, FIRST, True
+            found.append(path)
+        self.follow(False)
+        return found
+
+    def whole(self, rows: list[int]) -> TracedPath:
+        """The paths of rows, one after the other; of a loop, up to the start of the first row again."""
+        first = self.paths[rows[0]]
+        path = TracedPath(list(first.q), list(first.tangents))
+        for row in rows[1:]:
+            path.joined(self.paths[row])
+        if self.follows[rows[-1]] == rows[0]:
+            path.joined(TracedPath([self.starts[rows[0]]], [self.first[rows[0]]]))
+        return path
+
+    def follow(self, to_starts: bool) -> None:
+        """Advance all that are on their way until they end, or come to a start."""
+        for _ in range(STEPS):
             rows = np.flatnonzero(self.alive)
             if not len(rows):
                 break
@@ -80,15 +124,13 @@ class _Tracing:
             cosine = (tangent * self.tangent[rows]).sum(axis=1)
             good &= cosine > BENT
             self.step[rows[~good]] *= SHORTER
-            self.turn_or_end(rows[~good & (self.step[rows] < LEAST)])
-            done, q, tangent, cosine = rows[good], q[good], tangent[good], cosine[good]
-            for row, other in self.passed(done, q, tangent):
-                if row == other:
-                    self.close(row)
-                elif self.alive[row] and self.alive[other]:
-                    self.alive[other], given_up[other] = False, True
-            self.advance(done, q, tangent, cosine)
-        return [path for path, gone in zip(self.paths, given_up, strict=True) if not gone]
+            self.alive[rows[~good & (self.step[rows] < LEAST)]] = False
+            rows, q, tangent, cosine = rows[good], q[good], tangent[good], cosine[good]
+            if to_starts:
+                self.follows[rows] = self.passed(rows, q, tangent)
+                self.alive[rows[self.follows[rows] >= 0]] = False
+            self.advance(rows, q, tangent, cosine)
+        self.alive[:] = False
 
     def stepped(self, rows: Rows) -> tuple[Array, Array, Mask]:
         """Where a step leads (n, nq), the tangents there (n, nq), and whether it is near the curve (n,)."""
@@ -118,41 +160,50 @@ class _Tracing:
         for row, at, along in zip(rows.tolist(), q, tangent, strict=True):
             self.paths[row].q.append(at)
             self.paths[row].tangents.append(along)
-            if len(self.paths[row].q) > STEPS:
-                self.turn_or_end(np.array([row]))
 
-    def passed(self, rows: Rows, q: Array, tangent: Array) -> list[tuple[int, int]]:
-        """Which of rows (n,), on the step to q (n, nq), pass the start of which row."""
-        others = np.flatnonzero(self.alive)
-        away = wrapped(self.starts[others] - self.q[rows][:, None])
-        chord = q - self.q[rows]
-        share = (away @ chord[:, :, None])[:, :, 0] / (chord * chord).sum(axis=1)[:, None]
-        k, j = np.nonzero((share > 0) & (share <= 1))
-        length = np.linalg.norm(chord[k], axis=1)[:, None]
-        at = hermite(
-            share[k, j], np.zeros_like(chord[k]), chord[k], self.tangent[rows[k]] * length, tangent[k] * length
-        )
-        near = np.abs(at - away[k, j]).max(axis=1) < PASSED
-        cosine = (tangent[k] * self.first[others[j]]).sum(axis=1)
-        own = rows[k] == others[j]
-        steps = np.array([len(self.paths[row].q) for row in rows.tolist()])[k]
-        found = near & np.where(own, (cosine > ALIKE) & (steps > AWAY), np.abs(cosine) > ALIKE)
-        return list(zip(rows[k[found]].tolist(), others[j[found]].tolist(), strict=True))
+    def passed(self, rows: Rows, q: Array, tangent: Array) -> NDArray[np.intp]:
+        """The first start (n,) that each of rows (n,) passes on the step to q (n, nq), -1 if it passes none."""
+        here, chord = self.q[rows], q - self.q[rows]
+        squares = (chord * chord).sum(axis=1)
+        # the sum of the cosines of all angles between them: few starts are within a step
+        alike = np.hstack([np.cos(here), np.sin(here)]) @ self.waves.T
+        k, j = np.nonzero(alike > self.chain.nq - BESIDE * (squares[:, None] + PASSED))
+        away = wrapped(self.starts[j] - here[k])
+        share, length = (away * chord[k]).sum(axis=1) / squares[k], np.sqrt(squares[k])[:, None]
+        at = hermite(share, np.zeros_like(away), chord[k], self.tangent[rows[k]] * length, tangent[k] * length)
+        found = (np.abs(at - away).max(axis=1) < PASSED) & (share > 0) & (share <= 1)
+        found &= (tangent[k] * self.first[j]).sum(axis=1) > ALIKE
+        steps = np.array([len(self.paths[row].q) for row in rows.tolist()])
+        found &= (rows[k] != j) | (steps[k] > AWAY)
+        first = np.full(len(rows), -1)
+        order = np.argsort(-share[found])
+        first[k[found][order]] = j[found][order]
+        return first
 
-    def close(self, row: int) -> None:
-        """End a curve at its start."""
-        path = self.paths[row]
-        path.q.append(path.q[-1] + wrapped(path.q[0] - path.q[-1]))
-        path.tangents.append(path.tangents[0])
-        path.closed, self.alive[row] = True, False
 
-    def turn_or_end(self, rows: Rows) -> None:
-        """Follow curves that go no further from their starts in the other direction, if that was not done."""
-        for row in rows.tolist():
-            path = self.paths[row]
-            if path.backwards:
-                self.alive[row] = False
-                continue
-            path.turned()
-            self.q[row], self.tangent[row] = path.q[-1], path.tangents[-1]
-            self.bend[row], self.step[row] = 0.0, FIRST
+def cycles(follows: list[int]) -> tuple[list[list[int]], list[list[int]]]:
+    """The cycles of a graph in which a node leads to follows[node], and of each end (-1) the longest way to it."""
+    seen, loops = [-1] * len(follows), list[list[int]]()
+    for start in range(len(follows)):
+        way, node = list[int](), start
+        while node >= 0 and seen[node] < 0:
+            seen[node] = start
+            way.append(node)
+            node = follows[node]
+        if node >= 0 and seen[node] == start:
+            loops.append(way[way.index(node) :])
+    longest: dict[int, list[int]] = {}
+    on_loops = {node for loop in loops for node in loop}
+    for start in range(len(follows)):
+        way, node = list[int](), start
+        while node >= 0 and node not in on_loops:
+            way.append(node)
+            node = follows[node]
+        if node < 0 and len(way) > len(longest.get(way[-1], [])):
+            longest[way[-1]] = way
+    return loops, list(longest.values())
+
+
+def _turns(angles: Array) -> Array:
+    """The full turns [rad] nearest to angles [rad]."""
+    return angles - wrapped(angles)

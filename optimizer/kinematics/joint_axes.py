@@ -34,6 +34,18 @@ class JointAxes:
         frames = link_frames(chain.placements, np.zeros((1, chain.nq)))[0]
         return cls(frames[1:, :3, 2].copy(), frames[1:, :3, 3].copy(), frames[-1] @ chain.T_last_flange)
 
+    def chain(self) -> Chain:
+        """The chain with these axes."""
+        frames = np.tile(np.eye(4), (len(self.points), 1, 1))
+        # the direction of x is free
+        x = np.eye(3)[np.abs(self.directions).argmin(axis=1)]
+        y = np.cross(self.directions, x)
+        y /= np.linalg.norm(y, axis=1)[:, None]
+        frames[:, :3, 0], frames[:, :3, 1] = np.cross(y, self.directions), y
+        frames[:, :3, 2], frames[:, :3, 3] = self.directions, self.points
+        back = np.linalg.inv(frames)
+        return Chain(np.concatenate([frames[:1], back[:-1] @ frames[1:]]), back[-1] @ self.T_zero)
+
     def simplified(self) -> JointAxes:
         """The arm of parallel and meeting axes nearby: this one, if nothing nearly is."""
         directions, points = self.directions.copy(), self.points.copy()

@@ -28,7 +28,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from optimizer.kinematics.forward import joint_placements
+from optimizer.kinematics.chain import Chain
 
 # greatest distance [m] of axes that meet, and cosine of axes at right angles
 EQUAL = 1e-9
@@ -54,16 +54,18 @@ class SphericalShoulder:
     @classmethod
     def of(cls, model: pin.Model) -> SphericalShoulder | None:
         """The form of a Pinocchio model with a frame `flange`; None if its axes do not meet in this way."""
-        if model.nq != 7 or model.nv != 7:
-            return None
-        P = joint_placements(model)
+        return cls.of_chain(Chain.of(model)) if model.nq == model.nv == 7 else None
+
+    @classmethod
+    def of_chain(cls, chain: Chain) -> SphericalShoulder | None:
+        """The form of a chain of seven joints; None if its axes do not meet in this way."""
+        P = chain.placements
         first, second, third = (_meeting(P[k]) for k in (1, 2, 5))
         square = max(abs(P[1][2, 2]), abs(P[2][2, 2]))
         if first is None or second is None or third is None or square > EQUAL or abs(first[1] - second[0]) > EQUAL:
             return None
         shoulder = P[0] @ [0.0, 0.0, first[0], 1.0]
-        flange = model.frames[model.getFrameId("flange")].placement.homogeneous
-        form = cls(P, np.asarray(flange), shoulder[:3], second[1], third[0], third[1])
+        form = cls(P, chain.T_last_flange, shoulder[:3], second[1], third[0], third[1])
         return form if min(form.rho * form.nu, form.inclined) > EQUAL else None
 
     @cached_property

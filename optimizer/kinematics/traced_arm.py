@@ -1,8 +1,9 @@
 """Inverse kinematics of any seven-joint arm: the curves of configurations that hold a pose, followed point by point.
 
-Starts near the pose come from a table of configurations inside the joint ranges (`seed_table`), Newton's method leads
-them onto curves, and each curve is followed all around (`curve_tracing`). A curve that no start leads to is missed, and
-so may be what passes a singularity: nothing here is `complete`.
+Starts near the pose come from the closed form of an arm nearby (`nearby_arm`), or from a table of configurations inside
+the joint ranges (`seed_table`). Newton's method leads them onto curves, and each curve is followed all around
+(`curve_tracing`). A curve that no start leads to is missed, and so may be what passes a singularity: nothing here is
+`complete`.
 """
 
 from __future__ import annotations
@@ -18,9 +19,11 @@ from optimizer.exceptions import SingularPose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.curve_tracing import TracedPath, traced
+from optimizer.kinematics.nearby_arm import NearbyArm
 from optimizer.kinematics.newton import solved
 from optimizer.kinematics.seed_table import SeedTable
 from optimizer.kinematics.traced_curve import TracedCurve
+from optimizer.kinematics.traced_limits import within
 from optimizer.problem.branches import BranchLabel, NumberedBranch
 
 JOINTS = 7
@@ -41,8 +44,8 @@ class TracedArm:
 
     complete = False
 
-    def __init__(self, chain: Chain, seeds: SeedTable) -> None:
-        self._chain, self._seeds = chain, seeds
+    def __init__(self, chain: Chain, seeds: SeedTable, nearby: NearbyArm | None) -> None:
+        self._chain, self._seeds, self._nearby = chain, seeds, nearby
         self._found = lru_cache(maxsize=KEPT)(self._curves)
 
     @classmethod
@@ -52,7 +55,8 @@ class TracedArm:
             return None
         chain, q_min, q_max = Chain.of(model), model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
         turns = q_max / 2 - q_min / 2 >= np.pi
-        return cls(chain, SeedTable(chain, np.where(turns, -np.pi, q_min), np.where(turns, np.pi, q_max)))
+        seeds = SeedTable(chain, np.where(turns, -np.pi, q_min), np.where(turns, np.pi, q_max))
+        return cls(chain, seeds, NearbyArm.of(chain))
 
     def label(self, q: Array) -> NumberedBranch:
         """The number of the curve nearest to a configuration (7,) [rad] among those of its pose; 1 if it has none."""
@@ -77,10 +81,7 @@ class TracedArm:
         Raises SingularPose if T was reached in singular configurations only, which no curve leads away from.
         """
         curves = self._found(np.ascontiguousarray(T, dtype=float).tobytes())
-        if limits is None:
-            return curves
-        cut = (each.within(limits.q_min, limits.q_max) for each in curves)
-        return [each for each in cut if each is not None]
+        return curves if limits is None else within(curves, limits.q_min, limits.q_max)
 
     def distance_to_reach(self, T: Array) -> None:
         """None: not known."""
@@ -89,8 +90,11 @@ class TracedArm:
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
         checkpoint()
-        starts = self._seeds.starts(T)
+        starts = np.zeros((0, JOINTS)) if self._nearby is None else self._nearby.starts(T)
         q, missed = solved(self._chain, starts, T, STEPS)
+        if not (missed < SOLVED).any():
+            starts = self._seeds.starts(T)
+            q, missed = solved(self._chain, starts, T, STEPS)
         if not (missed < SOLVED).any():
             # next to a singularity Newton's method is slow
             q, missed = solved(self._chain, starts[:FEW], T, MOST_STEPS)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.robot import Array, Mask
+from models.robot import Array
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain, miss, pose_error
 from optimizer.kinematics.curve_tracing import TracedPath
@@ -20,8 +19,6 @@ from optimizer.problem.branches import BranchLabel
 OPEN = 3.0
 # Newton steps onto the curve, the error [m, rad] that needs no more, and what is added to J Jᵀ there
 CORRECTIONS, EXACT, DAMPING = 4, 1e-14, 1e-18
-# points of each piece at which a curve is held against limits, and steps that find where it crosses them
-POINTS, CROSSINGS = 4, 8
 # steps that find the member nearest to a configuration, the distance [rad] that needs no more, and the difference of
 # parameters for its derivative
 NEAREST, FOUND, STEP = 6, 1e-10, 1e-6
@@ -118,6 +115,10 @@ class TracedCurve:
 
     def passes(self, q: Array) -> bool:
         """Whether a configuration (nq,) [rad] that holds the pose is a member."""
+        if len(self.nodes) > 1:
+            steps, away = np.diff(self.nodes, axis=0), wrapped(q - self.nodes)
+            if np.sqrt((away * away).sum(axis=1).min()) > np.sqrt((steps * steps).sum(axis=1).max()) + BESIDE:
+                return False
         nearly = self.nearly(np.array([self._nearest(q)]))[0]
         if np.abs(wrapped(nearly - q)).max() > BESIDE:
             return False
@@ -154,59 +155,6 @@ class TracedCurve:
             return centre, np.full_like(centre, ROUNDING)
         rates = np.abs(np.diff(self.nodes, axis=0) / np.diff(self.knots)[:, None]).max(axis=0)
         return centre, np.minimum(FASTER * np.asarray(half, dtype=float)[:, None] * rates + ROUNDING, np.pi)
-
-    def within(self, q_min: Array, q_max: Array) -> TracedCurve | None:
-        """The curve, cut to where it is within limits (nq,) [rad] but for full turns; None if it is nowhere."""
-        u = self._sampled
-        excess = self._excess(self.nearly(u), q_min, q_max)
-        inside = excess <= 0
-        if inside.all():
-            return self
-        if not inside.any():
-            return None
-        edges = np.flatnonzero(inside[:-1] != inside[1:])
-        at = self._crossings(u[edges], u[edges + 1], inside[edges], q_min, q_max)
-        ends = at.tolist()
-        if inside[0]:
-            ends.insert(0, float(u[0]))
-        if inside[-1]:
-            ends.append(float(u[-1]))
-        arcs = list(zip(ends[::2], ends[1::2], strict=True))
-        if self.closed and inside[0] and inside[-1]:
-            # the arc goes on behind the curve's own start
-            (_, first), (last, _) = arcs[0], arcs[-1]
-            arcs = [*arcs[1:-1], (last, first + 2 * np.pi)]
-        return replace(self, arcs=arcs)
-
-    @cached_property
-    def _sampled(self) -> Array:
-        """Parameters of points along the whole curve."""
-        share = np.arange(POINTS) / POINTS
-        between = self.knots[:-1, None] + share * np.diff(self.knots)[:, None]
-        return np.append(between.ravel(), self.knots[-1])
-
-    def _excess(self, q: Array, q_min: Array, q_max: Array) -> Array:
-        """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
-        away = np.abs(wrapped(q - (q_min + q_max) / 2)) - (q_max - q_min) / 2
-        # a joint that may turn all around has no limits
-        return np.asarray(np.where(q_max - q_min >= 2 * np.pi, -np.pi, away).max(axis=1))
-
-    def _crossings(self, low: Array, high: Array, inside: Mask, q_min: Array, q_max: Array) -> Array:
-        """Where (n,) the curve crosses limits between parameters low and high (n,); `inside` (n,): at low it is in."""
-        low, high = low.copy(), high.copy()
-        f_low, f_high = (self._excess(self.at(u), q_min, q_max) for u in (low, high))
-        for _ in range(CROSSINGS):
-            # regula falsi after Illinois: the end that stays counts half
-            span = np.where(f_high == f_low, 1.0, f_high - f_low)
-            u = np.clip(low - f_low * (high - low) / span, low, high)
-            f = self._excess(self.at(u), q_min, q_max)
-            is_low = (f <= 0) == inside
-            f_high = np.where(is_low, f_high / 2, f)
-            f_low = np.where(is_low, f, f_low / 2)
-            low, high = np.where(is_low, u, low), np.where(is_low, high, u)
-            if (np.abs(f) < ROUNDING / 2).all():
-                break
-        return np.where(inside, low, high)
 
 
 def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[Array]:

@@ -13,8 +13,12 @@ from models.robot import Array, Robot
 from optimizer import Arm, Pose, Problem, optimize
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.chain import Chain, miss, pose_error
+from optimizer.kinematics.curve_tracing import cycles, traced
 from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.kinematics.nearby_arm import NearbyArm
 from optimizer.kinematics.redundant_arm import RedundantArm
+from optimizer.kinematics.seed_table import SeedTable
 from optimizer.kinematics.traced_arm import TracedArm
 from optimizer.kinematics.traced_curve import TracedCurve
 from tests.optimizer.chains import move, serial_chain
@@ -71,6 +75,52 @@ def test_members_reach_the_pose_within_the_limits(robot: Robot, arm: TracedArm) 
                 assert (np.abs(wrapped(q - middle)) < half + LIMIT).all()
 
 
+def test_a_configuration_on_a_limit_is_on_an_arc(robot: Robot, arm: TracedArm) -> None:
+    """Its curve leaves the limits there."""
+    rng, limits = np.random.default_rng(56), robot.limits
+    for joint in range(7):
+        q = inside(robot, rng)
+        q[joint] = rng.choice([limits.q_min[joint], limits.q_max[joint]])
+        assert min(away(each, q) for each in arm.self_motions(flange(robot, q), limits)) < FOUND
+
+
+def test_the_curves_of_the_arm_nearby_are_near_those_of_the_arm() -> None:
+    """From its flange on, the Gen3 is of the form with a spherical shoulder but for 0.35 mm; a calibrated Panda is."""
+    rng, panda = np.random.default_rng(57), PANDA.model.copy()
+    panda.jointPlacements[6].translation += np.array([1e-4, 2e-4, -1e-4])
+    for model, mirrored in ((GEN3.model, True), (panda, False)):
+        chain = Chain.of(model)
+        nearby = NearbyArm.of(chain)
+        assert nearby is not None and nearby.mirrored == mirrored
+        for q in rng.uniform(-1.5, 1.5, (5, 7)):
+            T = chain.flange(q[None])[0]
+            starts = nearby.starts(T)
+            assert len(starts) and miss(pose_error(chain.flange(starts), T)).max() < 2e-3
+        found = TracedArm.of(model)
+        assert found is not None and found.self_motions(T)
+    assert NearbyArm.of(Chain.of(CHAIN.model)) is None
+
+
+def test_parts_of_curves_between_starts_make_loops_and_ways_to_an_end() -> None:
+    """Start 4 is the same as 0; 5 and 6 come to a start from which the curve ends."""
+    loops, ways = cycles([1, 2, 0, 3, 1, 7, 7, -1])
+    assert sorted(map(sorted, loops)) == [[0, 1, 2], [3]]
+    assert ways in ([[5, 7]], [[6, 7]])
+
+
+def test_a_loop_is_followed_once_however_many_starts_it_has(robot: Robot, arm: TracedArm) -> None:
+    rng, chain = np.random.default_rng(58), Chain.of(robot.model)
+    T = flange(robot, inside(robot, rng))
+    for curve in arm.self_motions(T)[:3]:
+        for count in (1, 9):
+            starts = curve.at(rng.uniform(-np.pi, np.pi, count))
+            (path,) = traced(chain, np.vstack([starts, starts[:1]]), T)
+            assert path.closed == curve.closed
+            ends = wrapped(path.q[-1] - path.q[0])
+            assert not path.closed or np.abs(ends).max() < FOUND
+            assert all(away(curve, q) < FOUND for q in path.q)
+
+
 def test_what_limits_cut_off_is_outside(robot: Robot, arm: TracedArm) -> None:
     rng, q_min, q_max = np.random.default_rng(53), np.full(7, -2.0), np.full(7, 2.2)
     narrow, cut = replace(robot.limits, q_min=q_min, q_max=q_max), 0
@@ -98,9 +148,10 @@ def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
 
 
 def test_no_curve_of_a_closed_form_is_missing() -> None:
-    """The Panda's closed form knows all curves."""
-    exact, traced = RedundantArm.of(PANDA.model), TracedArm.of(PANDA.model)
-    assert exact is not None and traced is not None
+    """The Panda's closed form knows all curves. It gives no starts here."""
+    exact, chain = RedundantArm.of(PANDA.model), Chain.of(PANDA.model)
+    traced = TracedArm(chain, SeedTable(chain, PANDA.limits.q_min, PANDA.limits.q_max), None)
+    assert exact is not None
     rng, members, found = np.random.default_rng(55), 0, 0
     for _ in range(4):
         T = flange(PANDA, inside(PANDA, rng))
