@@ -16,6 +16,21 @@ from app.http.refused_body import RefusedBody
 class JsonRequest(Request):
     """A request that reads JSON strictly."""
 
+    _parts: list[bytes] | None = None
+    _whole: bytes | None = None
+
+    async def parts(self) -> list[bytes]:
+        """The body as it was received: to put a large one together would hold up others."""
+        if self._parts is None:
+            self._parts = [part async for part in self.stream()]
+        return self._parts
+
+    async def body(self) -> bytes:
+        """The body."""
+        if self._whole is None:
+            self._whole = b"".join(await self.parts())
+        return self._whole
+
     async def json(self) -> Any:
         """The body. Raises RefusedBody."""
         try:

@@ -17,7 +17,7 @@ from app.http.turns import Turns
 
 _SMALL = 1 << 16
 """Largest body or answer [byte] that does not count: small requests find room whatever others hold."""
-_PIECES = 4
+_PIECES = 2
 """Pieces of large bodies, of some 256 KiB, that are read in one turn of the event loop."""
 _PIECE = 1 << 18
 """Bytes of an answer that are handed to the connection at a time: the next ones wait until the client has read."""

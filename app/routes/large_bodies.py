@@ -43,7 +43,7 @@ class LargeBodyRoute(JsonRoute):
 
         async def handle_either(request: Request) -> Response:
             request = strictly(request)
-            is_large = _is_json(request) and len(await request.body()) > LARGE
+            is_large = _is_json(request) and sum(map(len, await request.parts())) > LARGE
             return await (handle_large if is_large else handle)(request)
 
         return handle_either
@@ -59,7 +59,7 @@ def _taking_held(
     """The endpoint, with its body from a worker."""
 
     async def body(request: Request, settings: ServiceSettings, engine: ServiceClientEngine) -> HeldBody:
-        task = ReadBodyTask(model, await request.body(), request.state.id)
+        task = ReadBodyTask(model, await strictly(request).parts(), request.state.id)
         return held(await unless_disconnected(request, engine.run(task, settings.max_deadline)))
 
     @wraps(endpoint)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,16 +39,16 @@ class HeldBody:
 
 @dataclass(frozen=True)
 class ReadBodyTask:
-    """A JSON body as received, its schema, and the request's id."""
+    """A JSON body in the parts in which it was received, its schema, and the request's id."""
 
     model: type[BaseModel]
-    body: bytes
+    parts: Sequence[bytes]
     request_id: str
 
     def run(self, deadline: float) -> TaskResult:
         """The content of a HeldBody. `deadline` is not watched: it takes a second at most. Raises InvalidRequest."""
         try:
-            read = self.model.model_validate(parsed_json(self.body), from_attributes=True)  # as FastAPI does
+            read = self.model.model_validate(parsed_json(b"".join(self.parts)), from_attributes=True)  # as FastAPI does
         except ValidationError as error:
             raise invalid_request(error, "body") from None
         return TaskResult(pickle.dumps(pickled_body(read)), "application/x-python-pickle")

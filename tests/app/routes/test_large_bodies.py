@@ -129,7 +129,7 @@ def test_survives_what_is_no_json(client: TestClient, body: bytes) -> None:
 
 def test_large_fields_stay_pickled() -> None:
     body = move(scene=SCENE)
-    request = held(ReadBodyTask(OptimizeRequest, json.dumps(body).encode(), "the-id").run(AMPLE))
+    request = held(ReadBodyTask(OptimizeRequest, [json.dumps(body).encode()], "the-id").run(AMPLE))
     assert isinstance(request, HeldBody)
     assert (request.robot, request.deadline, request.scene) == ("ur5e", AMPLE, Ellipsis)
     assert request.model_fields_set == set(body)
