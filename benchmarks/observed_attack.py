@@ -41,22 +41,24 @@ class Outcome:
 
 
 def probe(port: int, pipe: Connection) -> None:
-    """Times of `/healthz` [s], until the pipe is written to."""
+    """Times of `/healthz` [s], from a first message to the pipe until it is written to."""
     walls: list[float] = []
     client = Client(port, PROBE)
-    while not pipe.poll(PROBE_PERIOD):
+    pipe.send(None)
+    while not walls or not pipe.poll(PROBE_PERIOD):
         began = time.perf_counter()
-        with contextlib.suppress(OSError, Exception):
+        with contextlib.suppress(Exception):
             client.get("/healthz")
         walls.append(time.perf_counter() - began)
     pipe.send(walls)
 
 
 def honest(port: int, pipe: Connection) -> None:
-    """Status and time [s] of each request of a client that waits for its answers, until the pipe is written to."""
+    """Status and time [s] of each request of a client that waits for its answers, as `probe` measures."""
     answers: list[tuple[int, float]] = []
     client = Client(port, HONEST)
-    while not pipe.poll(0.1):
+    pipe.send(None)
+    while not answers or not pipe.poll(0.1):
         began = time.perf_counter()
         try:
             status = client.optimize(move()).status
@@ -73,6 +75,8 @@ def beside(target: Callable[[int, Connection], None], port: int) -> Iterator[Cal
     ours, theirs = context.Pipe()
     process = context.Process(target=target, args=(port, theirs), daemon=True)
     process.start()
+    # on a busy machine a process may take longer to begin than an attack takes
+    ours.recv()
 
     def end() -> list[Any]:
         ours.send(None)
