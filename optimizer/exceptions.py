@@ -192,14 +192,15 @@ def in_collision(name: str, branches: Sequence[CollidingBranch]) -> InCollision:
 class NoSequence(JoulepathError):
     """Every stop of a round can be reached, but no chain of configurations leads over all stops: none to `stop`.
 
-    `reached` are the labels of the configurations before it to which a chain leads, `open` those of its own.
+    `reached` are the labels of the configurations before it to which a chain leads, `open` those of its own; `cause`
+    says why some motion to it was not found.
     """
 
-    def __init__(self, stop: str, reached: Sequence[str], open_: Sequence[str]) -> None:
+    def __init__(self, stop: str, reached: Sequence[str], open_: Sequence[str], cause: str = "") -> None:
         super().__init__(
             f"The arm can be at every stop, but no round was found: from no configuration to which the moves before "
             f"lead was a motion within the limits found to {stop}. Move this stop or the one before it, relax a limit, "
-            "leave `branch` out or set `windings` true."
+            f"leave `branch` out or set `windings` true.{f' Why one was not found: {cause}.' if cause else ''}"
         )
         self.stop, self.reached, self.open = stop, list(reached), list(open_)
 
@@ -224,6 +225,10 @@ class PathAttempt:
     reason: str
 
 
+# what the names of a stop's lines end with
+LINES = ("/approach", "/retreat")
+
+
 class PathInfeasible(JoulepathError):
     """No configuration at the start of a tool path leads along all of it; `attempts` say how far each one gets.
 
@@ -239,6 +244,8 @@ class PathInfeasible(JoulepathError):
         best = self.attempts[0]
         way = "the path" if path == "path" else path
         remedy = "Move it, widen limits.position, or ask POST /cycle to divide it: a stop's path with split."
+        if path.endswith(LINES):
+            remedy = "Move the stop, shorten the line, or widen limits.position."
         if in_parts:
             remedy = "Some place of it is out of reach in all of them, so that it cannot be divided: move it."
         super().__init__(

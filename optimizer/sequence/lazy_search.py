@@ -28,11 +28,13 @@ class LazySearch(ABC):
     """A search over `legs`, whose time is up at `search_end`.
 
     `failed`: some leg has no motion and is not proven to have none. `cut_short`: for some leg the time was too short.
+    `causes` say why a leg's last attempt failed, by the number of the leg.
     """
 
     def __init__(self, legs: Sequence[Leg], closed: bool, search_end: Deadline) -> None:
         self.legs, self.closed, self.search_end = list(legs), closed, search_end
         self.failed = self.cut_short = False
+        self.causes: dict[int, str] = {}
         self._chain = LeastChain([leg.cost for leg in self.legs], closed)
 
     @abstractmethod
@@ -129,4 +131,4 @@ class LazySearch(ABC):
             [layer.ends[k].label for k in sorted(set(layer.end[nodes].tolist()))]
             for layer, nodes in ((leg.start, np.isfinite(reached)), (leg.goal, np.ones(len(leg.goal.q), dtype=bool)))
         ]
-        return NoSequence(leg.goal.name, *labels)
+        return NoSequence(leg.goal.name, labels[0], labels[1], self.causes.get(self.legs.index(leg), ""))

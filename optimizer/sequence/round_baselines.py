@@ -91,7 +91,7 @@ def _in_time(
     at, wait = timing.cheapest_wait(nodes, waited)
     prepared = [search.legs[k].prepared for (k, _, _), _ in pairs]
     moving = [leg.energy(spline) for leg, spline in zip(prepared, splines, strict=True)]
-    total = sum(each.electrical.total for each in moving) + dwelling(search, nodes) + wait
+    total = sum(each.electrical.total for each in moving) + sum(dwells_of(search, nodes)) + wait
     sensitivity = reduce(add, [leg.sensitivity(spline) for leg, spline in zip(prepared, splines, strict=True)])
     known = Known(total, sensitivity + resting(search, nodes, at, waited), sum(each.duration for each in splines))
     theirs = Needed(known, sum(each.mechanical.total for each in moving))
@@ -124,7 +124,8 @@ def of_chain(search: RoundSearch, nodes: list[int], name: RoundBaselineName, our
     None if it takes another time than is asked for.
     """
     moves = [search.solutions[each] for each in search.pairs(nodes)]
-    energy = sum(move.energy.electrical.total for move in moves) + dwelling(search, nodes)
+    # added up as our round is: the same chain needs the same to the last digit
+    energy = sum(a.energy.electrical.total + b for a, b in zip(moves, dwells_of(search, nodes), strict=True))
     duration = sum(move.duration for move in moves) + search.asked.dwelling
     if search.asked.nearest_duration(duration) != duration:
         return None
@@ -175,7 +176,7 @@ def controller_default(search: RoundSearch, start: int, ours: Needed) -> RoundBa
     if search.asked.nearest_duration(duration) != duration:
         return None
     sensitivity = reduce(add, sensitivities) + resting(search, nodes)
-    known = Known(total + dwelling(search, nodes), sensitivity, duration - search.asked.dwelling)
+    known = Known(total + sum(dwells_of(search, nodes)), sensitivity, duration - search.asked.dwelling)
     return compared(search.asked, "controller_default", duration, Needed(known, work), held, ours)
 
 
@@ -189,10 +190,10 @@ def compared(
     return RoundBaseline(name, duration, held, own, interval, theirs)
 
 
-def dwelling(search: RoundSearch, nodes: list[int]) -> float:
-    """Electrical energy [J] of the dwells of a chain."""
+def dwells_of(search: RoundSearch, nodes: list[int]) -> list[float]:
+    """Electrical energy [J] of the dwell after each move of a chain."""
     moves = zip(search.asked.moves, search.legs, nodes[1:], strict=True)
-    return sum(float(dwell_energies(search.asked, move, leg.goal)[node]) for move, leg, node in moves)
+    return [float(dwell_energies(search.asked, move, leg.goal)[node]) for move, leg, node in moves]
 
 
 def resting(search: RoundSearch, nodes: list[int], at: int = -1, waited: float = 0.0) -> Sensitivity:

@@ -179,6 +179,7 @@ class RoundSearch(LazySearch):
                 return self.late()
             self.failed |= result.spline is None
             if settled(incumbent, candidate, result, result.reason) is None:
+                self.causes[k] = result.reason
                 return np.inf
         self._runs[k, s, g] = run
         incumbent.end = self.end

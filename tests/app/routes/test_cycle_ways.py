@@ -122,7 +122,7 @@ def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
         ({"shape": "arc", "blend": 0.0, "points": POINTS[:2]}, ["path", "points"]),
         ({"speed": 0.0}, ["path", "speed"]),
         ({"speed": "fast"}, ["path", "speed"]),
-        ({"speed": {"min": 0.3, "max": 0.3}}, ["path", "speed"]),
+        ({"speed": {"min": 0.3, "max": 0.31}}, ["path", "speed"]),
         ({"speed": {"min": 0.3, "ramp": 0.4}}, ["path", "speed", "ramp"]),
         ({"tolerance": {"position": 0.0}}, ["path", "tolerance", "position"]),
         ({"tolerance": {"about": [0.0, 0.0, 0.0]}}, ["path", "tolerance", "about"]),
@@ -182,3 +182,22 @@ def test_a_stop_has_a_target_or_a_path(client: TestClient, fields: dict[str, Any
     assert reply.status_code == 422
     (error,) = reply.json()["errors"]
     assert error["loc"] == ["body", "stops", 0] and "exactly one" in error["msg"]
+
+
+def test_a_fixed_speed_is_held_or_says_why_not(client: TestClient) -> None:
+    def bead(speed: float) -> dict[str, Any]:
+        path = {"points": POINTS[:2], "speed": {"min": speed, "max": speed}}
+        only = {"shoulder": "right", "elbow": "up", "wrist": "flip"}
+        return a_round(stops=[{"name": "bead", "path": path, "branch": only}], closed=False)
+
+    reply = client.post("/cycle", json=bead(0.1))
+    assert reply.status_code == 200, reply.text
+    # the largest deviation, over a thousandth of the speed
+    assert 0 < reply.json()["certificate"]["worst_ratio"]["path_speed"] <= 1
+    fast = client.post("/cycle", json=bead(0.9)).json()
+    assert fast["type"] == "/problems/no-sequence" and "lower speed" in fast["detail"]
+
+
+def test_a_line_out_of_reach_is_not_to_be_divided(client: TestClient) -> None:
+    far = {"direction": [0.0, 0.0, 1.0], "frame": "base", "distance": 1.8}
+    assert "shorten the line" in client.post("/cycle", json=with_lines(retreat=far)).json()["detail"]
