@@ -46,6 +46,8 @@ ACCURACY = 1e-9
 # members of a self-motion that stand for it; of many self-motions, so many times those of one in all, and of each at
 # least so many
 MEMBERS, MOST_IN_ALL, LEAST_OF_EACH = 8, 4, 2
+# members among which one within the limits is sought, if no other is
+MANY = 128
 
 
 class InverseKinematics(Protocol):
@@ -195,6 +197,8 @@ class ClosedFormInverseKinematics:
         if motions:
             each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // len(motions)))
             configurations = _members(motions, [spread(motion, each) for motion in motions])
+            if limits is not None:
+                configurations = _inside_if_any(motions, configurations, limits)
             for motion, of_motion in zip(motions, configurations, strict=True):
                 labels += [motion.label] * len(of_motion)
                 curves += [None if is_point(motion) else motion] * len(of_motion)
@@ -293,6 +297,19 @@ def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list
         alike, at = zip(*group, strict=True)
         together = _TOGETHER.get(kind)
         found += together(alike, at) if together else [motion.at(u) for motion, u in zip(alike, at, strict=True)]
+    return found
+
+
+def _inside_if_any(motions: Sequence[SelfMotion], members: Sequence[Array], limits: Limits) -> list[Array]:
+    """The members (n, nq) [rad] of each self-motion; if none is within the limits, the middle one of many that are."""
+    counts = [len(each) for each in members]
+    held = np.array(_nearest_turns(np.vstack(members), limits)[1])
+    found = list(members)
+    for k in np.flatnonzero(~np.logical_or.reduceat(held, np.cumsum([0, *counts[:-1]]))).tolist():
+        many = motions[k].at(spread(motions[k], MANY))
+        inside = np.flatnonzero(_nearest_turns(many, limits)[1])
+        if len(inside):
+            found[k] = many[inside[[len(inside) // 2]]]
     return found
 
 

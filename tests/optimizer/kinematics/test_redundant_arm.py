@@ -173,6 +173,16 @@ def test_arcs_are_what_the_limits_leave(robot: Robot, arm: RedundantArm) -> None
     assert np.quantile([*outside, 0.0], 0.5) < BEYOND
 
 
+def test_a_curve_of_which_little_is_within_the_limits_gives_a_member() -> None:
+    """The last joint is on its limit, and both ends of the arc are beyond limits."""
+    panda = load_robot("panda")
+    q = np.array([2.7836954234526634, 0.054726722201069, 0.12264925125535742, -0.38038534780456557, 1.4067400815888678,
+                  2.171561296725141, 2.8973])  # fmt: skip
+    curves = [each.self_motion for each in required_inverse_kinematics(panda, "goal").solve(forward(panda, q))]
+    nearest = [each.at(np.array([each.parameter(q)]))[0] for each in curves if each is not None]
+    assert np.abs(wrapped(np.array(nearest) - q)).max(axis=1).min() < FOUND
+
+
 @pytest.mark.parametrize("joint", [1, 3, 5])
 @pytest.mark.parametrize("off", long_but([0.0, 1e-8, 1e-5], [0.0, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3]))
 def test_a_pose_on_a_singularity_or_next_to_it_is_reached(
