@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from app.store.tables import KnownMotion, now
 
 MOST_OF_A_CELL = 400
-"""Motions that a round is given: those of its cell that were used last, some 2 kB each."""
+"""Motions that a round is given: those of its cell that were used last, some 1 kB each."""
 MOST = 20_000
 """Motions that are kept in all."""
 
