@@ -37,6 +37,7 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "scenes": ("scenes", (), 300),
     "starts": ("starts", (), 0),
     "success": ("requests", ("--clients", "2", "--line-every", "20", "--seed", "3"), 1000),
+    "arms": ("arms", (), 10),
     "quality": ("quality", (), 100),
     "simulation": ("simulation", (), 200),
     "load": ("load", (), 0),

@@ -11,7 +11,7 @@ import pinocchio as pin
 from benchmarks.motion import SplineMotion, worst_ratios
 from benchmarks.tasks import flange
 from models.registry import load_robot
-from models.robot import Array, Limits
+from models.robot import Array, Limits, Robot
 from optimizer.problem.arm import LIMIT_NAMES, Arm, Payload
 from optimizer.problem.problem import Problem
 
@@ -37,6 +37,20 @@ def objective(answer: dict[str, Any]) -> float:
 def errors_found(body: dict[str, Any], answer: dict[str, Any], T_start: Array, T_goal: Array) -> list[str]:
     """A message for every error in an answer; T_start and T_goal (4, 4) are the flange poses of the request."""
     return [*_certificate_errors(answer), *_replay_errors(body, answer, T_start, T_goal), *_energy_errors(body, answer)]
+
+
+def refusal_errors(robot: Robot, problem: str, q_start: Array, q_goal: Array) -> list[str]:
+    """A message if the answer to a request between two configurations (nq,) [rad], both free of collisions, is a
+    problem, and the motors can hold the arm at both without any payload.
+
+    Gravity's torques are those of Pinocchio.
+    """
+    data = robot.model.createData()
+    held = [np.abs(pin.computeGeneralizedGravity(robot.model, data, q)) for q in (q_start, q_goal)]
+    worst = float((np.max(held, axis=0) / robot.limits.tau_max).max())
+    if problem == "torque-infeasible" and worst > 1:
+        return []
+    return [f"refused as {problem}, but both ends are free, and holding takes {worst:.0%} of the torque limits"]
 
 
 def _certificate_errors(answer: dict[str, Any]) -> Iterator[str]:

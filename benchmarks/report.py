@@ -20,6 +20,7 @@ def write(path: Path, machine: Results, results: dict[str, Results | None], took
         _requirements(results),
         _distributions(results),
         _notes(results),
+        _arms(results.get("arms")),
         _load(results.get("load")),
         _growth(results.get("scaling")),
         _foreign(results.get("foreign")),
@@ -123,6 +124,28 @@ def _notes(results: dict[str, Results | None]) -> str:
     if success := results.get("success"):
         lines.append(f"Energy balance: largest error {success['balance_error']:.0e} of the total.")
     return "## Notes\n\n" + "\n".join(f"- {line}" for line in lines) if lines else ""
+
+
+def _arms(found: Results | None) -> str:
+    """Requests to a pose, per robot."""
+    if found is None:
+        return ""
+    header = ["robot", "joints", "answered", "errors", "time: median [ms]", "95th percentile [ms]", "gap: median [%]"]
+    rows = (
+        [
+            f"`{row['robot']}`",
+            str(row["joints"]),
+            f"{row['answered']} of {row['count']}",
+            str(len(row["errors"])),
+            *_times(row, 0),
+            "" if row["gap"]["p50"] is None else f"{PERCENT * row['gap']['p50']:.1f}",
+        ]
+        for row in found["rows"]
+    )
+    text = (
+        "Random requests from joint positions to a pose, one client, one worker. A refusal without a true reason is an "
+    )
+    return f"## Robots\n\n{text}error.\n\n{table(header, rows)}"
 
 
 def _load(found: Results | None) -> str:

@@ -111,6 +111,18 @@ def _success(found: Results) -> Iterator[Requirement]:
     yield Requirement(task, "energy above time scaling, same duration [%]", "maximum", excess, 1, digits=2)
 
 
+def _arms(found: Results) -> Iterator[Requirement]:
+    task, rows = "every robot, joint to pose", found["rows"]
+    valid = PERCENT * sum(row["answered"] for row in rows) / max(sum(row["count"] for row in rows), 1)
+    yield Requirement(task, "answers [%]", "mean", valid, 99, at_least=True, digits=1)
+    yield Requirement(task, "wrong answers and refusals", "count", len(found["errors"]), 0)
+    for row in rows:
+        quantity = "gap, 1 - lower bound / energy [%]"
+        yield Requirement(f"`{row['robot']}`, to a pose", quantity, "median", PERCENT * row["gap"]["p50"], 12, digits=1)
+        if row["joints"] > 6:
+            yield from _percentiles(f"`{row['robot']}`, to a pose", row["wall"], p50=200, p95=600)
+
+
 def _quality(found: Results) -> Iterator[Requirement]:
     task = f"best of {found['starts']} starts with {found['control_points']} control points"
     quantity, excess = "energy above it [%]", found["excess"]
@@ -147,6 +159,7 @@ SECTIONS: dict[str, Callable[[Results], Iterator[Requirement]]] = {
     "scenes": _scenes,
     "starts": _starts,
     "success": _success,
+    "arms": _arms,
     "quality": _quality,
     "simulation": _simulation,
     "load": _load,

@@ -12,7 +12,7 @@ from benchmarks.command import parser, write_json
 from benchmarks.service import Answer, Service, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
-from models.registry import load_robot
+from models.registry import load_robot, robot_names
 from optimizer.energy.kernel_cache import compile_kernel
 
 PATIENCE = 90.0  # longest time for the first answer, and for the compiler [s]
@@ -31,10 +31,10 @@ def first_answer(service: Service, body: dict[str, Any]) -> Answer:
             time.sleep(0.005)
 
 
-def warm(seed: int) -> dict[str, Any]:
+def warm(seed: int, robot: str) -> dict[str, Any]:
     """Times with compiled kernels in the cache: a request sent at once, and one sent after `/readyz` answers 200."""
-    compile_kernel(load_robot("ur5e"))
-    body = request_task(seed, 0).body
+    compile_kernel(load_robot(robot))
+    body = request_task(seed, 0, robot=robot).body
     with running(ready=False) as service:
         at_once = first_answer(service, body)
         answered = service.age
@@ -51,10 +51,10 @@ def warm(seed: int) -> dict[str, Any]:
     }
 
 
-def cold(seed: int) -> dict[str, Any]:
+def cold(seed: int, robot: str) -> dict[str, Any]:
     """Times with an empty cache: sequential requests before and after the kernel is compiled."""
     with tempfile.TemporaryDirectory() as cache, running(ready=False, JOULEPATH_CACHE_DIR=cache) as service:
-        body = request_task(seed, 0).body
+        body = request_task(seed, 0, robot=robot).body
         first = first_answer(service, body)
         answered, ready = service.age, None
         compiled: float | None = None
@@ -67,7 +67,7 @@ def cold(seed: int) -> dict[str, Any]:
             if ready is None and client.get("/readyz").status == 200:
                 ready = service.age
             index += 1
-            answer = client.optimize(request_task(seed, index).body)
+            answer = client.optimize(request_task(seed, index, robot=robot).body)
             statuses.append(answer.status)
             (before if compiled is None else after).append(answer.wall)
         return {
@@ -83,8 +83,10 @@ def cold(seed: int) -> dict[str, Any]:
 
 def main() -> None:
     """Measures both."""
-    given = parser(__doc__).parse_args()
-    results = {"warm": warm(given.seed), "cold": cold(given.seed)}
+    arguments = parser(__doc__)
+    arguments.add_argument("--robot", choices=robot_names(), default="ur5e", help="(%(default)s)")
+    given = arguments.parse_args()
+    results = {"warm": warm(given.seed, given.robot), "cold": cold(given.seed, given.robot)}
     one = results["warm"]
     print(
         f"warm cache: ready after {one['start_to_ready']:.2f} s, first request then {one['first_after_ready']:.3f} s "

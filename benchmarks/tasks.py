@@ -35,12 +35,14 @@ class Move:
 
 @dataclass(frozen=True)
 class RequestTask:
-    """A body for `POST /optimize`, and the poses T_base_flange (4, 4) that it requests."""
+    """A body for `POST /optimize`, and the configurations (nq,) [rad] and poses T_base_flange (4, 4) it was made of."""
 
     seed: int
     index: int
     kind: Kind
     body: dict[str, Any]
+    q_start: Array
+    q_goal: Array
     T_start: Array
     T_goal: Array
 
@@ -77,7 +79,7 @@ def request_task(
     body: dict[str, Any] = {"robot": robot, "start": start, "goal": {"pose": as_pose(T_goal)}}
     if varied:
         body |= _variation(rng, arm)
-    return RequestTask(seed, index, kind, body, T_start, T_goal)
+    return RequestTask(seed, index, kind, body, q_start, q_goal, T_start, T_goal)
 
 
 def collision_free(rng: np.random.Generator, robot: Robot) -> Array:

@@ -24,7 +24,7 @@ from optimizer.trajectories.quadrature import quadrature
 # durations of the quintic, in multiples of the shortest one, and the panels and points of its quadrature
 TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3
 # pairs whose energies are estimated: those of least lower bound
-MOST_ESTIMATED = 1024
+MOST_ESTIMATED = 384
 # seeds need at most this ratio of the least estimate, and so many of them are solved at a time
 NEAR, MOST_SEEDS = 1.12, 4
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,10 @@ from app.convert.arm_fields import arm_fields
 from app.convert.request import to_problem
 from app.convert.solution import to_optimize_response
 from app.schemas.request import OptimizeRequest
-from benchmarks.checks import allowed, beats, errors_found
+from benchmarks.checks import allowed, beats, errors_found, refusal_errors
 from benchmarks.motion import SplineMotion, replay
 from benchmarks.tasks import RequestTask, request_task
+from models.registry import load_robot
 from optimizer.optimize import optimize
 
 Json = dict[str, Any]
@@ -115,3 +117,14 @@ def test_replay_agrees_with_the_certificate(task: RequestTask, answered: Json) -
     assert motion.energy.electrical.total == pytest.approx(answered["energy"]["electrical"]["total"], rel=ENERGY_ERROR)
     for name, ratio in answered["certificate"]["worst_ratio"].items():
         assert motion.ratios[name] == pytest.approx(ratio, abs=RATIO_ERROR)
+
+
+def test_a_refusal_is_right_only_if_the_arm_cannot_be_held(task: RequestTask) -> None:
+    robot = load_robot("ur5e")
+    ends = task.q_start, task.q_goal
+    for problem in ("torque-infeasible", "unreachable-pose", "deadline-exceeded"):
+        (message,) = refusal_errors(robot, problem, *ends)
+        assert problem in message
+    weak = replace(robot, limits=robot.limits.tightened(tau_max=robot.limits.tau_max / 1000))
+    assert refusal_errors(weak, "torque-infeasible", *ends) == []
+    assert len(refusal_errors(weak, "unreachable-pose", *ends)) == 1
