@@ -154,9 +154,13 @@ class SqpMethod(Method):
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
 
     def _must_be_below(self, stage: _Stage) -> float:
-        """The energy [J] that a solve must promise to come below. Around obstacles, promises are not kept."""
+        """The energy [J] that a solve must promise to come below.
+
+        Around obstacles and through passes, promises are not kept.
+        """
         smoothed = has_corners(self.prepared.problem.objective, self.prepared.arm)
-        return np.inf if len(stage.pairs) or smoothed or self.interval.minimum_time else self.best_known
+        kept = not (len(stage.pairs) or len(self.passes) or smoothed or self.interval.minimum_time)
+        return self.best_known if kept else np.inf
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths as initial guesses; `failed` if there is none.
