@@ -26,6 +26,9 @@ from optimizer.trajectories.time_scalings import quintic_spline
 # pays for it to what the storage gives back
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
 
+# further solves of a motion whose posture has moved, while each saves this share of the energy
+REGRADED, SAVED = 2, 3e-4
+
 
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
@@ -36,9 +39,8 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         solve_from(incumbent, candidate, sampled(coarse), fine=tight)
         if tight and candidate.spline is coarse and not incumbent.deadline.passed:
             solve_from(incumbent, candidate, sampled(coarse), fine=False)
-        elif tight and slides(incumbent.prepared, candidate) and not incumbent.deadline.passed:
-            # the posture has moved: with knots at the switches of jerk of the motion to it
-            solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
+        elif tight and slides(incumbent.prepared, candidate):
+            _regrade(incumbent, candidate)
     if not method.guess_baselines:
         return
     if incumbent.uses_storage:
@@ -54,6 +56,17 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         # not `lasting`: its other rounding leads the mechanical objective to other local optima
         slower = retimed(spline, longest / spline.duration)
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
+
+
+def _regrade(incumbent: Incumbent, candidate: Candidate) -> None:
+    """Solve again with knots at the switches of jerk of the motion to the posture found, while that saves energy."""
+    for _ in range(REGRADED):
+        before = candidate.energy or 0.0
+        if incumbent.deadline.passed:
+            return
+        solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
+        if before - (candidate.energy or 0.0) < SAVED * abs(before):
+            return
 
 
 def is_tight(incumbent: Incumbent, candidate: Candidate) -> bool:
