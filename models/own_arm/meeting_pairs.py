@@ -12,12 +12,15 @@ from models.own_arm.link_shapes import Rows
 from models.own_arm.upright import UprightChain, turn_onto
 from models.own_arm.urdf_chain import Chain
 
-# random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart
-SAMPLES, ALWAYS = 300, 0.95
+# random configurations over which pairs are looked at, and the share of them from which on two links cannot be apart.
+# Joints have the ranges that links leave them: a pair that meets this often with a guessed capsule says that it is too
+# thick there
+SAMPLES, ALWAYS, OFTEN = 300, 0.95, 0.3
 
 
-def pairs_that_meet(chain: Chain, upright: UprightChain, capsules: list[Rows]) -> list[list[int]]:
-    """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration."""
+def pairs_that_meet(chain: Chain, upright: UprightChain, capsules: list[Rows], guessed: list[bool]) -> list[list[int]]:
+    """Pairs of links, next but one or farther, whose capsules meet in nearly every configuration, or often if one of
+    them is `guessed`."""
     pairs = [(a, b) for a, b in combinations(range(chain.nq + 1), 2) if a + 1 < b]
     meets = np.zeros(len(pairs))
     shapes = [[(coal.Capsule(row[6], _length(row)), _middle(row)) for row in rows] for rows in capsules]
@@ -31,7 +34,8 @@ def pairs_that_meet(chain: Chain, upright: UprightChain, capsules: list[Rows]) -
             meets[k] += any(
                 coal.collide(a, T_a, b, T_b, request, coal.CollisionResult()) for a, T_a in first for b, T_b in second
             )
-    return [list(pair) for pair, count in zip(pairs, meets, strict=True) if count >= ALWAYS * SAMPLES]
+    share = [OFTEN if guessed[a] or guessed[b] else ALWAYS for a, b in pairs]
+    return [list(pair) for pair, count, least in zip(pairs, meets, share, strict=True) if count >= least * SAMPLES]
 
 
 def _length(row: list[float]) -> float:

@@ -13,16 +13,20 @@ from app.schemas.examples.own_arm import URDF
 from models.from_figures import robot_of
 from models.own_arm.description import Collision, Description, Drives, Electronics, InvalidArm, Motion
 from models.own_arm.figures import own_figures
-from models.registry import load_robot
+from models.registry import load_figures, load_robot
 from models.robot import Array
 from models.trust import energy_trust
+from models.urdf import urdf_of
 from optimizer import Arm, Problem, optimize
+from optimizer.collision.model import collision_model
 from optimizer.kinematics.ur_closed_form import URClosedForm
 from tests.models.own_arm.arms import AMPLE, HELD, PLAIN, RICH, RICH_ARM, refused, robot, whole
 from tests.models.test_capsule_cover import meshes as arm_folder
 
 # lengths of about 1 m and torques of some 100 N·m, both by sums of a hundred products
 EXACT, TORQUE = 1e-14, 1e-11
+# least share of random configurations that guessed shapes leave free
+FREE = 0.6
 
 
 @pytest.mark.parametrize(
@@ -214,3 +218,14 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     assert load_robot(file).never_in_collision == {(0, 2)}
     with pytest.raises(OSError, match=r"other\.yaml"):
         load_robot(tmp_path / "other.yaml")
+
+
+def test_guessed_capsules_of_a_wrist_leave_most_configurations_valid() -> None:
+    """Of arms by their kinematics alone: capsules from joint to joint are too thick next to a spherical wrist."""
+    for name in ("kr10_r1100", "ur10e", "xarm7"):
+        given = Description(urdf=urdf_of(name, load_figures(name)), tip="flange", acceleration=10.0, payload=5.0)
+        made = robot(given)
+        model = collision_model(Arm(robot=made))
+        q = np.random.default_rng(3).uniform(made.limits.q_min, made.limits.q_max, (200, made.nq))
+        free = model.pair_distances(model.frames(q)).distance.min(axis=1) > 0
+        assert free.mean() > FREE
