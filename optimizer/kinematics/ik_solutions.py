@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Limits
+from models.robot import Array
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.problem.branches import BranchLabel
@@ -46,7 +46,7 @@ class PrincipalSolution:
     singularities: Singularities
     row: int
 
-    @property
+    @cached_property
     def singular(self) -> tuple[str, ...]:
         """The parts of the label that are singular: the configuration is on both branches of such a part."""
         return self.singularities.parts(self.q)
@@ -59,11 +59,14 @@ class PrincipalSolution:
 
 @dataclass(frozen=True, eq=False)
 class IKSolution:
-    """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see `PrincipalSolution`."""
+    """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see `PrincipalSolution`.
+
+    `limit_distance` [rad] is the least distance of any joint to its limits.
+    """
 
     q: Array
     branch: PrincipalSolution
-    limits: Limits
+    limit_distance: float
 
     @property
     def label(self) -> BranchLabel:
@@ -84,8 +87,3 @@ class IKSolution:
     def smallest_singular_value(self) -> float:
         """That of the flange's geometric Jacobian, which full turns do not change."""
         return self.branch.smallest_singular_value
-
-    @property
-    def limit_distance(self) -> float:
-        """The least distance [rad] of any joint to its limits."""
-        return float(min((self.q - self.limits.q_min).min(), (self.limits.q_max - self.q).min()))

@@ -237,25 +237,26 @@ class ClosedFormInverseKinematics:
         if not reachable:
             raise self._out_of_reach(T, target)
         nearest, held = _nearest_turns(reached.q, limits)
-        solutions = list[IKSolution]()
+        wound, owners = list[Array](), list[PrincipalSolution]()
         for branch, near, inside in zip(reached.principal(self._form, self._chain), nearest, held, strict=True):
             if not inside:
                 continue
             if windings and branch.self_motion is None:
-                choices = full_turn_alternatives(branch.q, limits.q_min, limits.q_max)
-                wound = np.array(list(product(*choices)))
-                wound.setflags(write=False)
-                solutions += [IKSolution(q, branch, limits) for q in wound]
+                wound.append(np.array(list(product(*full_turn_alternatives(branch.q, limits.q_min, limits.q_max)))))
             else:
-                solutions.append(IKSolution(near, branch, limits))
-        if not solutions:
+                wound.append(near[None])
+            owners += [branch] * len(wound[-1])
+        if not owners:
             raise UnreachablePose(
                 target,
                 None,
                 f"The {target} pose is within reach, but every arm configuration for it violates a position limit: "
                 "widen limits.position or move the pose.",
             )
-        return solutions
+        q = np.concatenate(wound)
+        q.setflags(write=False)
+        distances = np.minimum(q - limits.q_min, limits.q_max - q).min(axis=1).tolist()
+        return [IKSolution(*each) for each in zip(q, owners, distances, strict=True)]
 
     def _out_of_reach(self, T: Array, target: str) -> UnreachablePose | SingularPose:
         distance = self._form.distance_to_reach(_orthonormal(T))
