@@ -36,12 +36,12 @@ def main() -> None:
     address = sys.argv[2] if len(sys.argv) > 2 else "http://127.0.0.1:8000"
     answer = ask(path, address.rstrip("/"))
     total, bound = answer["energy"]["electrical"]["total"], answer["energy"]["lower_bound"]
-    print(f"this motion            {total:7.1f} J in {answer['duration']:.2f} s")
+    print(f"this motion            {total:5.0f} J in {answer['duration']:.2f} s")
     for each in answer["baselines"]:
         if each["name"] in ("controller_default", "ruckig"):
-            needs = f"{each['electrical']:7.1f} J in {each['duration']:.2f} s"
+            needs = f"{each['electrical']:5.0f} J in {each['duration']:.2f} s"
             print(f"{each['name']:22s} {needs}  ({100 * each['saving']:.0f} % saved)")
-    print(f"no motion needs less   {bound:7.1f} J")
+    print(f"no motion needs less   {bound:5.0f} J")
     print("turn to, in degrees:  ", [round(57.29577951308232 * q, 1) for q in answer["branch"]["goal"]["q"]])
     print("greatest value / limit:", round(max(answer["certificate"]["worst_ratio"].values()), 3))
     for warning in answer.get("warnings", []):
