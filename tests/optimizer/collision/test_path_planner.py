@@ -22,13 +22,15 @@ from optimizer.collision.path_planner import (
     plan_paths,
 )
 from optimizer.collision.state_validity import StateValidityChecker
-from optimizer.deadline import Deadline
+from optimizer.deadline import NEVER, Deadline
 from optimizer.exceptions import NoCollisionFreeTrajectory, NoTrajectory
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
 from optimizer.methods import planned_paths
+from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, HalfSpace, Obstacle, Scene, Shape, capsule_between
@@ -241,6 +243,20 @@ def test_a_motion_into_a_cage_starts_from_a_planned_path() -> None:
     """The optimiser alone finds no way between the bars."""
     found = optimize(problem(*task("cage")))
     assert found.candidates[0].reason == f"converged{FROM_PLANNED_PATH}"
+
+
+@pytest.mark.parametrize(
+    ("best_known", "was_postponed", "planned"), [(np.inf, False, False), (1e6, False, True), (np.inf, True, True)]
+)
+def test_a_motion_deep_inside_an_obstacle_is_left_for_a_planned_path_once_one_is_known(
+    best_known: float, was_postponed: bool, planned: bool
+) -> None:
+    arm, q_start, q_goal = task("post")
+    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
+    solver.best_known, solver.was_postponed = best_known, was_postponed
+    found = solver.solve()
+    assert found.spline is not None
+    assert found.reason.endswith(FROM_PLANNED_PATH) == planned
 
 
 def test_a_request_among_obstacles_has_the_same_answer_whatever_time_it_takes() -> None:
