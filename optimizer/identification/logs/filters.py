@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
 
 from models.robot import Array
 
@@ -33,6 +32,9 @@ def low_passed(values: Array, rate: float) -> Array:
 
 def _filtered(channel: Array, rate: float, highest: float) -> Array:
     """A channel (n,) without what is above a frequency [Hz]."""
+    # every process that serves requests would hold 25 MB of it, and only logs are filtered
+    from scipy.signal import butter, sosfiltfilt
+
     return np.asarray(sosfiltfilt(butter(_ORDER, highest, fs=rate, output="sos"), channel))
 
 
