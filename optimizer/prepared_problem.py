@@ -17,8 +17,10 @@ from optimizer.kinematics.least_speed import LeastSpeed
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
+from optimizer.problem.targets import Target
 from optimizer.solution import Energy, Sensitivity
 from optimizer.surroundings import Surroundings
 from optimizer.trajectories.limit_ratios import too_much
@@ -54,11 +56,16 @@ class PreparedProblem(Plant):
     @cached_property
     def course(self) -> ToolCourse | None:
         """The course of the problem's tool path; None if there is none."""
-        path, ends = self.problem.tool_path, (self.problem.start, self.problem.goal)
+        path, start, goal = self.problem.tool_path, self.problem.start, self.problem.goal
         if path is None:
             return None
-        T_start, T_goal = (each.T if isinstance(each, Pose) else tcp_pose(self.arm, np.asarray(each)) for each in ends)
-        return ToolCourse.of(path, T_start, T_goal)
+        if isinstance(goal, ConeOrientedPose):
+            return ToolCourse.of(path, self._pose(start), goal)
+        return ToolCourse.of(path, self._pose(start), self._pose(goal))
+
+    def _pose(self, end: Target) -> Array:
+        """T_base_tcp (4, 4) at an end that is a pose or joint positions."""
+        return end.T if isinstance(end, Pose) else tcp_pose(self.arm, np.asarray(end))
 
     @cached_property
     def least_speed(self) -> LeastSpeed | None:

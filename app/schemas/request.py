@@ -242,8 +242,9 @@ class OptimizeRequest(MotionRequest):
         default="bspline",
     )
     path: Path | None = described(
-        "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. `method` and "
-        "`windings` do not matter. Null: the motion is free.",
+        "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. The orientation of "
+        "the goal may be `free_about` the axis `tolerance.about`. `method` and `windings` do not matter. Null: the "
+        "motion is free.",
         None,
         {"tolerance": {"position": 1e-4}},
         default=None,

@@ -82,9 +82,9 @@ def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
 def _with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
     """The trace of a turning with which the course is followed to its end; if there is none, how far it is followed."""
     sheet = TurningSheet.of(arm, chain_of(arm.robot), course, stopped.q[0])
-    chosen = sheet.least(shortest)
+    chosen = sheet.least(shortest, course.free_end)
     for knots in KNOTS if chosen is not None else ():
-        turning = turning_through(sheet.at, sheet.angles[chosen], knots)
+        turning = turning_through(sheet.at, sheet.angles[chosen], knots, course.free_end)
         (trace,) = _traces(arm, replace(course, turning=turning), stopped.q[:1])
         if trace.obstacle is None:
             return replace(trace, turning=turning)

@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.course_shapes import Shape, shape_of
+from optimizer.kinematics.orientation_tolerance import nearest_orientation
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 
 # poses of the course that a motion is compared with, on each piece of its shape at least, and the way between two [m]
@@ -37,19 +39,27 @@ class ToolCourse:
     by_distance: tuple[Array, Array] | None = None
     # the angle [rad] by which the tool is turned about the path's free axis at a fraction of the way; None: by none
     turning: CubicSpline | None = None
+    # whether the tool may be turned about this axis at the goal, too
+    free_end: bool = False
     # the part of the shape that the course follows, from one fraction to another one, in this direction
     first: float = 0.0
     last: float = 1.0
 
     @classmethod
-    def of(cls, path: ToolPath, T_start: Array, T_goal: Array) -> ToolCourse:
-        """The course of a path, or a section of it, from T_start to T_goal (4, 4).
+    def of(cls, path: ToolPath, T_start: Array, goal: Array | ConeOrientedPose) -> ToolCourse:
+        """The course of a path, or a section of it, from the pose T_start (4, 4) to a `goal`.
+
+        The goal is a pose (4, 4). Or the rotation about the path's free axis is free there: then the tool turns as
+        little as may be from the pose before.
 
         Raises InvalidProblem; see `shape_of`. The ramps of a path must leave something between them.
         """
         if path.section is not None:
-            T_start, T_goal = path.section.start.T, path.section.goal.T
-        course = cls(path, shape_of(path, np.array([T_start, *(pose.T for pose in path.via), T_goal])))
+            T_start, goal = path.section.start.T, path.section.goal.T
+        known, free_end = [T_start, *(pose.T for pose in path.via)], isinstance(goal, ConeOrientedPose)
+        if isinstance(goal, ConeOrientedPose):
+            goal = goal.with_orientation(nearest_orientation(goal, known[-1][:3, :3])).T
+        course = cls(path, shape_of(path, np.array([*known, goal])), free_end=free_end)
         if path.least_speed is not None:
             course = course._by_distance()
         if path.section is not None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +30,9 @@ MOST_TURN = 3
 # a configuration is on the sheet if it misses its pose by less [m, rad]; a joint that turns farther from one point to
 # the next [rad] does so at a singularity
 REACHED, JUMP = 1e-9, 0.35
+# how turnings begin and end
+_AT_REST: Final = "clamped"
+_NATURAL: Final = "natural"
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +83,12 @@ class TurningSheet:
         """The fraction of the course up to which some configurations are known."""
         return float(self.at[np.isfinite(self.q[:, :, 0]).any(axis=1)].max(initial=0.0))
 
-    def least(self, cost: Callable[[Array, Array, npt.NDArray[np.intp]], Array]) -> npt.NDArray[np.intp] | None:
-        """The numbers (s,) of the angles of the turning of least cost that begins and ends without a turn.
+    def least(
+        self, cost: Callable[[Array, Array, npt.NDArray[np.intp]], Array], free_end: bool = False
+    ) -> npt.NDArray[np.intp] | None:
+        """The numbers (s,) of the angles of the turning of least cost that begins without a turn.
 
+        It ends without one, too, or at any angle if its end is free.
         `cost` gives that of steps from q to others (n, nq) [rad] from the points (n,) of the way. None if no turning
         leads to the end.
         """
@@ -98,9 +105,10 @@ class TurningSheet:
             best = total.argmin(axis=0)
             came[k] = np.arange(ANGLES) - (best - MOST_TURN)
             reached = total[best, np.arange(ANGLES)]
-        if not np.isfinite(reached[middle]):
+        last = int(reached.argmin()) if free_end else middle
+        if not np.isfinite(reached[last]):
             return None
-        chosen = [middle]
+        chosen = [last]
         for k in range(steps - 1, -1, -1):
             chosen.append(int(came[k, chosen[-1]]))
         return np.array(chosen[::-1])
@@ -122,17 +130,24 @@ def shortest(first: Array, second: Array, at: npt.NDArray[np.intp]) -> Array:
     return np.asarray(((second - first) ** 2).sum(axis=1))
 
 
-def turning_through(at: Array, angle: Array, knots: int) -> CubicSpline:
-    """A smooth turning near angles (k,) [rad] at fractions (k,), by values at `knots` even fractions; zero at the ends,
-    where it begins and ends at rest."""
+def turning_through(at: Array, angle: Array, knots: int, free_end: bool = False) -> CubicSpline:
+    """A smooth turning near angles (k,) [rad] at fractions (k,), by values at `knots` even fractions; see
+    `turning_of`."""
     x = np.linspace(0.0, 1.0, knots)
-    unit = CubicSpline(x, np.eye(knots), bc_type="clamped")(at)[:, 1:-1]
-    return turning_of(np.asarray(np.linalg.lstsq(unit, angle, rcond=None)[0], dtype=float))
+    unit = CubicSpline(x, np.eye(knots), bc_type=_NATURAL if free_end else _AT_REST)(at)[
+        :, 1 : knots if free_end else -1
+    ]
+    return turning_of(np.asarray(np.linalg.lstsq(unit, angle, rcond=None)[0], dtype=float), free_end)
 
 
-def turning_of(inner: Array) -> CubicSpline:
-    """The turning with values (k,) [rad] at even fractions between the ends, where it is zero."""
-    return CubicSpline(np.linspace(0.0, 1.0, len(inner) + 2), np.concatenate([[0.0], inner, [0.0]]), bc_type="clamped")
+def turning_of(values: Array, free_end: bool = False) -> CubicSpline:
+    """The turning with values (k,) [rad] at even fractions after the start, where it is zero.
+
+    The last value is that at the end if this is free, and an even turning is one of them. Else it is zero there, too,
+    and the turning begins and ends at rest.
+    """
+    angles = np.concatenate([[0.0], values, [] if free_end else [0.0]])
+    return CubicSpline(np.linspace(0.0, 1.0, len(angles)), angles, bc_type=_NATURAL if free_end else _AT_REST)
 
 
 def _followed(chain: Chain, q: Array, T: Array) -> Array:

@@ -10,17 +10,18 @@ from scipy.integrate import cumulative_trapezoid
 
 from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
-from optimizer.kinematics.course_tracing import path_ratios
+from optimizer.kinematics.course_tracing import Trace, path_ratios
 from optimizer.methods.duration_intervals import DurationInterval
+from optimizer.methods.end_angle import try_angles
 from optimizer.methods.even_speed import EvenSpeed
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
-from optimizer.methods.tool_turning import turned_paths
+from optimizer.methods.tool_turning import TurnedToEnd, turned_paths
 from optimizer.problem.tool_path import ToolPath
 from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
-from optimizer.trajectories.spline import Spline, sample
+from optimizer.trajectories.spline import Spline, sample, sampled
 
 # spans of the first time scaling, and more of them for each bend; how much finer the second one is, and its spans
 # at most
@@ -77,7 +78,7 @@ class ToolPathMotion(Method):
             results.append(self._kept(path, self.interval, self._scaling(FINER_SCALING)))
         found = self._clear(min(results, key=lambda result: self.prepared.cost_of(result.spline)))
         if found.spline is None and self._may_turn():
-            results += self._turned(self._paced(path), self._scaling(1), np.inf)
+            self._turn(self._paced(path), self._scaling(1), np.inf, results)
             found = min([found, *results], key=lambda result: self.prepared.cost_of(result.spline))
         return with_effort(found, results)
 
@@ -102,20 +103,40 @@ class ToolPathMotion(Method):
         """Whether the tool may turn about an axis, and its turning has not been looked for before."""
         return self._tool_path.about is not None and not self.prepared.is_chosen(self.q_start)
 
-    def _turned(self, law: tuple[Array, Array], scaling: Basis, least: float) -> list[SolveResult]:
-        """Motions with other turnings of the tool, which are looked for with a law of times [s] and fractions (k,).
+    def _turn(self, law: tuple[Array, Array], scaling: Basis, least: float, results: list[SolveResult]) -> None:
+        """Append to `results` motions with other turnings of the tool, looked for with a law of times [s] and fractions
+        (k,).
 
         The path of the best one is kept if it needs less than `least` [J]; and no other is looked for again.
         """
-        results = list[SolveResult]()
-        self.prepared.choose(self.q_start)
-        for trace, path in turned_paths(self.prepared, self.q_start, self.q_goal, *law):
+        prepared, best = self.prepared, least
+        kept: tuple[Trace, Spline, Spline] | None = None
+        assert prepared.course is not None
+        prepared.choose(self.q_start)
+
+        def tried(trace: Trace, path: Spline, scaling: Basis, law: tuple[Array, Array] | None) -> float:
+            nonlocal best, kept
             results.append(self._clear(self._kept(path, self.interval, scaling, law)))
-            cost = self.prepared.cost_of(results[-1].spline)
-            if cost < least:
-                least = cost
-                self.prepared.choose(self.q_start, trace, path)
-        return results
+            found, cost = results[-1].spline, prepared.cost_of(results[-1].spline)
+            if found is not None and cost < best:
+                best, kept = cost, (trace, path, found)
+                prepared.choose(self.q_start, trace, path)
+            return cost
+
+        if prepared.course.free_end:
+            to_end = TurnedToEnd(prepared, self.q_start)
+
+            def ended(angle: float) -> float:
+                turned = to_end.at(angle)
+                return np.inf if turned is None else tried(*turned, self._scaling(1), None)
+
+            try_angles(ended, least)
+            if kept is not None:
+                trace, path, found = kept
+                law = _on_path(path, *sampled(found))
+                tried(trace, path, scaling, law)
+        for trace, path in turned_paths(prepared, self.q_start, self.q_goal, *law):
+            tried(trace, path, scaling, law)
 
     @staticmethod
     def may_refine(found: Spline) -> bool:
@@ -139,7 +160,7 @@ class ToolPathMotion(Method):
                     results.append(self._kept(path, self.interval, scaling, law))
                 if self._may_turn():
                     least = min(self.prepared.cost_of(result.spline) for result in results)
-                    results += self._turned(law, scaling, least)
+                    self._turn(law, scaling, least, results)
         except DeadlinePassed:
             results.append(SolveResult(SolveStatus.OUT_OF_TIME, DEADLINE_PASSED))
         return with_effort(min(results, key=lambda result: self.prepared.cost_of(result.spline)), results)

@@ -44,24 +44,52 @@ def turned_paths(
 ) -> Iterator[tuple[Trace, Spline]]:
     """Traces and joint paths of turnings from q_start to q_goal (nq,) [rad] that should need less; the better one last.
 
-    `s` (k,) are the fractions of the course at times t (k,) [s] of a motion.
+    If the end of the course is free, they lead to any angle there. `s` (k,) are the fractions of the course at times t
+    (k,) [s] of a motion.
     """
-    law = _TimeLaw(prepared, q_start, s, t)
-    known = prepared.traces[q_start.tobytes()].turning or turning_of(np.zeros(KNOTS - 2))
-    coarse = law.coarse()
+    law, known = _TimeLaw(prepared, q_start, s, t), _known(prepared, q_start)
+    wanted, coarse = None if law.course.free_end else q_goal, law.coarse()
     for turning in (coarse, law.refined(coarse or known)):
-        if turning is None:
-            continue
-        assert prepared.course is not None
-        course, limits = replace(prepared.course, turning=turning), prepared.arm.active_limits
-        (trace,) = traces(prepared.arm, course, q_start[None])
-        trace = replace(trace, turning=turning)
-        leads_there = trace.obstacle is None and np.abs(trace.q[-1] - q_goal).max() < SAME
-        if not leads_there or not within(trace, limits.q_min, limits.q_max):
-            continue
-        path = joint_path(prepared.arm, course, trace)
-        if path is not None:
-            yield trace, path
+        followed = None if turning is None else _followed(prepared, q_start, wanted, turning)
+        if followed is not None:
+            yield followed
+
+
+class TurnedToEnd:
+    """Paths from q_start (nq,) [rad] that end at other angles of a course whose end is free: the tool turns evenly to
+    them, beside what it turns now."""
+
+    def __init__(self, prepared: PreparedProblem, q_start: Array) -> None:
+        self.prepared, self.q_start, self.known = prepared, q_start, _known(prepared, q_start)
+
+    def at(self, angle: float) -> tuple[Trace, Spline] | None:
+        """The trace and the joint path that end at an angle [rad] to the present one; None if the arm cannot follow
+        them."""
+        x = self.known.x
+        return _followed(self.prepared, self.q_start, None, turning_of((self.known(x) + angle * x)[1:], free_end=True))
+
+
+def _known(prepared: PreparedProblem, q_start: Array) -> CubicSpline:
+    """The turning with which the course is followed from q_start (nq,) [rad]."""
+    assert prepared.course is not None
+    free_end = prepared.course.free_end
+    return prepared.traces[q_start.tobytes()].turning or turning_of(np.zeros(KNOTS - 2 + free_end), free_end)
+
+
+def _followed(
+    prepared: PreparedProblem, q_start: Array, q_goal: Array | None, turning: CubicSpline
+) -> tuple[Trace, Spline] | None:
+    """The trace and the joint path of a turning from q_start to q_goal (nq,) [rad]; None if it leads elsewhere, or the
+    arm cannot follow it. Without q_goal it may lead anywhere."""
+    assert prepared.course is not None
+    course, limits = replace(prepared.course, turning=turning), prepared.arm.active_limits
+    (trace,) = traces(prepared.arm, course, q_start[None])
+    trace = replace(trace, turning=turning)
+    leads_there = q_goal is None or np.abs(trace.q[-1] - q_goal).max() < SAME
+    if trace.obstacle is not None or not leads_there or not within(trace, limits.q_min, limits.q_max):
+        return None
+    path = joint_path(prepared.arm, course, trace)
+    return None if path is None else (trace, path)
 
 
 class _TimeLaw:
@@ -79,7 +107,8 @@ class _TimeLaw:
 
     def coarse(self) -> CubicSpline | None:
         """The turning of least cost by dynamic programming; None if there is none but the one without a turn."""
-        most = min(float(self.prepared.arm.active_limits.v_max.max() * self.t[-1] / 2), np.pi)
+        way_back = 1 if self.course.free_end else 2
+        most = min(float(self.prepared.arm.active_limits.v_max.max() * self.t[-1] / way_back), np.pi)
         steps = FIRST_STEPS + BEND_STEPS * self.course.shape.bends
         sheet = TurningSheet.of(self.prepared.arm, self.chain, self.course, self.q_start, steps, most)
         sheet = sheet.without(self._excluded)
@@ -89,15 +118,16 @@ class _TimeLaw:
             v = (second - first) / np.maximum(lengths[k], 1e-9)[:, None]
             return lengths[k] * self._drawn((first + second) / 2, v, np.zeros_like(v))
 
-        chosen = sheet.least(cost)
+        chosen = sheet.least(cost, self.course.free_end)
         if chosen is None or (chosen == chosen[0]).all():
             return None
-        return turning_through(sheet.at, sheet.angles[chosen], KNOTS)
+        return turning_through(sheet.at, sheet.angles[chosen], KNOTS, self.course.free_end)
 
     def refined(self, turning: CubicSpline) -> CubicSpline:
         """The turning near another one that needs the least with this time law."""
-        inner = turning(turning.x)[1:-1]
-        q = self._configurations(inner[None], self._first(turning))[0]
+        angles = turning(turning.x)
+        values = angles[1:] if self.course.free_end else angles[1:-1]
+        q = self._configurations(values[None], self._first(turning))[0]
         if not np.isfinite(q).all():
             return turning
         first = max(abs(float(self._costs(q[None])[0])), 1e-9)
@@ -112,18 +142,18 @@ class _TimeLaw:
             best[0] = tried[0]
             return float(values[0]), (values[1:] - values[0]) / STEP
 
-        found = minimize(cost, inner, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "ftol": PROGRESS})
-        return turning_of(np.asarray(found.x, dtype=float))
+        found = minimize(cost, values, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "ftol": PROGRESS})
+        return turning_of(np.asarray(found.x, dtype=float), self.course.free_end)
 
     def _first(self, turning: CubicSpline) -> Array:
         """Configurations (INSTANTS, nq) [rad] of a turning, followed from the start."""
         (trace,) = traces(self.prepared.arm, replace(self.course, turning=turning), self.q_start[None])
         return np.stack([np.interp(self.at, trace.at, q) for q in trace.q.T], axis=1)
 
-    def _configurations(self, inner: Array, near: Array) -> Array:
+    def _configurations(self, values: Array, near: Array) -> Array:
         """Configurations (n, INSTANTS, nq) [rad] of turnings by their values (n, k), near others; NaN where none is."""
-        count, nq = len(inner), near.shape[1]
-        angles = np.concatenate([turning_of(each)(self.at) for each in inner])
+        count, nq = len(values), near.shape[1]
+        angles = np.concatenate([turning_of(each, self.course.free_end)(self.at) for each in values])
         T = flange_pose(self.course.turned(np.tile(self.poses, (count, 1, 1)), angles), self.prepared.arm.T_flange_tcp)
         q, missed = newton.solved(self.chain, np.tile(near, (count, 1)), T, steps=20)
         q[missed > REACHED] = np.nan

@@ -37,7 +37,8 @@ class Problem:
     lasts no longer than the cycle.
 
     With a `tool_path` the TCP goes along it from `start` to `goal`, which are a pose or joint positions each: only the
-    branch and the timing are free, and `method` and `windings` do not matter.
+    branch and the timing are free, and `method` and `windings` do not matter. If the tool may turn about an axis on the
+    way, the goal may leave the rotation about it free.
 
     With `passes`, joint positions (nq,) [rad], the motion passes through them in their order, at times that are free;
     then start and goal are joint positions, too, and `method` does not matter.
@@ -77,8 +78,10 @@ class Problem:
             raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
         if self.tool_path is not None:
             for name in ("start", "goal"):
-                if isinstance(getattr(self, name), AnyOf | ConeOrientedPose):
+                if isinstance(getattr(self, name), AnyOf):
                     raise InvalidProblem(name, f"With a path, {name} must be one pose or joint positions.")
+            if isinstance(self.goal, ConeOrientedPose):
+                self.tool_path.check_free_goal(self.goal)
             self.tool_path.check_speed(self.arm.tcp_speed)
         passed = tuple(validated(self.arm, f"passes.{k}", q) for k, q in enumerate(self.passes))
         object.__setattr__(self, "passes", passed)

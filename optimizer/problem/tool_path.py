@@ -10,6 +10,7 @@ import numpy as np
 
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.arrays import unit_vector
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 
 PathShape = Literal["lines", "curve", "arc"]
@@ -27,6 +28,8 @@ RAMP, LEAST_RAMP = 0.02, 1e-3
 SPEED_TOLERANCE = 1e-3
 # a greatest speed must be so many times the least one: a motion needs some freedom between them
 SPEED_RANGE = 1.05
+# two axes are the same, or opposite ones, if the cosine of their angle differs from one by less
+SAME_AXIS = 1e-12
 # poses that are nearer than this [m] along the path are one
 SAME_POSE = 1e-6
 
@@ -101,6 +104,16 @@ class ToolPath:
                 "path.blend",
                 "The arm cannot turn a sharp corner without a stop: give a path.blend of at least the position's "
                 f'tolerance, {self.position_tolerance:g} m, one path for each line, or the shape "curve".',
+            )
+
+    def check_free_goal(self, goal: ConeOrientedPose) -> None:
+        """Raises InvalidProblem unless the rotation about the path's free axis is all that the goal leaves free."""
+        along = 0.0 if self.about is None else abs(float(goal.axis @ np.array(self.about)))
+        if goal.half_angle > 0 or along < 1 - SAME_AXIS:
+            raise InvalidProblem(
+                "goal.pose.orientation",
+                "With a path, the goal's orientation may be free about the axis path.tolerance.about alone: give the "
+                "same axis as free_about, or the orientation in full.",
             )
 
     def check_speed(self, most: float | None) -> None:

@@ -18,6 +18,7 @@ from optimizer.solution import CandidateStatus
 
 # goals of other candidates that a path may lead to as long as no motion is known
 MOST_OTHER_GOALS = 7
+NO_END = "the arm cannot be where the turn of the tool leads"
 
 
 def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
@@ -79,6 +80,12 @@ def _attempted(
     solver, prepared = solver_of(incumbent, candidate, interval), incumbent.prepared
     sliding = released(prepared, candidate, solver)
     result = in_time(incumbent, partial(attempt, solver))
+    if result.spline is not None and incumbent.problem.tool_path is not None and candidate.goal.tolerance is not None:
+        # the turn of the tool was chosen, and with it where the path ends
+        moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)
+        if moved is None:
+            return replace(result, status=SolveStatus.FAILED, reason=NO_END, spline=None), candidate
+        return result, moved
     if result.spline is None or not sliding:
         return result, candidate
     moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)

@@ -13,9 +13,11 @@ from optimizer.exceptions import PathAttempt, PathInfeasible
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.course_tracing import Trace, traces, turned, within
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.targets import Target
 from optimizer.search.candidates import Candidate, bound, pairs
 from optimizer.search.ends import EndConfiguration, ends, label_of
+from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.missed_branches import bound_of_others
 
 # rad: where a path leads, and joint positions that are given for its end
@@ -46,16 +48,21 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     return found
 
 
-def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline) -> float:
+def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float) -> float:
     """Lower bound [J] on motions along the tool path to which none of the `followed` candidates leads.
 
     A path may come so near to a singularity that a motion within its tolerance goes on in another branch than the one
     that was followed; and of a self-motion at its start only samples were followed. So this is the bound of all motions
-    between the first pose and the last one, in any other configurations.
+    between the first pose and the last one, in any other configurations; and where the goal leaves a rotation free, of
+    all of them: that of these ends once it reaches `enough` [J].
     """
     free = PreparedProblem.of(replace(prepared.problem, tool_path=None))
-    (starts, _), (goals, _) = (ends(free, name) for name in ("start", "goal"))
-    candidates = pairs(free, starts, goals)
+    starts, _ = ends(free, "start")
+    if isinstance(prepared.problem.goal, ConeOrientedPose):
+        goal = followed[0].goal
+        anywhere = [Candidate(start, goal, start.q, goal.q) for start in starts]
+        return min(family_bound_of(free, anywhere, deadline, enough), bound_of_others(free, anywhere, deadline))
+    candidates = pairs(free, starts, ends(free, "goal")[0])
     bound(free, candidates)
     others = (each.lower_bound for each in candidates if not each.sampled and not _is_among(each, followed))
     return min([bound_of_others(free, candidates, deadline), *others])
@@ -78,7 +85,12 @@ def _candidate(prepared: PreparedProblem, start: EndConfiguration, trace: Trace)
             return None
         q_goal = given
     goal = EndConfiguration(
-        label_of(prepared.arm.robot, q_goal), q_goal, [[value] for value in q_goal.tolist()], True, start.target
+        label_of(prepared.arm.robot, q_goal),
+        q_goal,
+        [[value] for value in q_goal.tolist()],
+        True,
+        start.target,
+        given if isinstance(given, ConeOrientedPose) else None,
     )
     return Candidate(start, goal, q_start, q_goal)
 

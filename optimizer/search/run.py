@@ -294,13 +294,11 @@ class Run:
                 candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
         # of a target that infinitely many configurations reach, only samples are solved: it is done only if a bound
         # rules all of it out
-        family = min(
-            family_bound_of(prepared, candidates, incumbent.deadline, objective),
-            bound_of_others(prepared, candidates, incumbent.deadline),
-        )
-        beside = np.inf
-        if self.problem.tool_path is not None:
-            beside = bound_beside(prepared, candidates, incumbent.deadline)
+        family, beside = bound_of_others(prepared, candidates, incumbent.deadline), np.inf
+        if self.problem.tool_path is None:
+            family = min(family, family_bound_of(prepared, candidates, incumbent.deadline, objective))
+        else:
+            beside = bound_beside(prepared, candidates, incumbent.deadline, objective)
             family = min(family, beside) if any(each.sampled for each in candidates) else family
         done = all(each.status is CandidateStatus.PRUNED for each in open_) and family >= objective
         least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])

@@ -1,0 +1,164 @@
+"""Paths whose goal leaves the rotation about the tool's free axis open: what it gains, its bound, and its refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.robot import Array
+from optimizer.exceptions import InvalidProblem, JoulepathError, PathInfeasible
+from optimizer.kinematics.course_tracing import chain_of
+from optimizer.kinematics.orientation_tolerance import excess_angle, nearest_orientation
+from optimizer.kinematics.tcp import tcp_pose as pose_of
+from optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_through
+from optimizer.methods.end_angle import try_angles
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.tool_path import ToolPath
+from optimizer.solution import Solution
+from tests.optimizer.moves import ROBOT, tcp_pose
+from tests.optimizer.test_turning_path import ARM, Z, down, over_the_base
+from tests.optimizer.tool_paths import HOME, along, moved
+from tests.selection import long_but
+
+
+def free(pose: Pose) -> ConeOrientedPose:
+    return ConeOrientedPose.about(pose, np.array(Z))
+
+
+def turned_as_little_as_may_be(goal: Pose, before: Pose) -> Pose:
+    return free(goal).with_orientation(nearest_orientation(free(goal), before.T[:3, :3]))
+
+
+def outwards(goal: Any) -> Problem:
+    """A line away from the base, with a nozzle that points back at it in the beginning."""
+    return over_the_base(start=down(0.45, -0.12, 0.25), goal=goal, branch=BranchFilter("right", "up", "flip"))
+
+
+@pytest.fixture(scope="module")
+def stretched() -> Solution:
+    return optimize(outwards(free(down(0.8, -0.12, 0.25))))
+
+
+def test_a_goal_out_of_reach_is_reached_with_a_turn(stretched: Solution) -> None:
+    with pytest.raises(PathInfeasible):
+        optimize(outwards(down(0.8, -0.12, 0.25)))
+    assert stretched.certificate.valid and stretched.lower_bound <= stretched.energy.electrical.total
+    T = pose_of(ARM, stretched.goal.q[None])[0]
+    assert np.abs(T[:3, 3] - [0.8, -0.12, 0.25]).max() < 1e-6 and T[2, 2] == pytest.approx(-1.0, abs=1e-9)
+    assert abs(Rotation.from_matrix(down(0, 0, 0).T[:3, :3].T @ T[:3, :3]).magnitude()) > 0.2, "the tool has turned"
+    assert np.array_equal(stretched.goal.q, stretched.trajectory.spline.control_points[-1])
+
+
+@pytest.mark.parametrize("seed", long_but(range(2), range(20)))
+def test_a_free_end_never_needs_more_than_the_one_without_a_turn(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3))
+    goal, via = moved(rng.uniform(-0.2, 0.2, 3), turn), moved(rng.uniform(-0.2, 0.2, 3))
+    path = ToolPath(via=[via] if seed % 2 else [], blend=0.02 * (seed % 2), about=Z)
+    fixed = turned_as_little_as_may_be(goal, via if seed % 2 else tcp_pose(HOME))
+    try:
+        pinned = optimize(along(fixed, path=path))
+    except PathInfeasible:
+        return
+    found = optimize(along(free(goal), path=path))
+    assert found.certificate.valid
+    assert found.energy.electrical.total <= pinned.energy.electrical.total * (1 + 1e-6)
+    assert found.lower_bound <= pinned.lower_bound * (1 + 1e-9), "there are more motions"
+    q = found.trajectory.spline.curve(np.linspace(0.0, found.trajectory.spline.duration, 2000))
+    T = pose_of(along(goal, path=path).arm, q)
+    assert excess_angle(free(goal), T[-1, :3, :3]) < 1e-6
+    if not seed % 2:
+        start, way = T[0, :3, 3], T[-1, :3, 3] - T[0, :3, 3]
+        off = T[:, :3, 3] - start - np.outer((T[:, :3, 3] - start) @ way / (way @ way), way)
+        assert np.linalg.norm(off, axis=1).max() < path.position_tolerance
+
+
+@pytest.mark.parametrize("start", ["joint positions", "pose"])
+def test_no_motion_to_any_angle_at_the_goal_needs_less_than_the_bound(start: str) -> None:
+    rng, goal = np.random.default_rng(3), moved([0.1, 0.15, -0.1])
+    given = HOME if start == "joint positions" else tcp_pose(HOME)
+    asked = along(free(goal), start=given, path=ToolPath(about=Z))
+    bound = optimize(asked).lower_bound
+    assert bound > 0
+    reached = 0
+    for angle in rng.uniform(-np.pi, np.pi, 8):
+        T = goal.T.copy()
+        T[:3, :3] = T[:3, :3] @ Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix()
+        try:
+            anywhere = optimize(replace(asked, goal=Pose(T), tool_path=None))
+        except JoulepathError:
+            continue
+        reached += 1
+        assert anywhere.energy.electrical.total >= bound
+    assert reached > 4
+
+
+def test_a_turning_to_a_free_end_is_the_shortest_on_its_sheet() -> None:
+    problem = along(moved([0.0, 0.2, 0.0]), path=ToolPath(about=Z))
+    course = PreparedProblem.of(problem).course
+    assert course is not None
+    sheet = TurningSheet.of(problem.arm, chain_of(ROBOT), course, HOME, steps=4, most=0.5)
+    middle = len(sheet.angles) // 2
+
+    def total(chosen: Array) -> float:
+        rows = sheet.q[np.arange(4), chosen]
+        return float(shortest(rows[:-1], rows[1:], np.arange(3)).sum())
+
+    best, pinned = sheet.least(shortest, free_end=True), sheet.least(shortest)
+    assert best is not None and pinned is not None and best[0] == middle
+    steps = np.array(list(np.ndindex(7, 7, 7))) - 3
+    all_turnings = middle + np.concatenate([np.zeros((len(steps), 1), dtype=int), steps.cumsum(axis=1)], axis=1)
+    least = min(total(each) for each in all_turnings)
+    assert total(best) == pytest.approx(least, rel=1e-12) and total(best) <= total(pinned)
+
+
+def test_a_smooth_turning_may_be_an_even_one_to_a_free_end() -> None:
+    at = np.linspace(0.0, 1.0, 30)
+    even, pinned = (turning_through(at, 0.7 * at, 10, free_end) for free_end in (True, False))
+    assert np.abs(even(at) - 0.7 * at).max() < 1e-12
+    assert abs(pinned(1.0)) < 1e-12 and abs(pinned(0.0)) < 1e-12
+
+
+@pytest.mark.parametrize("least", [-3.0, -1.1, 0.4, 2.9])
+def test_the_best_angle_is_found_all_around(least: float) -> None:
+    asked: dict[float, float] = {}
+
+    def cost(angle: float) -> float:
+        asked[angle] = np.inf if 1 < angle < 1.6 else 5.0 - np.cos(angle - least)
+        return asked[angle]
+
+    try_angles(cost, cost(0.0))
+    assert min(asked.values()) < 4.001 and len(asked) < 20
+
+
+WRONG: list[tuple[Any, ToolPath]] = [
+    (free(down(0.4, 0.1, 0.2)), ToolPath()),
+    (free(down(0.4, 0.1, 0.2)), ToolPath(about=(1.0, 0.0, 0.0))),
+    (ConeOrientedPose(np.array([0.4, 0.1, 0.2])), ToolPath(about=Z)),
+    (
+        ConeOrientedPose(np.array([0.4, 0.1, 0.2]), direction=np.array([0.0, 0.0, -1.0]), half_angle=0.1),
+        ToolPath(about=Z),
+    ),
+]
+
+
+@pytest.mark.parametrize(("goal", "path"), WRONG)
+def test_any_other_freedom_of_the_goal_is_refused(goal: Any, path: ToolPath) -> None:
+    with pytest.raises(InvalidProblem) as refusal:
+        Problem(arm=Arm(robot=ROBOT), start=HOME, goal=goal, tool_path=path)
+    assert refusal.value.field == "goal.pose.orientation"
+
+
+def test_the_opposite_axis_is_the_same_freedom() -> None:
+    goal = ConeOrientedPose(down(0.4, 0.1, 0.2).T[:3, 3], -np.array(Z), np.array([0.0, 0.0, 1.0]), 0.0)
+    Problem(arm=Arm(robot=ROBOT), start=HOME, goal=goal, tool_path=ToolPath(about=Z))
