@@ -27,8 +27,8 @@ def test_the_angle_at_the_goal_is_chosen(client: TestClient) -> None:
     OptimizeResponse.model_validate_json(reply.content)
     answer = reply.json()
     assert max(answer["certificate"]["worst_ratio"].values()) <= 1 + 1e-6
-    assert 0 < answer["lower_bound"] <= answer["energy"]["electrical"]["total"]
-    assert np.allclose(answer["trajectory"]["q"][-1], answer["goal"]["q"], atol=1e-9)
+    assert 0 < answer["energy"]["lower_bound"] <= answer["energy"]["electrical"]["total"]
+    assert np.allclose(answer["trajectory"]["q"][-1], answer["branch"]["goal"]["q"], atol=1e-9)
 
 
 @pytest.mark.parametrize(
