@@ -240,7 +240,7 @@ def test_stops_that_no_chain_connects_are_named() -> None:
 
 WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "no stops": ("stops", {"stops": []}),
-    "too many stops": ("stops", {"stops": [Stop(name=str(k), target=HOME) for k in range(101)]}),
+    "too many stops": ("stops", {"stops": [Stop(name=str(k), target=HOME) for k in range(257)]}),
     "name twice": ("stops.1.name", {"stops": [Stop(name="a", target=HOME), Stop(name="A ", target=HOME)]}),
     "name of the start": ("stops.0.name", {"stops": [Stop(name="start", target=HOME)]}),
     "no name": ("stops.0.name", {"stops": [Stop(name="", target=HOME)]}),
