@@ -18,18 +18,18 @@ from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import START, WorkRound
+from optimizer.problem.work_round import WorkRound
 from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.known_motions import KnownMotion, known_motions
-from optimizer.sequence.layers import Layer, layer_of
+from optimizer.sequence.layers import Layer
 from optimizer.sequence.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
 from optimizer.sequence.legs import Leg, check_size
 from optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
 from optimizer.sequence.rests import dwell_costs
-from optimizer.sequence.ways import layers_of_stop
+from optimizer.sequence.ways import layers_of
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
 
@@ -346,12 +346,3 @@ def problem_of(asked: WorkRound, move: PlannedMove, q_start: Array, q_goal: Arra
         sample_period=asked.sample_period,
         deadline=max(time, LEAST_TIME),
     )
-
-
-def layers_of(asked: WorkRound) -> dict[str, Layer]:
-    """The layers of all places of a round by their names, in their order. Raises the errors of `layer_of`, and
-    PathInfeasible."""
-    layers = {START: layer_of(asked, START, "start", asked.start, asked.branch, asked.windings)}
-    for k, stop in enumerate(asked.stops):
-        layers |= zip(stop.places, layers_of_stop(asked, k), strict=True)
-    return layers

@@ -33,8 +33,8 @@ from optimizer.problem.stops import Stop
 from optimizer.problem.targets import AnyOf
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.ends import EndConfiguration
-from optimizer.sequence.round_search import layers_of
 from optimizer.sequence.round_solution import RoundSolution
+from optimizer.sequence.ways import layers_of
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, torques
 from tests.optimizer.sequence.rounds import HOME, PART, pick_and_place, poses
