@@ -59,8 +59,8 @@ class RoundSearch(LazySearch):
         self.solutions: dict[tuple[int, int, int], Solution] = {}
         # searches that have a first motion, to go on with
         self._runs: dict[tuple[int, int, int], Run] = {}
-        # time [s] that first motions took
-        self._spent = 0.0
+        # times [s] that first motions took
+        self._spent = list[float]()
         # one problem of each arm, whose models its other problems share
         self._prepared: dict[int, PreparedProblem] = {}
         self._known_motions = known_motions()
@@ -177,8 +177,8 @@ class RoundSearch(LazySearch):
     def _attempt(self, k: int, s: int, g: int) -> float | None:
         first = isinstance(self.legs[k], PassingLeg) and not self.legs[k].solved
         # near the end of the search, a share of what is left is less than any motion takes
-        usual = MANY_TIMES * self._spent / max(len(self._runs), 1)
-        time = self._shared(k, self.search_end).left if first else max(SHARE_OF_A_LEG * self.search_end.left, usual)
+        left, usual = self.search_end.left, MANY_TIMES * float(np.mean(self._spent or [0.0]))
+        time = self._shared(k, self.search_end).left if first else max(SHARE_OF_A_LEG * left, min(usual, left))
         run = self._run(k, self._problem_of(k, s, g, time))
         try:
             run.prepare()
@@ -204,7 +204,7 @@ class RoundSearch(LazySearch):
                 self.causes[k] = result.reason
                 return np.inf
         self._runs[k, s, g] = run
-        self._spent += self.clock() - run.began
+        self._spent.append(self.clock() - run.began)
         incumbent.end = self.end
         assert candidate.energy is not None
         return candidate.energy
