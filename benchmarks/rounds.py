@@ -4,12 +4,15 @@
     python -m benchmarks.rounds --count 5 --stops 12
     python -m benchmarks.rounds --count 10 --time 1.5
     python -m benchmarks.rounds --count 20 --stops 5 --passes 4
+    python -m benchmarks.rounds --count 5 --stops 12 --free
+    python -m benchmarks.rounds --count 1 --stops 245 --deadline 600
 
 A UR5e starts from rest over the table, takes up 2 kg at every other stop, puts it down at the next one, and comes back.
 Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each. Collisions are ignored,
 so that every round has an answer. With `--time`, each round gets so many times the duration of least energy. With
 `--passes`, it passes through the first stops without a rest, and carries the part nowhere; then a round that needs more
-than the one that stops there ends the benchmark.
+than the one that stops there ends the benchmark. With `--free`, the order is free, the arm carries nothing either, and
+full turns do not count.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from models.registry import load_robot
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.pose import Pose
 from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
@@ -47,7 +51,9 @@ def poses(rng: np.random.Generator, count: int) -> list[Pose]:
     return found
 
 
-def rounds(seed: int, count: int, stops: int, deadline: float, passes: int = 0) -> Iterator[WorkRound]:
+def rounds(
+    seed: int, count: int, stops: int, deadline: float, passes: int = 0, free: bool = False
+) -> Iterator[WorkRound]:
     """The rounds, each with a generator of its own."""
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
     for k in range(count):
@@ -55,13 +61,15 @@ def rounds(seed: int, count: int, stops: int, deadline: float, passes: int = 0) 
         yield WorkRound(
             arm=arm,
             start=HOME,
-            stops=[_stop(j, pose, passes) for j, pose in enumerate(targets)],
+            stops=[_stop(j, pose, passes, free) for j, pose in enumerate(targets)],
+            order=FreeOrder() if free else None,
+            windings=not free,
             deadline=deadline,
         )
 
 
-def _stop(number: int, pose: Pose, passes: int) -> Stop:
-    if passes:
+def _stop(number: int, pose: Pose, passes: int, free: bool) -> Stop:
+    if passes or free:
         passed = number < passes
         return Stop(name=str(number), target=pose, dwell=0.0 if passed else 0.3, passed=passed)
     return Stop(name=str(number), target=pose, dwell=0.3, payload=NOTHING if number % 2 else PART)
@@ -80,6 +88,7 @@ def main() -> None:
     arguments.add_argument("--stops", type=int, default=6, help="stops of a round (%(default)s)")
     arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a round [s] (%(default)s)")
     arguments.add_argument("--passes", type=int, default=0, help="stops that are passed (%(default)s)")
+    arguments.add_argument("--free", action="store_true", help="the order is free")
     arguments.add_argument("--time", type=float, help="give each round so many times its own duration")
     given = arguments.parse_args()
     on_one_core()
@@ -87,7 +96,7 @@ def main() -> None:
     optimize_round(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
     found: dict[str, list[float]] = {}
     optimal = 0
-    for own in rounds(given.seed, given.count, given.stops, given.deadline, given.passes):
+    for own in rounds(given.seed, given.count, given.stops, given.deadline, given.passes, given.free):
         asked = own if given.time is None else in_time(own, given.time)
         began = time.perf_counter()
         answer = optimize_round(asked)

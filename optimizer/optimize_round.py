@@ -222,7 +222,7 @@ def _is_done(search: RoundSearch, found: _Found) -> bool:
     """Whether no other chain can be better, and every move converged."""
     sampled = any(layer.sampled for leg in search.legs for layer in leg.layers)
     converged = all(move.solution.status == "optimal" for move in found.moves)
-    open_ = sampled or search.cut_short or search.failed or search.leaves_routes
+    open_ = sampled or search.cut_short or search.failed or search.leaves_better
     return converged and found.shared and not open_
 
 

@@ -30,6 +30,8 @@ from optimizer.trajectories.spline import Spline
 TIME_WEIGHT = 1e4
 # rounding of a constraint ratio
 RATIO_ROUNDING = 1e-6
+# what is built for an arm, whatever the problem
+_OF_THE_ARM = frozenset(("kernel", "model", "_data", "electrical_parameters", "surroundings", "path"))
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,13 @@ class PreparedProblem(Plant):
     def of(cls, problem: Problem) -> PreparedProblem:
         """The problem with its models. They are built when they are first used."""
         return cls(problem.arm, problem)
+
+    def sharing(self, problem: Problem) -> PreparedProblem:
+        """Another problem of the same arm, with those models of the arm that are built."""
+        assert problem.arm is self.arm
+        other = PreparedProblem.of(problem)
+        vars(other).update({name: value for name, value in vars(self).items() if name in _OF_THE_ARM})
+        return other
 
     @cached_property
     def surroundings(self) -> Surroundings:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import ArmRequest
@@ -28,6 +28,9 @@ from optimizer.problem.problem import MethodName
 from optimizer.problem.work_round import LONGEST_ROUND, MOST_STOPS
 from optimizer.sequence.round_solution import RoundBaselineName
 from optimizer.solution import Objective
+
+# of a round with more stops, the default deadline is longer, and samples are no closer: answers stay as large as before
+_MANY_STOPS, _LONG_DEADLINE, _LEAST_PERIOD = 100, 120.0, 1e-3
 
 LongTime = Annotated[float, Field(gt=0, le=LONGEST_ROUND)]
 
@@ -141,17 +144,42 @@ class CycleRequest(ArmRequest):
     )
     candidates: WhichCandidates = which_candidates()
     sample_period: float = described(
-        "Time between the samples of the answers of the moves.", "s", 0.008, default=0.008, ge=1e-4, le=1
+        f"Time between the samples of the answers of the moves. With more than {_MANY_STOPS} stops, at least "
+        f"{_LEAST_PERIOD:g} s.",
+        "s",
+        0.008,
+        default=0.008,
+        ge=1e-4,
+        le=1,
     )
     deadline: float = described(
         "Wall time from the arrival of the request, including the wait for a worker. When it nears, the service "
-        "returns the best certified round found so far.",
+        f"returns the best certified round found so far. With more than {_MANY_STOPS} stops, the default is "
+        f"{_LONG_DEADLINE:g} s.",
         "s",
         60.0,
         default=60.0,
         ge=1e-3,
         le=LONGEST_DEADLINE,
     )
+
+    @field_validator("sample_period")
+    @classmethod
+    def _few_enough_samples(cls, period: float, info: ValidationInfo) -> float:
+        if len(info.data.get("stops", ())) > _MANY_STOPS and period < _LEAST_PERIOD:
+            raise PydanticCustomError(
+                "too_many_samples",
+                "With more than {stops} stops, `sample_period` must be at least {least} s",
+                {"stops": _MANY_STOPS, "least": _LEAST_PERIOD},
+            )
+        return period
+
+    @model_validator(mode="after")
+    def _long_enough(self) -> Self:
+        if "deadline" not in self.model_fields_set and len(self.stops) > _MANY_STOPS:
+            # still a default: it is no longer than the service allows
+            object.__setattr__(self, "deadline", _LONG_DEADLINE)
+        return self
 
     @model_validator(mode="after")
     def _order_is_free(self) -> Self:

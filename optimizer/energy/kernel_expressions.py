@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -72,7 +72,7 @@ class Parameters:
 
     def pack(self) -> Array:
         """All parameters as one vector."""
-        return np.concatenate([np.atleast_1d(np.asarray(value, dtype=float)) for value in astuple(self)])
+        return np.concatenate([np.atleast_1d(np.asarray(value, dtype=float)) for value in vars(self).values()])
 
     @staticmethod
     def symbols(nq: int) -> tuple[Parameters, ca.SX]:

@@ -22,7 +22,7 @@ from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop,
 from optimizer.problem.targets import Target, members, validated
 from optimizer.solution import Objective
 
-MOST_STOPS = 100
+MOST_STOPS = 256
 # stops that one motion passes through: the effort of its nonlinear program grows with their square and more
 MOST_PASSES = 12
 # longest duration of a round [s]
@@ -212,10 +212,13 @@ class WorkRound:
 
     @cached_property
     def arms(self) -> list[Arm]:
-        """The arm with what it carries on the way to each stop, and after the last one."""
-        arms = [self.arm]
+        """The arm with what it carries on the way to each stop, and after the last one: one arm for each payload."""
+        arms, known = [self.arm], {self.arm.payload.content: self.arm}
         for stop in self.stops:
-            arms.append(arms[-1] if stop.payload is None else replace(arms[-1], payload=stop.payload))
+            payload = arms[-1].payload if stop.payload is None else stop.payload
+            if payload.content not in known:
+                known[payload.content] = replace(self.arm, payload=payload)
+            arms.append(known[payload.content])
         return arms
 
     @cached_property

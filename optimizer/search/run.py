@@ -51,15 +51,21 @@ OVERTIME = 0.1
 class Run:
     """One search. `known` are motions between the problem's ends, of any duration, that warm-start it.
 
-    `tell` gets what is found.
+    `tell` gets what is found. `like` is another problem of the same arm, whose models are used again.
     """
 
     def __init__(
-        self, problem: Problem, known: Sequence[Spline] = (), clock: Clock = time.perf_counter, tell: Tell = nobody
+        self,
+        problem: Problem,
+        known: Sequence[Spline] = (),
+        clock: Clock = time.perf_counter,
+        tell: Tell = nobody,
+        like: PreparedProblem | None = None,
     ) -> None:
         self.clock, self.began = clock, clock()
         self.problem, self.known = problem, known
-        self.incumbent = Incumbent(PreparedProblem.of(problem), Deadline.after(problem.deadline, clock), tell=tell)
+        prepared = PreparedProblem.of(problem) if like is None else like.sharing(problem)
+        self.incumbent = Incumbent(prepared, Deadline.after(problem.deadline, clock), tell=tell)
         self.unreachable: list[UnreachableTarget] = []
 
     def prepare(self) -> None:

@@ -61,9 +61,9 @@ class LazySearch(ABC):
             value = self.attempt(k, centre_s, centre_g)
         if value is not None:
             leg.set_kind(kind, value)
-        # some legs weigh more than their bounds before they are solved
-        if leg.cost[s, g] < before:
-            self._chain.lower(before - float(leg.cost[s, g]))
+        # some legs weigh more than their bounds before they are solved; the pair may have a value of its own
+        least = min(float(leg.cost[s, g]), np.inf if value is None else value + float(leg.dwell[g]))
+        self._chain.lower(max(before - least, 0.0))
 
     def late(self) -> float | None:
         """What a leg for which the time was too short is worth: without its share of it, no other is tried."""

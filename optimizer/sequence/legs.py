@@ -7,8 +7,9 @@ the range of a joint can tell pairs of a kind apart: where it does, a pair has a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
+from optimizer.problem.stops import PlannedMove
 from optimizer.search.lower_bound import priced_bounds
 from optimizer.search.priced_work import priced_work_bounds
 from optimizer.sequence.layers import Layer
@@ -25,6 +27,8 @@ from optimizer.trajectories.spline import Spline
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000
+# pairs of all legs of a round: they take some 1.4 GB
+MOST_PAIRS_OF_ROUND = 30_000_000
 # nodes of a stop with lines or a path: they make a matrix, of which the diagonal alone counts
 MOST_ON_WAY = 2000
 # kinds between two looks at the deadline: some ten milliseconds
@@ -112,6 +116,10 @@ class Leg:
         cost = _costs(bound + _beyond(self.prepared, self.displacement), self.kind, self.dwell)
         return replace(self, bound=bound, cost=cost, solved={}, exact={})
 
+    def weigh_more(self, share: float) -> None:
+        """Let every pair weigh more than its bound while it is not solved, by this share of the bound."""
+        self.cost += share * np.abs(_costs(self.bound, self.kind, np.zeros(len(self.goal.q))))
+
     def prepared_for(self, s: int, g: int) -> PreparedProblem:
         """The problem of a pair's motion: what reaches another target goes along another line."""
         if self.prepared.problem.tool_path is None:
@@ -173,6 +181,21 @@ class Leg:
         """The energy [J] of the motion of this pair; inf if it has none."""
         self.exact[s, g] = energy
         self.cost[s, g] = energy + self.dwell[g]
+
+
+def check_size(moves: Sequence[PlannedMove], layers: Mapping[str, Layer]) -> None:
+    """Raises InvalidProblem if the legs of a round have too many pairs of configurations together."""
+    pairs = [
+        len(layers[a].q) * len(layers[b].q)
+        for move in moves
+        for a, b in pairwise((move.start, *move.through, move.goal))
+    ]
+    if sum(pairs) > MOST_PAIRS_OF_ROUND:
+        raise InvalidProblem(
+            "stops",
+            f"The moves of this round have {sum(pairs)} pairs of arm configurations, of at most {MOST_PAIRS_OF_ROUND}: "
+            "give fewer stops or targets, a `branch`, or `windings` false.",
+        )
 
 
 def kinds_of(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:

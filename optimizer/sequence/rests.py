@@ -55,7 +55,12 @@ def rest_sensitivity(asked: WorkRound, move: PlannedMove, length: float, q: Arra
 
 def dwell_energies(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:
     """Energy (n,) [J] of the dwell after a move, in each configuration of its goal."""
-    return np.array([rest_energy(asked, move, move.dwell, hold) for hold in holding_powers(move, goal).tolist()])
+    first = np.unique(goal.end, return_index=True)[1]
+    powers = holding_powers(move, goal)
+    # full turns change nothing
+    energies = np.zeros(len(goal.ends))
+    energies[goal.end[first]] = [rest_energy(asked, move, move.dwell, hold) for hold in powers[first].tolist()]
+    return energies[goal.end]
 
 
 def dwell_costs(asked: WorkRound, move: PlannedMove, goal: Layer) -> Array:

@@ -18,18 +18,18 @@ from optimizer.methods.method import SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.problem.stops import PlannedMove
-from optimizer.problem.work_round import START, WorkRound
+from optimizer.problem.work_round import WorkRound
 from optimizer.progress import CandidatesFound, CandidateTried, Improved, Tell, nobody
 from optimizer.search.attempts import settled, solve
 from optimizer.search.run import Run
 from optimizer.sequence.chains import LeastChain
 from optimizer.sequence.known_motions import KnownMotion, known_motions
-from optimizer.sequence.layers import Layer, layer_of
+from optimizer.sequence.layers import Layer
 from optimizer.sequence.lazy_search import SAME, SHARE_OF_A_LEG, LazySearch
-from optimizer.sequence.legs import Leg
+from optimizer.sequence.legs import Leg, check_size
 from optimizer.sequence.passing_leg import LIKELY, PassingLeg, Route
 from optimizer.sequence.rests import dwell_costs
-from optimizer.sequence.ways import layers_of_stop
+from optimizer.sequence.ways import layers_of
 from optimizer.solution import CandidateStatus, Solution
 from optimizer.trajectories.spline import Spline
 
@@ -37,6 +37,11 @@ from optimizer.trajectories.spline import Spline
 RESERVED, LEAST_TIME = 0.3, 1e-3
 # routes through passes that are tried for a pair at most, and while none has a motion
 MOST_ROUTES, MOST_FAILED = 3, 10
+# stops beyond which the proof that no chain is better is worth less than its time: a pair that is not solved weighs so
+# much more than its bound then, of the 17 % more that motions need in the median
+MANY_STOPS, LIKELY_MORE = 40, 0.1
+# mean times of a first motion that one may take in any case
+MANY_TIMES = 4
 
 
 class RoundSearch(LazySearch):
@@ -54,13 +59,22 @@ class RoundSearch(LazySearch):
         self.solutions: dict[tuple[int, int, int], Solution] = {}
         # searches that have a first motion, to go on with
         self._runs: dict[tuple[int, int, int], Run] = {}
+        # times [s] that first motions took
+        self._spent = list[float]()
+        # one problem of each arm, whose models its other problems share
+        self._prepared: dict[int, PreparedProblem] = {}
         self._known_motions = known_motions()
         try:
             with watch(self.end):
                 layers = layers_of(asked)
+                check_size(self.moves, layers)
                 legs = [self._leg(move, layers) for move in self.moves]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
+        self._is_long = len(asked.stops) > MANY_STOPS and asked.objective == "electrical"
+        for leg in legs:
+            if self._is_long and not isinstance(leg, PassingLeg):
+                leg.weigh_more(LIKELY_MORE)
         # motions that rest at the passes of a pair, along one of its routes
         self.stopping: dict[tuple[int, int, int], tuple[Route, Spline]] = {}
         # whether a route has a bound below the motion found of its pair
@@ -74,7 +88,10 @@ class RoundSearch(LazySearch):
 
     def _leg(self, move: PlannedMove, layers: Mapping[str, Layer]) -> Leg:
         start, *between, goal = (layers[place] for place in (move.start, *move.through, move.goal))
-        prepared = PreparedProblem.of(problem_of(self.asked, move, start.q[0], goal.q[0], self.asked.deadline))
+        problem = problem_of(self.asked, move, start.q[0], goal.q[0], self.asked.deadline)
+        known = self._prepared.get(id(move.arm))
+        prepared = PreparedProblem.of(problem) if known is None else known.sharing(problem)
+        self._prepared[id(move.arm)] = prepared
         dwells = dwell_costs(self.asked, move, goal)
         if between:
             return PassingLeg.through(prepared, [start, *between, goal], dwells)
@@ -90,8 +107,11 @@ class RoundSearch(LazySearch):
             fresh = [each for each in self.pairs(nodes) if each not in self.solutions]
             if not fresh:
                 return nodes
-            for each in fresh:
-                self.finish(*each)
+            # what has no motion yet may take all the time that is left, the others a share of it in a long round
+            fresh.sort(key=lambda each: each in self._runs)
+            for done, each in enumerate(fresh):
+                shared = self._is_long and each in self._runs
+                self.finish(*each, share=1 / (len(fresh) - done) if shared else 1.0)
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
         """Objective [J] of a first motion of a pair, whose run is kept; inf if none is found in its share of the time.
@@ -156,8 +176,10 @@ class RoundSearch(LazySearch):
 
     def _attempt(self, k: int, s: int, g: int) -> float | None:
         first = isinstance(self.legs[k], PassingLeg) and not self.legs[k].solved
-        time = self._shared(k, self.search_end).left if first else SHARE_OF_A_LEG * self.search_end.left
-        run = Run(self._problem_of(k, s, g, time), clock=self.clock)
+        # near the end of the search, a share of what is left is less than any motion takes
+        left, usual = self.search_end.left, MANY_TIMES * float(np.mean(self._spent or [0.0]))
+        time = self._shared(k, self.search_end).left if first else max(SHARE_OF_A_LEG * left, min(usual, left))
+        run = self._run(k, self._problem_of(k, s, g, time))
         try:
             run.prepare()
             for spline in self._known(k, s, g):
@@ -182,14 +204,16 @@ class RoundSearch(LazySearch):
                 self.causes[k] = result.reason
                 return np.inf
         self._runs[k, s, g] = run
+        self._spent.append(self.clock() - run.began)
         incumbent.end = self.end
         assert candidate.energy is not None
         return candidate.energy
 
     @property
-    def leaves_routes(self) -> bool:
-        """Whether some chain through passes has a bound below the best one: such legs weigh more than their bounds."""
-        if not self.asked.passes or self.routes_left:
+    def leaves_better(self) -> bool:
+        """Whether some chain has a bound below the best one, where legs weigh more than their bounds: through passes,
+        and in a round of many stops."""
+        if self.routes_left or not (self.asked.passes or self._is_long):
             return self.routes_left
         return self.leaves_chains
 
@@ -213,19 +237,24 @@ class RoundSearch(LazySearch):
             # a path that is followed as fast as it can be is not followed so fast again without a guess
             known.append(own.trajectory.spline)
         key = self._known_motions.key("finished", fixed, known)
-        return self._recalled(key, fixed) or self._kept(key, Run(fixed, known, self.clock).solution())
+        return self._recalled(k, key, fixed) or self._kept(key, self._run(k, fixed, known).solution())
 
-    def finish(self, k: int, s: int, g: int) -> None:
-        """Optimise the motion of a pair to the end, and certify it. Raises DeadlineExceeded if no time is left."""
+    def finish(self, k: int, s: int, g: int, share: float = 1.0) -> None:
+        """Optimise the motion of a pair to the end, in this share of the time that is left, and certify it.
+
+        Raises DeadlineExceeded if no time is left.
+        """
         leg, before, end = self.legs[k], float(self.legs[k].cost[s, g]), self._end_of(k)
+        if share < 1:
+            end = end.within(share * end.left)
         problem, known = self._problem_of(k, s, g, end.left), self._known(k, s, g)
         run = self._runs.pop((k, s, g), None)
         key = self._known_motions.key("finished", problem, known)
         try:
-            if (recalled := self._recalled(key, problem)) is not None:
+            if (recalled := self._recalled(k, key, problem)) is not None:
                 found = recalled
             elif run is None:
-                found = self._kept(key, Run(problem, known, self.clock).solution())
+                found = self._kept(key, self._run(k, problem, known).solution())
             else:
                 run.incumbent.end = end
                 if run.incumbent.cut_short and known:
@@ -247,13 +276,13 @@ class RoundSearch(LazySearch):
             self._known_motions.keep(key, KnownMotion(found.trajectory.spline, found.solver.stationarity))
         return found
 
-    def _recalled(self, key: str, problem: Problem) -> Solution | None:
+    def _recalled(self, k: int, key: str, problem: Problem) -> Solution | None:
         """The solution that a known motion is; None if none is known, or it is not certified."""
         known = self._known_motions.recall(key)
         if known is None:
             return None
         try:
-            return Run(problem, clock=self.clock).as_it_is(known.spline, known.stationarity, is_optimal=True)
+            return self._run(k, problem).as_it_is(known.spline, known.stationarity, is_optimal=True)
         except NoTrajectory:
             self._known_motions.forget(key)
             return None
@@ -290,7 +319,11 @@ class RoundSearch(LazySearch):
         if better:
             with suppress(DeadlineExceeded):
                 return self.solve_in(k, s, g, motion.duration)
-        return Run(self._problem_of(k, s, g, self.end.left), clock=self.clock).as_it_is(motion)
+        return self._run(k, self._problem_of(k, s, g, self.end.left)).as_it_is(motion)
+
+    def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
+        """The search of a motion of leg `k`."""
+        return Run(problem, known, self.clock, like=self.legs[k].prepared)
 
     def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:
         """The problem of a pair, with `time` [s] for it."""
@@ -313,12 +346,3 @@ def problem_of(asked: WorkRound, move: PlannedMove, q_start: Array, q_goal: Arra
         sample_period=asked.sample_period,
         deadline=max(time, LEAST_TIME),
     )
-
-
-def layers_of(asked: WorkRound) -> dict[str, Layer]:
-    """The layers of all places of a round by their names, in their order. Raises the errors of `layer_of`, and
-    PathInfeasible."""
-    layers = {START: layer_of(asked, START, "start", asked.start, asked.branch, asked.windings)}
-    for k, stop in enumerate(asked.stops):
-        layers |= zip(stop.places, layers_of_stop(asked, k), strict=True)
-    return layers

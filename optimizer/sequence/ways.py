@@ -22,7 +22,7 @@ from optimizer.problem.problem import Problem
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, RETREAT, Stop
 from optimizer.problem.tool_path import ToolPath
-from optimizer.problem.work_round import WorkRound
+from optimizer.problem.work_round import START, WorkRound
 from optimizer.search.end_feasibility import check_configurations
 from optimizer.search.ends import EndConfiguration, label_of
 from optimizer.search.path_ends import attempt_of
@@ -47,6 +47,15 @@ class _Way:
         T_end = T.copy()
         T_end[:3, 3] += self.sign * self.line.shift(T)
         return ToolCourse.of(ToolPath(), T, T_end)
+
+
+def layers_of(asked: WorkRound) -> dict[str, Layer]:
+    """The layers of all places of a round by their names, in their order. Raises the errors of `layer_of`, and
+    PathInfeasible."""
+    layers = {START: layer_of(asked, START, "start", asked.start, asked.branch, asked.windings)}
+    for k, stop in enumerate(asked.stops):
+        layers |= zip(stop.places, layers_of_stop(asked, k), strict=True)
+    return layers
 
 
 def layers_of_stop(asked: WorkRound, k: int) -> list[Layer]:

@@ -10,12 +10,14 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.convert.warnings import NO_DEFAULT_MOTION
-from app.schemas.cycle import CycleResponse
+from app.routes.parameters import deadline_of
+from app.schemas.cycle import CycleRequest, CycleResponse
 from app.schemas.response import OptimizeResponse
 from tests.app.requests import HOME, PATIENT
 
 # relative: sums of the same numbers in another order
 ROUNDING = 1e-9
+REST: dict[str, Any] = {"target": {"q": HOME}}
 PART = {"mass": 2.0, "com": [0.0, 0.0, 0.1]}
 
 
@@ -154,6 +156,8 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
         },
     ),
     "deadline": ("validation", ["body", "deadline"], {"deadline": 1e5}),
+    "too many stops": ("validation", ["body", "stops"], {"stops": [REST] * 257}),
+    "samples of many stops": ("validation", ["body", "sample_period"], {"stops": [REST] * 101, "sample_period": 1e-4}),
     "no time": ("validation", ["body", "time"], {"time": 0.0}),
     "turned round": ("validation", ["body", "time"], {"time": {"min": 9.0, "max": 8.0}}),
     "text": ("validation", ["body", "time"], {"time": "long"}),
@@ -170,6 +174,16 @@ def test_what_is_wrong_is_named(name: str, client: TestClient) -> None:
         assert content["errors"][0]["loc"][: len(loc)] == loc
     if kind in ("unreachable-pose", "stop-in-collision"):
         assert content["target"].startswith("stops/")
+
+
+@pytest.mark.parametrize(("count", "most", "allowed"), [(100, 600.0, 60.0), (101, 600.0, 120.0), (256, 90.0, 90.0)])
+def test_many_stops_have_more_time_by_default_where_the_operator_allows_it(
+    count: int, most: float, allowed: float
+) -> None:
+    asked = CycleRequest.model_validate({"start": {"q": HOME}, "stops": [REST] * count})
+    assert deadline_of(asked, most) == allowed
+    given = CycleRequest.model_validate({"start": {"q": HOME}, "stops": [REST] * count, "deadline": 60.0})
+    assert deadline_of(given, most) == 60.0
 
 
 def test_no_time_is_a_deadline_exceeded(client: TestClient) -> None:

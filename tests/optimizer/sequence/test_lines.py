@@ -19,7 +19,7 @@ from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene
 from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_search import layers_of
+from optimizer.sequence.ways import layers_of
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.optimizer.sequence.rounds import HOME, pick_and_place
 from tests.optimizer.sequence.test_optimize_round import assert_true

@@ -16,8 +16,8 @@ from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.problem import Problem
 from optimizer.search.mechanical_bound import mechanical_bounds
 from optimizer.search.priced_work import CELLS, WORKS, priced_work_bounds
-from optimizer.sequence.round_search import layers_of
 from optimizer.sequence.round_solution import RoundSolution
+from optimizer.sequence.ways import layers_of
 from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.time_scalings import quintic_spline
 from tests.optimizer.moves import ROBOT

@@ -33,8 +33,8 @@ from optimizer.problem.stops import Stop
 from optimizer.problem.targets import AnyOf
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.ends import EndConfiguration
-from optimizer.sequence.round_search import layers_of
 from optimizer.sequence.round_solution import RoundSolution
+from optimizer.sequence.ways import layers_of
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, ROBOT, torques
 from tests.optimizer.sequence.rounds import HOME, PART, pick_and_place, poses
@@ -240,7 +240,7 @@ def test_stops_that_no_chain_connects_are_named() -> None:
 
 WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "no stops": ("stops", {"stops": []}),
-    "too many stops": ("stops", {"stops": [Stop(name=str(k), target=HOME) for k in range(101)]}),
+    "too many stops": ("stops", {"stops": [Stop(name=str(k), target=HOME) for k in range(257)]}),
     "name twice": ("stops.1.name", {"stops": [Stop(name="a", target=HOME), Stop(name="A ", target=HOME)]}),
     "name of the start": ("stops.0.name", {"stops": [Stop(name="start", target=HOME)]}),
     "no name": ("stops.0.name", {"stops": [Stop(name="", target=HOME)]}),

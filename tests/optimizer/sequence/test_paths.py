@@ -24,7 +24,8 @@ from optimizer.problem.targets import AnyOf
 from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.priced_search import priced_motion
-from optimizer.sequence.round_search import RoundSearch, layers_of
+from optimizer.sequence.round_search import RoundSearch
+from optimizer.sequence.ways import layers_of
 from tests.optimizer.moves import AMPLE, ROBOT, tcp_pose
 from tests.optimizer.sequence.rounds import HOME, PART, pick_and_place
 from tests.optimizer.sequence.test_lines import INTO

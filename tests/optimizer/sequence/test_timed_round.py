@@ -18,8 +18,8 @@ from optimizer.problem.branches import BranchFilter
 from optimizer.problem.problem import Problem
 from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
-from optimizer.sequence.round_search import layers_of
 from optimizer.sequence.round_solution import RoundSolution
+from optimizer.sequence.ways import layers_of
 from tests.optimizer.clocks import CountingClock
 from tests.optimizer.moves import AMPLE, fixed, torques
 from tests.optimizer.sequence.rounds import HOME, pick_and_place

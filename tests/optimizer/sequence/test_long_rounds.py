@@ -1,0 +1,87 @@
+"""Rounds of many stops: the same round for fewer motions, told on the way, and the best one so far at a deadline."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from optimizer.exceptions import InvalidProblem
+from optimizer.optimize_round import optimize_round
+from optimizer.problem.arm import Payload
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.work_round import WorkRound
+from optimizer.progress import Event, Improved
+from optimizer.sequence import legs, round_search
+from optimizer.sequence.round_search import MANY_STOPS
+from optimizer.sequence.round_solution import RoundSolution
+from tests.optimizer.clocks import CountingClock
+from tests.optimizer.sequence.rounds import PART, pick_and_place
+
+# a counting clock never comes to it
+ENDLESS = 1e9
+# share of the readings of a whole search after which the round has been found, and the search goes on
+ENOUGH = 0.75
+
+
+def long_round(deadline: float) -> WorkRound:
+    """One stop more than a round of which it is proven that no chain is better."""
+    asked = pick_and_place(1, MANY_STOPS + 1, windings=False, method="time_scaling", deadline=deadline)
+    only = BranchFilter(elbow="up", wrist="no_flip")
+    return replace(asked, stops=[replace(stop, branch=only) for stop in asked.stops])
+
+
+Whole = tuple[RoundSolution, list[Event], float]
+
+
+@pytest.fixture(scope="module")
+def whole() -> Whole:
+    """The long round without a deadline, what it told, and the readings of the clock that it took."""
+    events, clock = list[Event](), CountingClock()
+    found = optimize_round(long_round(ENDLESS), clock, events.append)
+    return found, events, clock.now
+
+
+def test_a_long_round_tells_what_it_finds_on_the_way(whole: Whole) -> None:
+    found, events, _ = whole
+    told = [each for each in events if isinstance(each, Improved)]
+    assert len(told) > 1 and all(a.energy > b.energy for a, b in pairwise(told))
+    assert told[-1].energy == pytest.approx(found.energy.electrical.total)
+    assert all(each.bound == pytest.approx(found.lower_bound) for each in told)
+
+
+def test_a_deadline_gives_the_best_long_round_so_far(whole: Whole) -> None:
+    best, _, readings = whole
+    found = optimize_round(long_round(ENOUGH * readings), CountingClock())
+    assert found.status == "feasible" and found.order == best.order
+    assert all(move.solution.certificate.valid for move in found.moves) and found.joins < 1e-9
+    assert found.lower_bound == best.lower_bound
+    assert found.energy.electrical.total >= best.energy.electrical.total
+    assert sum(move.solved for move in found.moves) < sum(move.solved for move in best.moves)
+
+
+def test_the_proof_alone_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = pick_and_place(5, 4, method="time_scaling")
+    proven = optimize_round(asked)
+    monkeypatch.setattr(round_search, "MANY_STOPS", 1)
+    found = optimize_round(asked)
+    assert found.energy.electrical.total == proven.energy.electrical.total
+    assert found.lower_bound == proven.lower_bound
+    assert sum(move.solved for move in found.moves) < sum(move.solved for move in proven.moves)
+    assert (proven.status, found.status) == ("optimal", "feasible")
+
+
+def test_too_many_pairs_of_all_moves_are_refused_before_any_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(legs, "MOST_PAIRS_OF_ROUND", 100)
+    with pytest.raises(InvalidProblem, match="fewer stops") as refusal:
+        optimize_round(pick_and_place(1, 3, windings=False))
+    assert refusal.value.field == "stops"
+
+
+def test_moves_with_the_same_payload_share_an_arm() -> None:
+    asked = pick_and_place(1, 3)
+    same = Payload(mass=PART.mass, com=np.array(PART.com))
+    arms = replace(asked, stops=[*asked.stops[:2], replace(asked.stops[2], payload=same)]).arms
+    assert arms[0] is arms[2] and arms[1] is arms[3] and arms[0] is not arms[1]
