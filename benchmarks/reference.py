@@ -176,7 +176,10 @@ def fingerprint(robot: Robot) -> str:
         k: v for part in (robot.limits, robot.drives, friction, robot.electronics) for k, v in vars(part).items()
     }
     # names are no parameters, and joint ranges do not limit a motion between two configurations within them
-    parts = [np.atleast_1d(v) for k, v in parameters.items() if k not in ("name", "q_min", "q_max")]
+    left_out = {"name", "q_min", "q_max"}
+    # terms of friction that the robot does not have
+    left_out |= {term for term in ("load", "bend") if not np.any(parameters[term])}
+    parts = [np.atleast_1d(v) for k, v in parameters.items() if k not in left_out]
     parts += [placement.homogeneous.ravel() for placement in robot.model.jointPlacements]
     parts += [body.toDynamicParameters() for body in robot.model.inertias]
     text = " ".join(f"{value:.9g}" for value in np.round(np.concatenate(parts), 12).tolist())

@@ -1,0 +1,23 @@
+"""References that were computed once: they hold for the robot's figures of today."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.reference import FILES, fingerprint, load
+from models.registry import load_robot
+from optimizer.problem.problem import Objective
+
+
+@pytest.mark.parametrize("objective", FILES)
+def test_references_are_of_the_robots_figures(objective: Objective) -> None:
+    assert load(FILES[objective])["fingerprint"] == fingerprint(load_robot("ur5e"))
+
+
+def test_a_friction_that_grows_with_the_load_has_other_references() -> None:
+    robot = load_robot("ur5e")
+    laws = {name: replace(law, load=np.full(6, 0.1)) for name, law in robot.friction_laws.items()}
+    assert fingerprint(replace(robot, friction_laws=laws)) != fingerprint(robot)
