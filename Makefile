@@ -40,11 +40,11 @@ test-long: $(VENV)/.dev $(STUDIO)/vendor kernels
 	@$(MAKE) --no-print-directory --jobs=2 lint pytest-long
 
 pytest:
-	$(PY) -m pytest -n auto --dist loadfile $(PYTEST_ARGS)
+	$(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
 
 # an empty marker expression takes back the deselection in pyproject.toml
 pytest-long:
-	$(PY) -m pytest -n auto --dist loadfile -m "" $(PYTEST_ARGS)
+	$(PY) -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "" $(PYTEST_ARGS)
 
 lint: $(VENV)/.dev
 	$(PY) -m ruff check $(SOURCES)

@@ -21,6 +21,7 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 from collections.abc import Callable
+from dataclasses import fields
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -172,9 +173,9 @@ def _ipopt(found: Search, moved: Array | None) -> float:
 def fingerprint(robot: Robot) -> str:
     """Hash of the robot's parameters that energies and limits depend on: references are valid for these only."""
     friction = next(iter(robot.friction_laws.values()))
-    parameters = {
-        k: v for part in (robot.limits, robot.drives, friction, robot.electronics) for k, v in vars(part).items()
-    }
+    parts_of = (robot.limits, robot.drives, friction, robot.electronics)
+    # not `vars`: it has what was computed from the fields, too
+    parameters = {each.name: getattr(part, each.name) for part in parts_of for each in fields(part)}
     # names are no parameters, and joint ranges do not limit a motion between two configurations within them
     left_out = {"name", "q_min", "q_max"}
     # terms of friction that the robot does not have
