@@ -124,6 +124,7 @@ def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
     expect(page.locator(".label.near")).to_contain_text(" – ".join(clearance["pair"]))
 
 
+@pytest.mark.long
 def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Page) -> None:
     """Where the service has them; else the arm is drawn from its figures, and the page says nothing."""
     with_meshes = page.evaluate(PIXELS)
@@ -242,6 +243,7 @@ def test_branches_side_by_side(page: Page) -> None:
         expect(labels.filter(has_text=f"{energy:.3g} J")).to_have_count(1)
 
 
+@pytest.mark.long
 def test_a_point_of_the_front_takes_the_place_of_the_answer(page: Page) -> None:
     lift = json.loads((ROOT / "examples" / "pareto" / "lift.json").read_text())
     ask(page, {name: value for name, value in lift.items() if name not in ("points", "duration")})
@@ -265,6 +267,7 @@ def test_without_webgl_the_figures_are_there(browser: Browser, service: Server) 
     plain.close()
 
 
+@pytest.mark.long
 def test_behind_the_path_of_a_proxy(browser: Browser, service: Server) -> None:
     """Every address of the page is relative."""
     front = "http://cell.example/robots/energy"

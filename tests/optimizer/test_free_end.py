@@ -83,7 +83,7 @@ def test_a_free_end_never_needs_more_than_the_one_without_a_turn(seed: int) -> N
         assert np.linalg.norm(off, axis=1).max() < path.position_tolerance
 
 
-@pytest.mark.parametrize("start", ["joint positions", "pose"])
+@pytest.mark.parametrize("start", long_but(["joint positions"], ["joint positions", "pose"]))
 def test_no_motion_to_any_angle_at_the_goal_needs_less_than_the_bound(start: str) -> None:
     rng, goal = np.random.default_rng(3), moved([0.1, 0.15, -0.1])
     given = HOME if start == "joint positions" else tcp_pose(HOME)

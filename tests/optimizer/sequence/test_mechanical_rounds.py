@@ -110,6 +110,7 @@ def test_what_the_price_bounds_holds_for_every_duration() -> None:
                 assert bound[k] <= work + price * duration
 
 
+@pytest.mark.long
 def test_a_free_order_does_no_more_work() -> None:
     free = replace(ASKED, order=FreeOrder(together=[[stop.name for stop in ASKED.stops]]))
     ours = optimize_round(free)

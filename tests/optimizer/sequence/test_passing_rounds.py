@@ -28,6 +28,7 @@ from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.round_solution import RoundSolution
 from tests.optimizer.moves import AMPLE, ROBOT
 from tests.optimizer.sequence.rounds import HOME, PART, poses
+from tests.selection import long_but
 
 # the package has the function of this name
 optimize_round_module = importlib.import_module("optimizer.optimize_round")
@@ -127,7 +128,7 @@ def test_a_round_of_passes_alone_comes_back() -> None:
     assert against(found)["stopping"] > 0.03
 
 
-@pytest.mark.parametrize("factor", [1.25, 0.99])
+@pytest.mark.parametrize("factor", long_but([0.99], [1.25, 0.99]))
 def test_in_a_given_time_it_is_not_worse_either(factor: float) -> None:
     stops = [Stop(name=f"{k}", target=q, passed=k < 2, dwell=0.2 * (k == 2)) for k, q in enumerate(Q)]
     own = optimize_round(of(*stops))
