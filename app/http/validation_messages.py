@@ -16,8 +16,8 @@ from app.convert.json_text import EMPTY, PLAIN_NAME
 from app.schemas.common import KEY_HEADER, NO_CONTROLS, UNKNOWN_FIELD, nearest
 from app.schemas.common import Request as RequestModel
 from app.schemas.own_arm import NAME_PATTERN
+from app.schemas.queries import PAGE_PATTERN
 from app.schemas.scene import BASE64
-from app.schemas.studies import PAGE_PATTERN
 
 _OBJECT = "Give a JSON object: names and values in braces"
 _MESSAGES = {

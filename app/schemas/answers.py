@@ -7,9 +7,7 @@ from typing import Any
 
 from app.schemas.common import Response, described, part
 from app.schemas.examples.values import ANSWER_ID, CREATED
-from app.schemas.studies import PAGE_PATTERN, Query
-
-_POSITION = f"1741944413589793_{ANSWER_ID}"
+from app.schemas.queries import Query, after_of, limit_of, next_of
 
 
 class KeptAnswer(Response):
@@ -46,17 +44,11 @@ class AnswerList(Response):
     """Kept answers, newest first."""
 
     answers: list[AnswerSummary] = part("The answers.")
-    next: str | None = described("Value of `after` for the next page; null on the last page.", None, _POSITION)
+    next: str | None = next_of(ANSWER_ID)
 
 
 class AnswerPage(Query):
     """The part of the list of answers that is returned."""
 
-    limit: int = described("Largest number of answers in the answer.", "1", 50, default=50, ge=1, le=200)
-    after: str | None = described(
-        "Value of `next` on the previous page. Null: the first page.",
-        None,
-        _POSITION,
-        default=None,
-        pattern=PAGE_PATTERN,
-    )
+    limit: int = limit_of("answers")
+    after: str | None = after_of(ANSWER_ID)

@@ -10,7 +10,7 @@ from pydantic import Field
 from app.schemas.common import Request, Response, described, part
 from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import CREATED, IDENTIFICATION_ID, LOG_ID
-from app.schemas.studies import PAGE_PATTERN, Query
+from app.schemas.queries import Query, after_of, limit_of, next_of
 
 MOST_LOGS = 32
 Target = Literal["friction", "rotor", "torque_constant", "power", "payload"]
@@ -18,7 +18,6 @@ Term = Literal["coulomb", "viscous", "load", "offset", "curved"]
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 LogIds = Annotated[list[str], Field(min_length=1, max_length=MOST_LOGS)]
 DEADLINE = 60.0
-_POSITION = f"1741944413589793_{IDENTIFICATION_ID}"
 
 
 class Fraction(Request):
@@ -216,20 +215,14 @@ class IdentificationList(Response):
     """Identifications, newest first."""
 
     identifications: list[ListedIdentification] = part("The identifications.")
-    next: str | None = described("Value of `after` for the next page; null on the last page.", None, _POSITION)
+    next: str | None = next_of(IDENTIFICATION_ID)
 
 
 class IdentificationPage(Query):
     """The part of the list of identifications that is returned."""
 
-    limit: int = described("Largest number of identifications in the answer.", "1", 50, default=50, ge=1, le=200)
-    after: str | None = described(
-        "Value of `next` on the previous page. Null: the first page.",
-        None,
-        _POSITION,
-        default=None,
-        pattern=PAGE_PATTERN,
-    )
+    limit: int = limit_of("identifications")
+    after: str | None = after_of(IDENTIFICATION_ID)
 
 
 class Identification(IdentificationSummary):

@@ -13,8 +13,9 @@ from app.schemas.cycle import CycleRequest
 from app.schemas.evaluate import EvaluateRequest
 from app.schemas.examples.values import ANSWER_PATH, CREATED, EVALUATE, JOB_ID, OPTIMIZE
 from app.schemas.pareto import ParetoRequest
+from app.schemas.queries import Query, after_of, limit_of, next_of
 from app.schemas.request import OptimizeRequest
-from app.schemas.studies import Name, Query
+from app.schemas.studies import Name
 from app.schemas.whatif import WhatifRequest
 
 MOST_REQUESTS = 10_000
@@ -162,22 +163,14 @@ class JobList(Response):
     """Jobs, newest first."""
 
     jobs: list[Job] = part("The jobs.")
-    next: str | None = described(
-        "Value of `after` for the next page; null on the last page.", None, f"1741944413589793_{JOB_ID}"
-    )
+    next: str | None = next_of(JOB_ID)
 
 
 class JobPage(Query):
     """The part of the list of jobs that is returned."""
 
-    limit: int = described("Largest number of jobs in the answer.", "1", 50, default=50, ge=1, le=200)
-    after: str | None = described(
-        "Value of `next` on the previous page. Null: the first page.",
-        None,
-        f"1741944413589793_{JOB_ID}",
-        default=None,
-        pattern=r"^[0-9]{1,16}_[0-9a-f-]{36}$",
-    )
+    limit: int = limit_of("jobs")
+    after: str | None = after_of(JOB_ID)
     state: JobState | None = described("Only jobs in this state. Null: all.", None, "running", default=None)
 
 

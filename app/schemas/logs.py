@@ -11,7 +11,8 @@ from app.schemas.arm import Payload
 from app.schemas.common import NO_CONTROLS, PLAIN, Request, Response, RobotName, Vector3, described, part
 from app.schemas.examples.values import CREATED, LOG_ID
 from app.schemas.lengths import NAME_LENGTH
-from app.schemas.studies import PAGE_PATTERN, Name, Query
+from app.schemas.queries import Query, after_of, limit_of, next_of
+from app.schemas.studies import Name
 
 EffortMeaning = Literal["current", "torque", "external"]
 _Column = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS)]
@@ -141,20 +142,12 @@ class LogDetail(LogSummary):
 class LogPage(Query):
     """The part of the list of logs that is returned."""
 
-    limit: int = described("Largest number of logs in the answer.", "1", 50, default=50, ge=1, le=200)
-    after: str | None = described(
-        "Value of `next` on the previous page. Null: the first page.",
-        None,
-        f"1741944413589793_{LOG_ID}",
-        default=None,
-        pattern=PAGE_PATTERN,
-    )
+    limit: int = limit_of("logs")
+    after: str | None = after_of(LOG_ID)
 
 
 class LogList(Response):
     """Logs, newest first."""
 
     logs: list[LogSummary] = part("The logs.")
-    next: str | None = described(
-        "Value of `after` for the next page; null on the last page.", None, f"1741944413589793_{LOG_ID}"
-    )
+    next: str | None = next_of(LOG_ID)

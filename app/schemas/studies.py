@@ -12,10 +12,10 @@ from app.schemas.evaluate import EvaluateRequest
 from app.schemas.examples.figures import FIGURES_ID
 from app.schemas.examples.values import ANSWER_ID, CREATED, EVALUATE, OPTIMIZE, STUDY_ID
 from app.schemas.lengths import KEY_LENGTH, NAME_LENGTH
+from app.schemas.queries import Query, after_of, limit_of, next_of
 from app.schemas.request import OptimizeRequest
 from optimizer.solution import Objective
 
-PAGE_PATTERN = r"^[0-9]{1,16}_[0-9a-f-]{36}$"
 Name = Annotated[str, Field(min_length=1, max_length=NAME_LENGTH, pattern=NO_CONTROLS), PLAIN]
 IdempotencyKey = Annotated[str, Field(min_length=1, max_length=KEY_LENGTH, pattern=r"^[!-~]+$")]
 
@@ -40,24 +40,11 @@ class StudyRequest(Request):
     )
 
 
-class Query(Request):
-    """The parameters of a query string."""
-
-    # every value in a query string is text
-    model_config = ConfigDict(strict=False)
-
-
 class StudyPage(Query):
     """The part of the list of studies that is returned."""
 
-    limit: int = described("Largest number of studies in the answer.", "1", 50, default=50, ge=1, le=200)
-    after: str | None = described(
-        "Value of `next` on the previous page. Null: the first page.",
-        None,
-        f"1741944413589793_{STUDY_ID}",
-        default=None,
-        pattern=PAGE_PATTERN,
-    )
+    limit: int = limit_of("studies")
+    after: str | None = after_of(STUDY_ID)
 
 
 class OptimizeStep(Request):
@@ -155,9 +142,7 @@ class StudyList(Response):
     """Studies, newest first."""
 
     studies: list[StudySummary] = part("The studies.")
-    next: str | None = described(
-        "Value of `after` for the next page; null on the last page.", None, f"1741944413589793_{STUDY_ID}"
-    )
+    next: str | None = next_of(STUDY_ID)
 
 
 class IterationDetail(Iteration):

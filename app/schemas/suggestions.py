@@ -6,7 +6,8 @@ from typing import Any, ClassVar, Literal
 
 from app.schemas.common import Response, described, part
 from app.schemas.examples.values import OPTIMIZE, STUDY_ID
-from app.schemas.studies import IterationEnergy, Query
+from app.schemas.queries import Query
+from app.schemas.studies import IterationEnergy
 
 
 class SuggestQuery(Query):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from models.robot import Array, Mask
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.redundant_boxes import with_shoulder
-from optimizer.kinematics.redundant_curve import RedundantCurve, last_angle
+from optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
 from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.problem.branches import Label
 
@@ -107,12 +107,13 @@ def crossing(curves: Sequence[RedundantCurve]) -> list[FreeTurn]:
     different = list({(curve.interval, *curve.sheet[1:].tolist()): curve for curve in curves}.values())
     if not different:
         return []
-    sheets = _Sheets.of(different)
-    lower = np.where(sheets.whole, -np.pi, 0.0)[:, None]
+    stack = CurveStack.of(different)
+    lower = np.where(stack.whole, -np.pi, 0.0)[:, None]
     u = lower + (np.pi - lower) * (np.arange(POINTS) + 0.5) / POINTS
-    rows, k = np.nonzero(_may_be_zero(sheets.lean(u.ravel(), np.repeat(np.arange(len(u)), POINTS)).reshape(u.shape)))
+    lean = _lean(stack, u.ravel(), np.repeat(np.arange(len(u)), POINTS)).reshape(u.shape)
+    rows, k = np.nonzero(_may_be_zero(lean))
     found = []
-    for row, at in zip(rows.tolist(), sheets.zeros(u[rows, k], rows).tolist(), strict=True):
+    for row, at in zip(rows.tolist(), _zeros(stack, u[rows, k], rows).tolist(), strict=True):
         if np.isfinite(at):
             curve = different[row]
             last = curve.last_angle(np.array([at]))
@@ -136,47 +137,28 @@ def _may_be_zero(lean: NDArray[np.complex128]) -> Mask:
     return np.asarray(near)
 
 
-@dataclass(frozen=True, eq=False)
-class _Sheets:
-    """The sheets of some curves of one pose: intervals (2, m) of q7, which are `whole` (m,), signs (2, m) of elbow and
-    wrist."""
+def _lean(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> NDArray[np.complex128]:
+    """The lean (n,), a complex number, of the third axis from the first at parameters u (n,) of curves (n,)."""
+    q7 = curves.last_angle(u, rows)
+    x, y, _ = curves.pose.third_axis(q7, *curves.pose.angles(q7, *curves.sheet[rows, 1:].T))
+    return np.asarray(x + 1j * y)
 
-    pose: RedundantPose
-    intervals: Array
-    whole: Mask
-    signs: Array
 
-    @classmethod
-    def of(cls, curves: Sequence[RedundantCurve]) -> _Sheets:
-        """Those of curves of one pose."""
-        return cls(
-            curves[0].pose,
-            np.array([curve.interval for curve in curves]).T,
-            np.array([curve.whole for curve in curves]),
-            np.array([curve.sheet[1:] for curve in curves]).T,
-        )
-
-    def lean(self, u: Array, rows: NDArray[np.intp]) -> NDArray[np.complex128]:
-        """The lean (n,), a complex number, of the third axis from the first at parameters u (n,) of sheets (n,)."""
-        q7 = last_angle(u, self.intervals[:, rows], self.whole[rows])
-        x, y, _ = self.pose.third_axis(q7, *self.pose.angles(q7, *self.signs[:, rows]))
-        return np.asarray(x + 1j * y)
-
-    def zeros(self, u: Array, rows: NDArray[np.intp]) -> Array:
-        """The parameters (n,) next to u (n,) at which the third axis is in line, by Gauss and Newton; nan if there is
-        none."""
-        u, found, best = u.copy(), np.full(len(u), np.nan), np.full(len(u), np.inf)
-        going = np.arange(len(u))
-        for n in range(STEPS):
-            if not len(going):
-                break
-            at, three = u[going], np.tile(rows[going], 3)
-            before, here, after = self.lean(np.concatenate([at - STEP, at, at + STEP]), three).reshape(3, -1)
-            size, slope = np.abs(here), (after - before) / (2 * STEP)
-            found[going[size < IN_LINE]] = at[size < IN_LINE]
-            # next to a zero the steps converge quadratically; elsewhere they end where the lean is least
-            on = (size >= IN_LINE) & (np.abs(slope) > 0) & ((n <= FIRST_STEPS) | (size <= SLOW * best[going]))
-            best[going], going = size, going[on]
-            moved = u[going] - (np.conj(slope[on]) * here[on]).real / np.abs(slope[on]) ** 2
-            u[going] = np.clip(moved, np.where(self.whole[rows[going]], -np.pi, 0.0), np.pi)
-        return found
+def _zeros(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:
+    """The parameters (n,) next to u (n,) of curves (n,) at which the third axis is in line, by Gauss and Newton; nan if
+    there is none."""
+    u, found, best = u.copy(), np.full(len(u), np.nan), np.full(len(u), np.inf)
+    going = np.arange(len(u))
+    for n in range(STEPS):
+        if not len(going):
+            break
+        at, three = u[going], np.tile(rows[going], 3)
+        before, here, after = _lean(curves, np.concatenate([at - STEP, at, at + STEP]), three).reshape(3, -1)
+        size, slope = np.abs(here), (after - before) / (2 * STEP)
+        found[going[size < IN_LINE]] = at[size < IN_LINE]
+        # next to a zero the steps converge quadratically; elsewhere they end where the lean is least
+        on = (size >= IN_LINE) & (np.abs(slope) > 0) & ((n <= FIRST_STEPS) | (size <= SLOW * best[going]))
+        best[going], going = size, going[on]
+        moved = u[going] - (np.conj(slope[on]) * here[on]).real / np.abs(slope[on]) ** 2
+        u[going] = np.clip(moved, np.where(curves.whole[rows[going]], -np.pi, 0.0), np.pi)
+    return found

@@ -137,7 +137,7 @@ def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list
     if not curves:
         return []
     owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
-    pairs = _Pairs.of([curves[k] for k in owner[0]])
+    right = CurveStack.of([curves[k] for k in owner[0]])
     lower, upper = np.array([curves[k].arcs[0] for k in owner[0]]).T
     # parts of the curves of pairs, and which of the two are not decided there
     pair, undecided = np.arange(len(lower)), np.ones((2, len(lower)), dtype=bool)
@@ -147,7 +147,7 @@ def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list
         ends[:, -1] = upper
         lower, upper = ends[:, :-1].ravel(), ends[:, 1:].ravel()
         pair, undecided = np.repeat(pair, count), np.repeat(undecided, count, axis=1)
-        held, inside = pairs.judged(pair, lower, upper, q_min, q_max)
+        held, inside = _judged(right, pair, lower, upper, q_min, q_max)
         side, row = np.nonzero(inside & undecided)
         kept.append(np.array([owner[side, pair[row]], lower[row], upper[row]]))
         undecided &= held & ~inside
@@ -173,9 +173,8 @@ def _joined(curves: Sequence[RedundantCurve], parts: Array) -> list[RedundantCur
 
 
 @dataclass(frozen=True, eq=False)
-class _Pairs:
-    """Curves of one pose over intervals (2, m) of q7, which are `whole` (m,), on sheets (m, 3) and on their
-    counterparts with the other shoulder."""
+class CurveStack:
+    """Curves of one pose: intervals (2, m) [rad] of q7, which are `whole` (m,), and sheets (m, 3)."""
 
     pose: RedundantPose
     interval: Array
@@ -183,8 +182,8 @@ class _Pairs:
     sheet: Array
 
     @classmethod
-    def of(cls, curves: Sequence[RedundantCurve]) -> _Pairs:
-        """Those of curves on the right shoulder."""
+    def of(cls, curves: Sequence[RedundantCurve]) -> CurveStack:
+        """Those of curves of one pose."""
         return cls(
             curves[0].pose,
             np.array([curve.interval for curve in curves]).T,
@@ -192,21 +191,27 @@ class _Pairs:
             np.array([curve.sheet for curve in curves]),
         )
 
-    def judged(self, pair: NDArray[np.intp], low: Array, high: Array, q_min: Array, q_max: Array) -> tuple[Mask, Mask]:
-        """Which parts, low … high (n,) of pairs (n,), may have members within the limits, and which have no others;
-        (2, n) each, the first row for the right shoulder."""
-        interval, whole = self.interval[:, pair], self.whole[pair]
-        start, end = last_angle(np.array([low, high]), interval, whole)
-        right, half = boxes_of(self.pose, Cells(start, end, self.sheet[pair]))
-        # with the other shoulder, the third axis leans to the other side
-        left = right.copy()
-        left[:, 0], left[:, 2] = right[:, 0] + np.pi, right[:, 2] + np.pi
-        left[:, 1] = -right[:, 1] - 2 * self.pose.form.lean_at_zero
-        middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
-        away = np.abs(wrapped(np.array([right, left]) - middle))
-        held = (away <= width + half).all(axis=2)
-        inside = ((away + half <= width) | (width >= np.pi)).all(axis=2)
-        return np.asarray(held), np.asarray(inside)
+    def last_angle(self, u: Array, rows: NDArray[np.intp]) -> Array:
+        """q7 (…, n) [rad] at parameters u (…, n) of curves (n,)."""
+        return last_angle(u, self.interval[:, rows], self.whole[rows])
+
+
+def _judged(
+    curves: CurveStack, rows: NDArray[np.intp], low: Array, high: Array, q_min: Array, q_max: Array
+) -> tuple[Mask, Mask]:
+    """Which parts, low … high (n,) of curves (n,) on the right shoulder, may have members within the limits, and which
+    have no others; (2, n) each, the second row for their counterparts with the left shoulder."""
+    start, end = curves.last_angle(np.array([low, high]), rows)
+    right, half = boxes_of(curves.pose, Cells(start, end, curves.sheet[rows]))
+    # with the other shoulder, the third axis leans to the other side
+    left = right.copy()
+    left[:, 0], left[:, 2] = right[:, 0] + np.pi, right[:, 2] + np.pi
+    left[:, 1] = -right[:, 1] - 2 * curves.pose.form.lean_at_zero
+    middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
+    away = np.abs(wrapped(np.array([right, left]) - middle))
+    held = (away <= width + half).all(axis=2)
+    inside = ((away + half <= width) | (width >= np.pi)).all(axis=2)
+    return np.asarray(held), np.asarray(inside)
 
 
 def last_angle(u: Array, interval: Array, whole: Mask) -> Array:

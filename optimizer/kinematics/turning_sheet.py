@@ -134,10 +134,9 @@ def turning_through(at: Array, angle: Array, knots: int, free_end: bool = False)
     """A smooth turning near angles (k,) [rad] at fractions (k,), by values at `knots` even fractions; see
     `turning_of`."""
     x = np.linspace(0.0, 1.0, knots)
-    unit = CubicSpline(x, np.eye(knots), bc_type=_NATURAL if free_end else _AT_REST)(at)[
-        :, 1 : knots if free_end else -1
-    ]
-    return turning_of(np.asarray(np.linalg.lstsq(unit, angle, rcond=None)[0], dtype=float), free_end)
+    units = CubicSpline(x, np.eye(knots), bc_type=_NATURAL if free_end else _AT_REST)(at)
+    chosen = units[:, 1:] if free_end else units[:, 1:-1]
+    return turning_of(np.asarray(np.linalg.lstsq(chosen, angle, rcond=None)[0], dtype=float), free_end)
 
 
 def turning_of(values: Array, free_end: bool = False) -> CubicSpline:

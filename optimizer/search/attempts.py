@@ -80,17 +80,15 @@ def _attempted(
     solver, prepared = solver_of(incumbent, candidate, interval), incumbent.prepared
     sliding = released(prepared, candidate, solver)
     result = in_time(incumbent, partial(attempt, solver))
-    if result.spline is not None and incumbent.problem.tool_path is not None and candidate.goal.tolerance is not None:
-        # the turn of the tool was chosen, and with it where the path ends
-        moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)
-        if moved is None:
-            return replace(result, status=SolveStatus.FAILED, reason=NO_END, spline=None), candidate
-        return result, moved
-    if result.spline is None or not sliding:
+    # the turn of the tool along a path is chosen, and with it where the path may end
+    turned = incumbent.problem.tool_path is not None and candidate.goal.tolerance is not None
+    if result.spline is None or not (sliding or turned):
         return result, candidate
     moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)
     if moved is not None:
-        return replace(result, reason=f"{result.reason}{SLID}"), moved
+        return (result if turned else replace(result, reason=f"{result.reason}{SLID}")), moved
+    if turned:
+        return replace(result, status=SolveStatus.FAILED, reason=NO_END, spline=None), candidate
     return in_time(incumbent, partial(attempt, solver_of(incumbent, candidate, interval))), candidate
 
 

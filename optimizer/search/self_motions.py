@@ -8,7 +8,6 @@ solved as a candidate of its own, and the steps are halved until they tell nothi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -20,15 +19,10 @@ from optimizer.search.ends import MEMBERS
 from optimizer.search.free_goal import REFINED, refine_goal
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
-from optimizer.search.sliding import slides
+from optimizer.search.sliding import Side, slides
 
 # first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3
-# a posture farther from a curve is not on it [rad]
-ON_CURVE = 1e-6
-
-Side = Literal["start", "goal"]
-SIDES: tuple[Side, Side] = ("start", "goal")
 
 
 def refine(incumbent: Incumbent) -> list[Candidate]:

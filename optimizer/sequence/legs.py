@@ -98,9 +98,7 @@ class Leg:
         dwell: Array,
     ) -> Leg:
         """The leg of given kinds, with their bounds."""
-        potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
-        levels = np.column_stack([potential[0][start.end[pair[:, 0]]], potential[1][goal.end[pair[:, 1]]]])
-        displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
+        displacement, levels = between(prepared, start, goal, pair)
         longest = LONGEST_DURATION if prepared.problem.duration_max is None else prepared.problem.duration_max
         bound = _kind_bounds(prepared, start.q[pair[:, 0]], displacement, levels, 0.0, longest)
         cost = _costs(bound + _beyond(prepared, displacement), kind, dwell)
@@ -214,6 +212,13 @@ def kinds_of(start: Layer, goal: Layer, prepared: PreparedProblem) -> tuple[npt.
     of_pair = np.empty(code.size, dtype=np.intp)
     of_pair[order] = kind
     return of_pair.reshape(code.shape), np.column_stack(np.unravel_index(order[first], code.shape))
+
+
+def between(prepared: PreparedProblem, start: Layer, goal: Layer, pair: npt.NDArray[np.intp]) -> tuple[Array, Array]:
+    """Displacements (k, nq) [rad] of pairs (k, 2), and the potential energies (k, 2) [J] at their ends."""
+    ends = [(layer, layer.end[nodes]) for layer, nodes in zip((start, goal), pair.T, strict=True)]
+    levels = [np.array([prepared.potential(end.q) for end in layer.ends])[own] for layer, own in ends]
+    return goal.q[pair[:, 1]] - start.q[pair[:, 0]], np.column_stack(levels)
 
 
 def _costs(of_kind: Array, kind: npt.NDArray[np.intp], dwell: Array) -> Array:

@@ -21,7 +21,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.search.lower_bound import travel_bounds
 from optimizer.sequence.layers import Layer
-from optimizer.sequence.legs import Leg, bounds_of, kinds_of
+from optimizer.sequence.legs import Leg, between, bounds_of, kinds_of
 from optimizer.sequence.round_solution import Pass
 from optimizer.solution import Branch
 from optimizer.trajectories.passing import pass_times
@@ -136,12 +136,10 @@ class PassingLeg(Leg):
 def _travel(prepared: PreparedProblem, start: Layer, goal: Layer, price: float, longest: float) -> Array:
     """Bounds (s, g) [J] on the travel from one layer to the next; see `travel_bounds`."""
     kind, pair = kinds_of(start, goal, prepared)
-    potential = [np.array([prepared.potential(end.q) for end in layer.ends]) for layer in (start, goal)]
-    gain = potential[1][goal.end[pair[:, 1]]] - potential[0][start.end[pair[:, 0]]]
-    displacement = goal.q[pair[:, 1]] - start.q[pair[:, 0]]
-    return np.asarray(
-        bounds_of(lambda x, own: travel_bounds(prepared, x, own, price, longest), displacement, gain)[kind]
-    )
+    displacement, levels = between(prepared, start, goal, pair)
+    gain = levels[:, 1] - levels[:, 0]
+    bounds = bounds_of(lambda x, own: travel_bounds(prepared, x, own, price, longest), displacement, gain)
+    return np.asarray(bounds[kind])
 
 
 def _least_sums(matrices: Sequence[Array]) -> Array:

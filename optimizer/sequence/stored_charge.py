@@ -71,7 +71,11 @@ def charges_of(bus: Bus, demands: Sequence[Demand], closed: bool) -> list[float]
     return [float(charge[k]) for k in ends]
 
 
+def flows(arm: Arm, demands: Sequence[Demand], charges: Sequence[float]) -> list[BusFlow]:
+    """The flow of each demand; `charges` as `charges_of` gives them."""
+    return [each.flow(arm, first) for each, first in zip(demands, charges[:-1], strict=True)]
+
+
 def drawn(arm: Arm, demands: Sequence[Demand], charges: Sequence[float]) -> float:
-    """Energy [J] that demands draw, the decrease of the charge included; `charges` as `charges_of` gives them."""
-    flows = [each.flow(arm, first) for each, first in zip(demands, charges, strict=False)]
-    return sum(float(each.drawn.sum()) for each in flows) + charges[0] - charges[-1]
+    """Energy [J] that demands draw, the decrease of the charge included."""
+    return sum(float(each.drawn.sum()) for each in flows(arm, demands, charges)) + charges[0] - charges[-1]

@@ -25,7 +25,7 @@ from optimizer.sequence.rests import rest_sensitivity
 from optimizer.sequence.round_baselines import compared
 from optimizer.sequence.round_search import LEAST_TIME, problem_of
 from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundBaselineName, RoundSolution, needed_by
-from optimizer.sequence.stored_charge import Demand, charges_of, drawn
+from optimizer.sequence.stored_charge import Demand, charges_of, drawn, flows
 from optimizer.solution import StorageUse
 from optimizer.trajectories.spline import Spline
 
@@ -41,12 +41,15 @@ Search = Callable[[WorkRound], RoundSolution]
 
 @dataclass(frozen=True)
 class Valued:
-    """A round as one: its `moves`, as they were found on another bus, the `motions` that stand for theirs, and the
-    `charges` [J] before each motion and after it, before and after the rest that follows. Its objective is `value` [J].
+    """A round as one: its `moves`, as they were found on another bus, and the `motions` that stand for theirs.
+
+    Each motion has PARTS `demands`; `charges` [J] are those before each of them, and after the last. The objective is
+    `value` [J].
     """
 
     moves: Sequence[Move]
     motions: list[Spline]
+    demands: list[Demand]
     charges: list[float]
     value: float
 
@@ -101,29 +104,29 @@ def _stored(asked: WorkRound, move: PlannedMove, charge: float) -> PlannedMove:
     return replace(move, arm=replace(move.arm, bus=bus), arm_after=replace(move.arm_after, bus=bus))
 
 
-def _demands(asked: WorkRound, moves: Sequence[Move], motions: Sequence[Spline]) -> list[Demand]:
-    """The demands of the motions, and of the rest after each of them."""
+def _demands(asked: WorkRound, move: Move, motion: Spline) -> list[Demand]:
+    """The demands of a motion, and of the rest after it."""
+    planned, q_goal = move.planned, motion.control_points[-1]
     return [
-        demand
-        for move, motion in zip(moves, motions, strict=True)
-        for demand in (
-            Demand.of_motion(Plant(_stored(asked, move.planned, 0.0).arm), motion),
-            Demand.of_rest(asked, move.planned, 0.0, move.planned.dwell, motion.control_points[-1]),
-            Demand.of_rest(asked, move.planned, move.planned.dwell, move.wait, motion.control_points[-1]),
-        )
+        Demand.of_motion(Plant(planned.arm), motion),
+        Demand.of_rest(asked, planned, 0.0, planned.dwell, q_goal),
+        Demand.of_rest(asked, planned, planned.dwell, move.wait, q_goal),
     ]
 
 
-def _valued(asked: WorkRound, moves: Sequence[Move], motions: list[Spline] | None = None) -> Valued:
-    """A round as one, with the exact charge; its motions are those of its moves unless given."""
-    motions = [move.solution.trajectory.spline for move in moves] if motions is None else motions
-    demands = _demands(asked, moves, motions)
+def _valued(
+    asked: WorkRound, moves: Sequence[Move], motions: list[Spline] | None = None, demands: list[Demand] | None = None
+) -> Valued:
+    """A round as one, with the exact charge; its motions are those of its moves unless given, with their demands."""
+    if motions is None or demands is None:
+        motions = [move.solution.trajectory.spline for move in moves]
+        demands = [each for move, own in zip(moves, motions, strict=True) for each in _demands(asked, move, own)]
     charges = charges_of(asked.arm.bus, demands, asked.closed)
     if asked.objective == "mechanical":
         value = sum(move.solution.energy.mechanical.total for move in moves)
     else:
         value = drawn(asked.arm, demands, charges)
-    return Valued(moves, motions, charges, value)
+    return Valued(moves, motions, demands, charges, value)
 
 
 def _refined(asked: WorkRound, best: Valued, end: Deadline, clock: Clock) -> Valued:
@@ -131,16 +134,17 @@ def _refined(asked: WorkRound, best: Valued, end: Deadline, clock: Clock) -> Val
     if asked.objective == "mechanical" or not asked.arm.bus.capacity * asked.arm.bus.efficiency:
         return best
     for k, move in enumerate(best.moves):
-        motion, charge = best.motions[k], best.charges[PARTS * k]
-        planned = _stored(asked, move.planned, charge)
-        surplus = Demand.of_motion(Plant(planned.arm), motion).flow(planned.arm, charge).surplus.sum()
-        if surplus <= SPILLED or end.passed:
+        motion, own = best.motions[k], PARTS * k
+        if best.demands[own].flow(asked.arm, best.charges[own]).surplus.sum() <= SPILLED or end.passed:
             continue
-        problem = _problem(asked, planned, move, end.left)
+        problem = _problem(asked, _stored(asked, move.planned, best.charges[own]), move, end.left)
         fixed = replace(problem, duration_min=motion.duration, duration_max=motion.duration)
         with suppress(JoulepathError):
             found = Run(fixed, [motion], clock).solution().trajectory.spline
-            other = _valued(asked, best.moves, [*best.motions[:k], found, *best.motions[k + 1 :]])
+            motions = [*best.motions[:k], found, *best.motions[k + 1 :]]
+            demand = Demand.of_motion(Plant(move.planned.arm), found)
+            demands = [*best.demands[:own], demand, *best.demands[own + 1 :]]
+            other = _valued(asked, best.moves, motions, demands)
             best = min(best, other, key=lambda each: each.value)
     return best
 
@@ -182,13 +186,12 @@ def _moves(asked: WorkRound, best: Valued, end: Deadline, clock: Clock) -> list[
 
 
 def _use(asked: WorkRound, best: Valued) -> StorageUse:
-    demands = _demands(asked, best.moves, best.motions)
-    flows = [each.flow(asked.arm, first) for each, first in zip(demands, best.charges, strict=False)]
+    moved = flows(asked.arm, best.demands, best.charges)
     return StorageUse(
         initial=best.charges[0],
         final=best.charges[-1],
-        charged=sum(float(each.charged.sum()) for each in flows),
-        discharged=sum(float(each.discharged.sum()) for each in flows),
+        charged=sum(float(each.charged.sum()) for each in moved),
+        discharged=sum(float(each.discharged.sum()) for each in moved),
     )
 
 

@@ -1,0 +1,43 @@
+"""What query strings have in common: `Query`, and the page of a list that is asked for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import ConfigDict
+
+from app.schemas.common import Request, described
+
+PAGE_PATTERN = r"^[0-9]{1,16}_[0-9a-f-]{36}$"
+
+
+class Query(Request):
+    """The parameters of a query string."""
+
+    # every value in a query string is text
+    model_config = ConfigDict(strict=False)
+
+
+def limit_of(things: str) -> Any:
+    """The field `limit` of a page of `things`."""
+    return described(f"Largest number of {things} in the answer.", "1", 50, default=50, ge=1, le=200)
+
+
+def after_of(example_id: str) -> Any:
+    """The field `after` of a page."""
+    return described(
+        "Value of `next` on the previous page. Null: the first page.",
+        None,
+        _position(example_id),
+        default=None,
+        pattern=PAGE_PATTERN,
+    )
+
+
+def next_of(example_id: str) -> Any:
+    """The field `next` of the answer with a page."""
+    return described("Value of `after` for the next page; null on the last page.", None, _position(example_id))
+
+
+def _position(example_id: str) -> str:
+    return f"1741944413589793_{example_id}"
