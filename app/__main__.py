@@ -18,10 +18,13 @@ def main() -> None:
 
     start_forkserver()
 
-    from app.access.start import check_access
-    from app.logs import configure_logging
-    from app.server import serve
-    from app.settings import WrongSettings, read_settings
+    from app.engine.imports import importing
+
+    with importing():
+        from app.access.start import check_access
+        from app.logs import configure_logging
+        from app.server import serve
+        from app.settings import WrongSettings, read_settings
 
     try:
         settings = read_settings()

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 
 
@@ -21,6 +23,7 @@ def test_the_snippet_prints_what_the_readme_says() -> None:
     assert run.stdout == printed
 
 
+@pytest.mark.long
 def test_the_snippet_of_the_cycles_page_goes_round() -> None:
     (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "cycles.md").read_text(), re.DOTALL)
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

@@ -5,24 +5,9 @@ from __future__ import annotations
 import signal
 from importlib import import_module
 
-from app.tasks import (
-    compare,
-    cycle,
-    evaluate,
-    export,
-    ik,
-    ik_path,
-    job_body,
-    job_request,
-    optimize,
-    own_robot,
-    pareto,
-    read_body,
-    study_step,
-    whatif,
-)
+from app.engine.imports import importing
 
-__all__ = [
+TASKS = (
     "compare",
     "cycle",
     "evaluate",
@@ -37,12 +22,15 @@ __all__ = [
     "read_body",
     "study_step",
     "whatif",
-]
+)
 
-# imported where it is called, because the process that answers HTTP does not need it
-import_module("toppra")
-# whose fields messages about large bodies name
-import_module("app.schemas.studies")
+with importing():
+    for name in TASKS:
+        import_module(f"app.tasks.{name}")
+    # imported where it is called, because the process that answers HTTP does not need it
+    import_module("toppra")
+    # whose fields messages about large bodies name
+    import_module("app.schemas.studies")
 
 # SIGTERM from a service manager reaches every process of the service. This one ends with its parent, and its end would
 # end the workers, which must last until the requests in flight are answered.

@@ -92,8 +92,12 @@ def test_every_body_has_an_example() -> None:
         assert {media_type for media_type, *_ in operation.bodies()} == declared.keys(), operation
 
 
-# a front of dozens of durations, all methods, and rounds in a given time or among obstacles
+# a front of dozens of durations, all methods, rounds in a given time, among obstacles or along a path, an excitation
+# of all parameters
 SLOW = (
+    "post /cycle application/json glue_path",
+    "post /cycle application/json out_of_a_tray",
+    "post /excitation application/json friction_and_rotors",
     "post /pareto application/json branch_switch",
     "post /compare application/json all_methods",
     "post /cycle application/json pick_and_place",

@@ -67,6 +67,7 @@ def until_replaced(server: Server, before: list[int], count: int) -> None:
     until(replaced)
 
 
+@pytest.mark.long
 def test_an_answer_is_played_in_mujoco(server: Server) -> None:
     """By its path alone: the payload is in the answer."""
     found = server.post("/optimize", move(payload={"mass": 2.0, "com": [0.0, 0.0, 0.06]})).json()
@@ -104,6 +105,7 @@ def test_long_requests_hold_up_nobody(server: Server) -> None:
     until_replaced(server, before, 1)
 
 
+@pytest.mark.long
 def test_a_deadline_over_http_gives_what_was_found(server: Server) -> None:
     answer = server.post("/optimize", long_search(deadline=6))
     assert answer.status_code == 200

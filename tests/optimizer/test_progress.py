@@ -16,6 +16,7 @@ from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved,
 from optimizer.solution import CandidateStatus
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
 from tests.optimizer.sequence.rounds import pick_and_place
+from tests.selection import long_but
 
 SAME = 1e-12
 
@@ -40,7 +41,7 @@ def goes_forward(events: list[Event]) -> list[Improved]:
     return best
 
 
-@pytest.mark.parametrize("bound", ["normal", "tight"])
+@pytest.mark.parametrize("bound", long_but(["normal"], ["normal", "tight"]))
 def test_a_search_ends_with_its_answer(bound: str) -> None:
     events: list[Event] = []
     answer = optimize(asked(bound), tell=events.append)
