@@ -128,6 +128,8 @@ class _Rows:
         """Add rows with gradients (rows, n) by the scaled variables, and return their numbers."""
         first, count = len(self.most), len(most)
         self.gradients.append(gradients)
+        if not count:
+            return np.zeros(0, dtype=int)
         self.A = np.concatenate([self.A, gradients @ self.whitening])
         self.least = np.concatenate([self.least, np.full(count, -_INFINITE) if least is None else least])
         self.most = np.concatenate([self.most, most])

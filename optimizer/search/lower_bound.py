@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from models.robot import Array, FrictionLaw, Limits
 from optimizer.energy.dwell import holding_power, linear_dwells
@@ -20,9 +22,9 @@ from optimizer.trajectories.seven_segment import shortest_duration
 _KNEE_DEFICIT = 0.3003
 # duration of a part of a motion [s] that stands for none
 SHORTEST_PART = 1e-12
-# halvings of the interval that holds the best duration, in logarithms: to 0.05 % of it. A tangent covers what is left
-# of the interval, so that the bound is exact to the square of that
-_BISECTIONS = 14
+# points of the secant method for the best duration at most; how steep it takes the loss to fall with the duration at
+# first; and the share of its cost to which a duration is the best one
+_POINTS, _FALL, _EXACT = 12, 1.7, 1e-9
 
 
 def lower_bounds(
@@ -163,7 +165,7 @@ def electrical(
         |displacement| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
 
     This is the value of a linear program whose right-hand side is linear in T, so it is convex in T, with slope
-    g(c) - c g'(c). Bisection on the slope finds the least sum in [t_min, t_max].
+    g(c) - c g'(c). `_best_durations` finds the least sum in [t_min, t_max].
     """
     cruise = _Cruise(np.abs(displacement), prepared.arm.friction_law, prepared.arm.active_limits)
     return _net_energy(prepared, cruise, potential_gain, t_min, t_max, waiting)
@@ -177,31 +179,63 @@ def _net_energy(
     base = prepared.arm.base_power + float(drives.inverter_constant.sum())
     base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
     rate = base - waiting
-    low, high = t_min.copy(), np.maximum(t_max, t_min)
-    for _ in range(_BISECTIONS):
-        middle = np.sqrt(low * high)
-        rising = rate + cruise.slope(middle) > 0
-        high, low = np.where(rising, middle, high), np.where(rising, low, middle)
-    # convex: the tangent at the lower end stays below the curve up to the upper end
-    value = rate * low + potential_gain + cruise.distance @ friction.coulomb + cruise.loss(low)
-    return np.asarray(value + np.minimum(rate + cruise.slope(low), 0.0) * (high - low))
+    T, below = _best_durations(cruise, rate, t_min, np.maximum(t_max, t_min))
+    return np.asarray(rate * T + potential_gain + cruise.distance @ friction.coulomb + cruise.loss(T) - below)
+
+
+def _best_durations(cruise: _Cruise, rate: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Durations (P,) [s] near those from `low` to `high` (P,) at which `rate` · T and the loss of `cruise` are least
+    together, and how far (P,) [J] this least is below their sum there, at most.
+
+    The sum is convex: it stays above its tangent at T on the interval that is known to hold the best duration. The loss
+    falls nearly with a power of T. So the secant method finds by logarithms where its fall is `rate`; it goes to the
+    middle of the interval instead of out of it.
+    """
+    T, below = np.where(rate > 0, low, high), np.zeros_like(low)
+    fall = -cruise.slope(low)
+    # most motions are best as fast as they can be
+    slower = np.flatnonzero((rate > 0) & (fall > rate))
+    cruise, rate, low, high = cruise.only(slower), rate[slower], np.log(low[slower]), np.log(high[slower])
+    x, over = low, np.log(fall[slower] / rate)
+    step, missed, done = over / _FALL, np.full_like(x, np.inf), np.zeros(len(x), dtype=bool)
+    for _ in range(_POINTS):
+        if done.all():
+            break
+        ahead = np.where((x + step > low) & (x + step < high), x + step, (low + high) / 2)
+        ahead = np.where(done, x, ahead)
+        duration = np.exp(ahead)
+        fall = -cruise.slope(duration)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            # without a fall, or twice at the same place, there is no step
+            there = np.log(fall / rate)
+            step = there * (ahead - x) / (over - there)
+        low, high = np.where(there > 0, ahead, low), np.where(there > 0, high, ahead)
+        x, over, rising = ahead, there, rate - fall
+        missed = np.maximum(rising * (duration - np.exp(low)), rising * (duration - np.exp(high)))
+        done = missed <= _EXACT * rate * duration
+    T[slower], below[slower] = np.exp(x), missed
+    return T, below
 
 
 class _Cruise:
     """The least loss ∫ g(|v|) dt of joints that displacement `distance` (P, nq) under acceleration and jerk limits."""
 
     def __init__(self, distance: Array, friction: FrictionLaw, limits: Limits) -> None:
-        self.distance, self.friction, self.a = distance, friction, limits.a_max
+        self.distance, self.friction, self.limits, self.a = distance, friction, limits, limits.a_max
         self.jerk_ramp = limits.a_max / limits.j_max
         self.ramp_speed = limits.a_max * self.jerk_ramp / 2
+
+    def only(self, rows: npt.NDArray[np.intp]) -> Self:
+        """The same of some of the motions."""
+        return type(self)(self.distance[rows], self.friction, self.limits)
 
     def speed(self, T: Array) -> tuple[Array, Array]:
         """c (P, nq) for durations T (P,), and the jerk ramp's time that it is subject to."""
         T = T[:, None]
-        moving = T - self.jerk_ramp
-        discriminant = moving**2 - 4 * (self.distance - self.jerk_ramp * self.ramp_speed) / self.a
-        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(discriminant, 0.0)))
-        without = self.a / 2 * (T - np.sqrt(np.maximum(T**2 - 4 * self.distance / self.a, 0.0)))
+        moving, spread = T - self.jerk_ramp, self.distance * (4 / self.a)
+        ramps = 4 * self.jerk_ramp * self.ramp_speed / self.a
+        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(moving * moving + ramps - spread, 0.0)))
+        without = self.a / 2 * (T - np.sqrt(np.maximum(T * T - spread, 0.0)))
         ramped = with_jerk > self.ramp_speed
         return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
 
@@ -210,24 +244,23 @@ class _Cruise:
         c, _ = self.speed(T)
         law = self.friction
         # g - c g'
-        return -np.asarray((c * (law.curved * c / np.hypot(c, law.speed) + law.viscous * c)).sum(axis=-1))
+        square = c * c
+        return -np.asarray((square * (law.curved / np.sqrt(square + law.speed**2) + law.viscous)).sum(axis=-1))
 
     def loss(self, T: Array) -> Array:
         """The loss (P,) [J], by parts: T g(c) - 2 ∫ g' t dh."""
         c, ramp = self.speed(T)
-        to_speed = (c * self._g(c) - self._integral(c)) / self.a
-        ramping = ramp / 2 * (self._g(c) - self._g(self.ramp_speed))
-        return np.asarray((T[:, None] * self._g(c) - 2 * (to_speed + ramping)).sum(axis=-1))
+        g, integral = self._g(c)
+        to_speed = (c * g - integral) / self.a
+        ramping = ramp / 2 * (g - self._g(self.ramp_speed)[0])
+        return np.asarray((T[:, None] * g - 2 * (to_speed + ramping)).sum(axis=-1))
 
-    def _g(self, v: Array) -> Array:
-        law = self.friction
-        return np.asarray(v * (law.curved * np.arcsinh(v / law.speed) + law.viscous * v))
-
-    def _integral(self, v: Array) -> Array:
-        """∫_0^v g."""
-        law, s = self.friction, self.friction.speed
-        curved = (v * v / 2 + s * s / 4) * np.arcsinh(v / s) - v * np.hypot(v, s) / 4
-        return np.asarray(law.curved * curved + law.viscous * v**3 / 3)
+    def _g(self, v: Array) -> tuple[Array, Array]:
+        """g(v), and ∫_0^v g."""
+        law, s, square = self.friction, self.friction.speed, v * v
+        bent = np.arcsinh(v / s)
+        curved = (square / 2 + s * s / 4) * bent - v * np.sqrt(square + s * s) / 4
+        return v * (law.curved * bent + law.viscous * v), law.curved * curved + law.viscous * square * v / 3
 
 
 class _Even(_Cruise):
@@ -240,4 +273,4 @@ class _Even(_Cruise):
 
     def loss(self, T: Array) -> Array:
         """The loss (P,) [J]."""
-        return np.asarray(T * self._g(self.speed(T)[0]).sum(axis=-1))
+        return np.asarray(T * self._g(self.speed(T)[0])[0].sum(axis=-1))

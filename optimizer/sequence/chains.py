@@ -47,20 +47,20 @@ class LeastChain:
         return self._through(first, node)
 
     def _through(self, first: Array, last: int | None) -> tuple[float, list[int]]:
-        reached, before = first, []
+        reached = [first]
         for cost in self.costs:
             # rows that nothing leads to are left out: with one first node, all but one
-            rows = np.flatnonzero(np.isfinite(reached))
+            rows = np.flatnonzero(np.isfinite(reached[-1]))
             if not len(rows):
                 return np.inf, []
-            total = reached[rows, None] + cost[rows]
-            best = total.argmin(axis=0)
-            before.append(rows[best])
-            reached = total[best, np.arange(total.shape[1])]
-        node = int(reached.argmin()) if last is None else last
-        if not np.isfinite(reached[node]):
+            all_rows = len(rows) == len(cost)
+            total = reached[-1][:, None] + cost if all_rows else reached[-1][rows, None] + cost[rows]
+            reached.append(total.min(axis=0))
+        node = int(reached[-1].argmin()) if last is None else last
+        if not np.isfinite(reached[-1][node]):
             return np.inf, []
         nodes = [node]
-        for own in reversed(before):
-            nodes.append(int(own[nodes[-1]]))
-        return float(reached[node]), nodes[::-1]
+        for before, cost in zip(reached[-2::-1], self.costs[::-1], strict=True):
+            # where each node came from is asked on one chain alone: several times less than for all of them
+            nodes.append(int((before + cost[:, nodes[-1]]).argmin()))
+        return float(reached[-1][node]), nodes[::-1]

@@ -19,7 +19,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from optimizer.search.baselines import guesses, motion_energy
-from optimizer.search.lower_bound import lower_bounds
+from optimizer.search.lower_bound import lower_bounds, priced_bounds
 from optimizer.solution import Energy
 from optimizer.trajectories import bspline
 from optimizer.trajectories.bspline import DEGREE
@@ -233,6 +233,20 @@ def test_the_bound_is_the_least_over_the_duration(name: str, pairs: int) -> None
         low = max(int(np.argmin(each)) - 1, 0) * 20
         fine = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] for T in times[low : low + 41]]
         assert free[k] == pytest.approx(min(fine), rel=1e-4)  # between two of the durations
+
+
+@pytest.mark.parametrize("price", [-40.0, -36.0, -30.0, 100.0])
+def test_the_bound_at_a_price_of_time_is_the_least_over_the_duration(price: float) -> None:
+    """Slow ways pay where time is cheap, the slowest where it is paid for."""
+    torques, longest = Torques(problem(payload=PAYLOAD)), 90.0
+    start, goal = ends(9, 3)
+    gain = np.array([torques.task.potential(b) - torques.task.potential(a) for a, b in zip(start, goal, strict=True)])
+    priced = priced_bounds(torques.task, goal - start, gain, price, longest)
+    for k in range(3):
+        times = np.geomspace(float(shortest_duration(goal[k] - start[k], ROBOT.limits)), longest, 400)
+        each = [bound(torques, start[[k]], goal[[k]], **fixed(float(T)))[0][0] + price * T for T in times]
+        assert priced[k] <= min(each) + EXACT * abs(min(each))
+        assert priced[k] == pytest.approx(min(each), rel=2e-3)
 
 
 def test_duration_bounds_raise_the_bound() -> None:
