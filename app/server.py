@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import ctypes
-import gc
 import math
 import socket
 
@@ -12,6 +11,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from app.access.start import log_access
+from app.engine.imports import keep
 from app.engine.pool import Engine
 from app.http.connection import Ceilings, Connection
 from app.jobs.jobs import Jobs
@@ -41,7 +41,7 @@ class _Server(uvicorn.Server):
         """Listens, and begins to check connections."""
         await super().startup(sockets)
         # what there is now stays: a garbage collection that looks through it would hold up every request for 0.1 s
-        gc.freeze()
+        keep()
         self._checking = asyncio.create_task(self._check_connections())
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
@@ -59,7 +59,6 @@ class _Server(uvicorn.Server):
         await asyncio.sleep(_SETTLING_TIME)
         await super().shutdown(sockets)
         self._checking.cancel()
-        gc.unfreeze()  # libraries look at the end whether all of theirs is gone
 
     async def _check_connections(self) -> None:
         while True:
