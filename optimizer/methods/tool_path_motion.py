@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -110,33 +111,51 @@ class ToolPathMotion(Method):
         The path of the best one is kept if it needs less than `least` [J]; and no other is looked for again.
         """
         prepared, best = self.prepared, least
-        kept: tuple[Trace, Spline, Spline] | None = None
         assert prepared.course is not None
         prepared.choose(self.q_start)
 
-        def tried(trace: Trace, path: Spline, scaling: Basis, law: tuple[Array, Array] | None) -> float:
-            nonlocal best, kept
-            results.append(self._clear(self._kept(path, self.interval, scaling, law)))
-            found, cost = results[-1].spline, prepared.cost_of(results[-1].spline)
-            if found is not None and cost < best:
-                best, kept = cost, (trace, path, found)
-                prepared.choose(self.q_start, trace, path)
-            return cost
+        def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
+            nonlocal best
+            results.append(result)
+            cost = prepared.cost_of(result.spline)
+            if cost >= best:
+                return False
+            best = cost
+            prepared.choose(self.q_start, trace, path)
+            return True
 
-        if prepared.course.free_end:
-            to_end = TurnedToEnd(prepared, self.q_start)
-
-            def ended(angle: float) -> float:
-                turned = to_end.at(angle)
-                return np.inf if turned is None else tried(*turned, self._scaling(1), None)
-
-            try_angles(ended, least)
-            if kept is not None:
-                trace, path, found = kept
-                law = _on_path(path, *sampled(found))
-                tried(trace, path, scaling, law)
+        found = self._at_best_angle(results) if prepared.course.free_end else None
+        if found is not None:
+            trace, path, coarse = found
+            assert coarse.spline is not None
+            own = _on_path(path, *sampled(coarse.spline))
+            fine = self._clear(self._kept(path, self.interval, scaling, own))
+            if any([is_best(trace, path, coarse), is_best(trace, path, fine)]):
+                law = own
         for trace, path in turned_paths(prepared, self.q_start, self.q_goal, *law):
-            tried(trace, path, scaling, law)
+            is_best(trace, path, self._clear(self._kept(path, self.interval, scaling, law)))
+
+    def _at_best_angle(self, results: list[SolveResult]) -> tuple[Trace, Spline, SolveResult] | None:
+        """The trace, the joints' path and a motion at the best angle of the tool at the end; None if there is none.
+
+        All angles, the present one included, are compared by motions of the first time scaling. The effort for them
+        goes into `results`.
+        """
+        found = list[tuple[float, Trace, Spline, SolveResult]]()
+        to_end = TurnedToEnd(self.prepared, self.q_start)
+
+        def cost(angle: float) -> float:
+            followed = to_end.at(angle)
+            if followed is None:
+                return np.inf
+            result = self._clear(self._kept(followed[1], self.interval, self._scaling(1)))
+            results.append(replace(result, status=SolveStatus.FAILED, spline=None))
+            found.append((self.prepared.cost_of(result.spline), *followed, replace(result, iterations=0, solves=0)))
+            return found[-1][0]
+
+        try_angles(cost, cost(0.0))
+        best = min(found, key=itemgetter(0), default=None)
+        return None if best is None or best[3].spline is None else best[1:]
 
     @staticmethod
     def may_refine(found: Spline) -> bool:

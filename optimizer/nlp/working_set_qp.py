@@ -126,16 +126,15 @@ class _Rows:
 
     def add(self, gradients: Array, most: Array, least: Array | None = None, hard: bool = False) -> Index:
         """Add rows with gradients (rows, n) by the scaled variables, and return their numbers."""
-        first, count = len(self.most), len(most)
         self.gradients.append(gradients)
-        if not count:
+        if not (count := len(most)):
             return np.zeros(0, dtype=int)
         self.A = np.concatenate([self.A, gradients @ self.whitening])
         self.least = np.concatenate([self.least, np.full(count, -_INFINITE) if least is None else least])
         self.most = np.concatenate([self.most, most])
         self.hard = np.concatenate([self.hard, np.full(count, hard)])
         self.active = np.concatenate([self.active, np.zeros(count, dtype=bool)])
-        return first + np.arange(count)
+        return len(self.most) - count + np.arange(count)
 
     def add_kinematic(self, gradients: Array, most: Array, places: Places) -> None:
         """Add the rows of places that have none yet."""
@@ -202,8 +201,7 @@ class WorkingSetQP:
         path = self.p.path_rows.active(at.path_values, at.T, NEAR_PATH)
         rows, bounds = self._rows(at, goal, torque, path), np.array(self._bounds(at.free, at.T))
         rows.add_bounds(bounds, self._bounded)
-        gradient, relaxed = at.gradient @ at.whitening, False
-        attempt, last = 0, rounds
+        gradient, relaxed, attempt, last = at.gradient @ at.whitening, False, 0, rounds
         while True:
             attempt += 1
             checkpoint()

@@ -84,6 +84,16 @@ def test_a_free_end_never_needs_more_than_the_one_without_a_turn(seed: int) -> N
         assert np.linalg.norm(off, axis=1).max() < path.position_tolerance
 
 
+def test_past_a_corner_the_free_end_is_no_worse_than_a_given_one() -> None:
+    """Angles are compared by motions of the same fineness: once, a coarse one at a better angle lost to a fine one."""
+    rng = np.random.default_rng(1)
+    turn = Rotation.from_rotvec(rng.uniform(-0.3, 0.3, 3))
+    goal, via = moved(rng.uniform(-0.2, 0.2, 3), turn), moved(rng.uniform(-0.2, 0.2, 3))
+    path = ToolPath(via=[via], blend=0.02, about=Z)
+    given = optimize(along(goal, path=path)).energy.electrical.total
+    assert optimize(along(free(goal), path=path)).energy.electrical.total <= given * (1 + 2e-3)
+
+
 @pytest.mark.parametrize("start", long_but(["joint positions"], ["joint positions", "pose"]))
 def test_no_motion_to_any_angle_at_the_goal_needs_less_than_the_bound(start: str) -> None:
     rng, goal = np.random.default_rng(3), moved([0.1, 0.15, -0.1])
