@@ -29,9 +29,14 @@ def _channels(log: Log, columns: Columns, effort: Group | None) -> Iterator[Chan
         indices = columns.groups.get(group) if group is not None else None
         for j, size in enumerate(noise(values, log.rate)):
             column = None if indices is None else columns.names[indices[j]]
-            low, high = float(values[:, j].min()), float(values[:, j].max())
-            yield Channel(f"{name}{j + 1}", column, units[name], low, high, float(size))
+            yield Channel(f"{name}{j + 1}", column, units[name], *_range(values[:, j]), float(size))
     if log.power is not None:
         column = " · ".join(columns.names[k] for k in columns.groups["power"])
         (size,) = noise(log.power[:, None], log.rate)
-        yield Channel("power", column, "W", float(log.power.min()), float(log.power.max()), float(size))
+        yield Channel("power", column, "W", *_range(log.power), float(size))
+
+
+def _range(values: Array) -> tuple[float, float]:
+    """The least and the greatest of values (n,), with the digits that single precision has."""
+    low, high = (float(f"{each:.7g}") for each in (values.min(), values.max()))
+    return low, high

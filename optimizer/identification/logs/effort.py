@@ -38,7 +38,7 @@ def effort_report(
 ) -> EffortReport:
     """What efforts (n, joints) at q, v, a (n, joints) [rad, s] are."""
     rows = slice(None, None, max(1, -(-len(q) // _MOST_ROWS)))
-    q, v, a, effort = q[rows], v[rows], a[rows], effort[rows]
+    q, v, a, effort = (each[rows].astype(float) for each in (q, v, a, effort))
     model = robot.loaded_model(payload.mass, payload.com, payload.inertia, gravity)
     data = model.createData()
     weights = np.array([pin.computeGeneralizedGravity(model, data, each) for each in q])

@@ -23,6 +23,8 @@ _REGULAR = 1.8  # steps [median steps] up to which a step counts in the mean: no
 _UNIFORM = 1e-3  # deviation [steps] from the grid up to which rows are taken as they are
 _MOST_GROWTH = 2.0  # rows of the grid for each row of the log
 _LATEST = 1e12  # |time| [s]
+_PIECE = 16384  # rows of the grid that a spline is evaluated at
+_BESIDE = 32  # rows of the log beside them: what is farther away changes a cubic spline by less than rounding
 
 
 @dataclass(frozen=True)
@@ -47,9 +49,17 @@ class Grid:
         """Channels (m, k) of the rows on the grid (n, k), linear in between, or if `smooth` by cubic splines."""
         if self.uniform:
             return np.ascontiguousarray(values)
-        result = np.empty((len(self.time), values.shape[1]))
-        for k, column in enumerate(values.T):
-            result[:, k] = CubicSpline(self.at, column)(self.time) if smooth else np.interp(self.time, self.at, column)
+        result = np.empty((len(self.time), values.shape[1]), values.dtype)
+        if not smooth:
+            for k, column in enumerate(values.T):
+                result[:, k] = np.interp(self.time, self.at, column)
+            return result
+        # piece by piece: the spline of a long log would need more memory than the log
+        for start in range(0, len(self.time), _PIECE):
+            time = self.time[start : start + _PIECE]
+            low, high = np.searchsorted(self.at, time[[0, -1]]).tolist()
+            rows = slice(max(low - _BESIDE, 0), high + _BESIDE)
+            result[start : start + _PIECE] = CubicSpline(self.at[rows], values[rows])(time)
         return result
 
 

@@ -27,7 +27,8 @@ class Move:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Log:
-    """One log of the arm `robot`, in SI units. Compared by identity. All arrays are read-only and share their rows.
+    """One log of the arm `robot`, in SI units. Compared by identity. All arrays are read-only and share their rows, in
+    single or double precision.
 
     `time` (n,) [s] is the uniform grid, from 0 in steps of 1 / `rate` [Hz]. `q` [rad], `v` [rad/s] and `a` [rad/s²] are
     (n, joints). `effort` (n, joints) is what `effort_meaning` says: both are None where no effort was logged. `power`
@@ -80,7 +81,7 @@ class Log:
 
 def _view(values: Array, shape: tuple[int, ...], name: str) -> Array:
     """A read-only view: a log can be too large to be copied. Raises InvalidProblem."""
-    view = np.asarray(values, dtype=float).view()
+    view = np.asarray(values, dtype=None if np.asarray(values).dtype == np.float32 else float).view()
     if view.shape != shape:
         raise InvalidProblem(name, f"{name} of a log must have the shape {shape}, not {view.shape}.")
     view.setflags(write=False)

@@ -34,6 +34,9 @@ _MOST_ANGLE = 20 * pi  # rad, ten turns
 _MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
 _MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
+# channels that are differentiated twice, or compared, are kept in double precision; any other has fewer digits than
+# single precision, which takes half of the memory
+_PRECISE: tuple[Group, ...] = ("q", "payload")
 
 
 @dataclass(frozen=True)
@@ -146,18 +149,21 @@ def _channels(source: Path | bytes, robot: Robot, options: LogOptions) -> tuple[
         scales: dict[Group, float] = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
         scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
         # arrays that grow in place: a log can fill half of the memory
-        parts = {group: array("d") for group in where}
-        times, numbers = array("d"), array("d")
+        parts = {group: array("d" if group in _PRECISE else "f") for group in where}
+        times, numbers = array("d"), array("i")
         for lines, block in rows.blocks():
             times.frombytes(block[:, used.index(columns.time)].tobytes())
-            numbers.frombytes(lines.astype(float).tobytes())
-            for group, indices in where.items():
-                parts[group].frombytes((block[:, indices] * scales.get(group, 1.0)).tobytes())
+            numbers.frombytes(lines.astype(np.int32).tobytes())
             _check_sizes(block, lines, rows, where, scales)
+            for group, part in parts.items():
+                values = block[:, where[group]] * scales.get(group, 1.0)
+                part.frombytes(values.astype(part.typecode).tobytes())
             _check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
-    grid = grid_of(np.frombuffer(times), np.frombuffer(numbers), names[columns.time])
-    values = {group: np.frombuffer(part).reshape(-1, len(where[group])) for group, part in parts.items()}
-    return _Channels(grid, columns, values), rows.dropped
+    grid = grid_of(np.frombuffer(times), np.frombuffer(numbers, np.int32), names[columns.time])
+    channels = {
+        group: np.frombuffer(part, part.typecode).reshape(-1, len(where[group])) for group, part in parts.items()
+    }
+    return _Channels(grid, columns, channels), rows.dropped
 
 
 def _check_sizes(

@@ -120,7 +120,7 @@ def _rows_of_log(robot: Robot, log: Log, number: int, moves: int, every: int) ->
     def mean(channel: Array | None, shape: tuple[int, ...]) -> Array:
         if channel is None:
             return np.full((len(starts), *shape), np.nan)
-        return np.asarray(np.mean([channel[starts + k] for k in range(size)], axis=0))
+        return np.asarray(np.mean([channel[starts + k] for k in range(size)], axis=0, dtype=float))
 
     joints = (robot.nq,)
     q, v, a = (mean(channel, joints) for channel in (log.q, log.v, log.a))
