@@ -35,9 +35,10 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     if not known:
         return False
     if len(known) > MOST_ESTIMATED:
-        # the others keep their order, in which neighbours are next to each other
-        most = sorted(each.lower_bound for each in known)[MOST_ESTIMATED]
-        known = [each for each in known if each.lower_bound < most]
+        # many bounds may be the same: zero, where the way down pays for everything. The others keep their order, in
+        # which neighbours are next to each other
+        by_bound = np.lexsort(([each.shortest for each in known], [each.lower_bound for each in known]))
+        known = [known[k] for k in np.sort(by_bound[:MOST_ESTIMATED]).tolist()]
     energy = estimates(prepared, known)
     least = _least(known, energy)
     order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]

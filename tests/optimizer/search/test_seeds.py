@@ -12,11 +12,11 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
+from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.search.run import Run
-from optimizer.search.seeds import MOST_SEEDS, NEAR, activate_seeds, estimates
+from optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
 from optimizer.solution import CandidateStatus
 
 # s: no search comes near it, however busy the machine
@@ -85,6 +85,20 @@ def test_the_next_seeds_follow_until_none_is_left() -> None:
         rounds += 1
         assert rounds <= len(incumbent.candidates)
     assert not any(each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates)
+
+
+def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
+    """On the way down with a heavy payload gravity may pay for everything: most pairs are bounded by zero."""
+    robot = load_robot("panda")
+    arm = Arm(robot=robot, payload=Payload(mass=robot.rated_payload), collisions=False)
+    high, low = np.array([0, 0.2, 0, -0.6, 0, 0.8, 0.785]), np.array([0, 1.2, 0, -1.6, 0, 2.8, 0.785])
+    run = Run(Problem(arm=arm, start=Pose(tcp_pose(arm, high)), goal=Pose(tcp_pose(arm, low)), deadline=AMPLE))
+    run.prepare()
+    incumbent = run.incumbent
+    before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    assert sum(each.lower_bound == 0 for each in before) > MOST_ESTIMATED
+    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
 
 
 def test_an_end_may_slide_onto_a_joint_limit() -> None:
