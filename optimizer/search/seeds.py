@@ -42,7 +42,9 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     energy = estimates(prepared, known)
     least = _least(known, energy)
     order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]
-    chosen = [k for k in order if energy[k] <= NEAR * energy[order[0]]][:MOST_SEEDS]
+    # an energy is negative where the supply takes more back than it gives
+    most = energy[order[0]] + (NEAR - 1) * abs(energy[order[0]])
+    chosen = [k for k in order if energy[k] <= most][:MOST_SEEDS]
     for k in chosen:
         known[k].deferred = False
         known[k].settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)

@@ -13,6 +13,7 @@ from models.robot import Array
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.optimize import optimize
 from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.bus import Bus
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.search.run import Run
@@ -87,18 +88,36 @@ def test_the_next_seeds_follow_until_none_is_left() -> None:
     assert not any(each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates)
 
 
+def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Problem:
+    """With the rated payload from one pose down to another."""
+    robot = load_robot(name)
+    arm = Arm(robot=robot, payload=Payload(mass=robot.rated_payload), collisions=False, bus=bus)
+    start, goal = (Pose(tcp_pose(arm, np.array(q))) for q in (high, low))
+    return Problem(arm=arm, start=start, goal=goal, deadline=AMPLE)
+
+
 def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
-    """On the way down with a heavy payload gravity may pay for everything: most pairs are bounded by zero."""
-    robot = load_robot("panda")
-    arm = Arm(robot=robot, payload=Payload(mass=robot.rated_payload), collisions=False)
-    high, low = np.array([0, 0.2, 0, -0.6, 0, 0.8, 0.785]), np.array([0, 1.2, 0, -1.6, 0, 2.8, 0.785])
-    run = Run(Problem(arm=arm, start=Pose(tcp_pose(arm, high)), goal=Pose(tcp_pose(arm, low)), deadline=AMPLE))
+    """Gravity pays for everything: most pairs are bounded by zero."""
+    run = Run(downwards("panda", [0, 0.2, 0, -0.6, 0, 0.8, 0.785], [0, 1.2, 0, -1.6, 0, 2.8, 0.785], Bus()))
     run.prepare()
     incumbent = run.incumbent
     before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
     assert sum(each.lower_bound == 0 for each in before) > MOST_ESTIMATED
     assert activate_seeds(incumbent.prepared, incumbent.candidates)
     assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
+
+
+def test_motions_that_give_energy_back_have_seeds_too() -> None:
+    bus = Bus(mode="recuperating", efficiency=1.0)
+    asked = downwards("iiwa14", [0, 0.2, 0, -0.5, 0, 0.5, 0], [0, 1.4, 0, -1.2, 0, 0.9, 0], bus)
+    run = Run(asked)
+    run.prepare()
+    incumbent = run.incumbent
+    before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    assert estimates(incumbent.prepared, before).min() < 0
+    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    assert any(not each.deferred for each in before)
+    assert run.search().energy.electrical.total < 0
 
 
 def test_an_end_may_slide_onto_a_joint_limit() -> None:
