@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from optimizer.problem.problem import Problem
 from optimizer.search.run import Run
 from optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
 from optimizer.solution import CandidateStatus
+from optimizer.trajectories.time_scalings import quintic_spline
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -26,6 +29,12 @@ AMPLE = 300.0
 HIGHEST = 1.4
 # m, rad
 HELD = 1e-9
+# s: several times what the motion takes by itself
+SLOW = 8.0
+# relative: an estimate is a quadrature of a few points, of smoothed friction and corners
+FEW_POINTS = 1e-2
+# relative: from a seed, a motion comes to a local optimum
+LOCAL = 0.1
 
 
 def problem_of(name: str, index: int, both: bool = False) -> Problem:
@@ -52,6 +61,29 @@ def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: st
     assert (energy >= np.array([each.lower_bound for each in known])).all()
     least = optimize(run.problem).energy.electrical.total
     assert least <= energy.min() <= HIGHEST * least
+
+
+def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
+    asked = replace(problem_of("panda", 1), duration_min=SLOW, duration_max=SLOW)
+    run = Run(asked)
+    run.prepare()
+    some = run.incumbent.candidates[::9]
+    energy = [
+        run.incumbent.prepared.energy(quintic_spline(each.q_start, each.q_goal, SLOW)).electrical.total for each in some
+    ]
+    np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
+
+
+def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
+    """A posture that needs much more than others on a straight line, and less than these on the best motion."""
+    robot, rng = load_robot("panda"), np.random.default_rng([77, 0])
+    arm, start, goal = Arm(robot=robot), collision_free(rng, robot), collision_free(rng, robot)
+    given: dict[str, Any] = {"arm": arm, "objective": "mechanical", "duration_max": 3.0, "deadline": AMPLE}
+    found = optimize(Problem(start=start, goal=Pose(tcp_pose(arm, goal)), **given))
+    good = np.array([2.4536, -0.9365, -0.8697, -0.7589, -0.7433, 0.4103, 0.4834])
+    assert np.abs(tcp_pose(arm, good) - tcp_pose(arm, goal)).max() < 1e-3
+    known = optimize(Problem(start=start, goal=good, **given))
+    assert found.energy.mechanical.total <= known.energy.mechanical.total * (1 + LOCAL)
 
 
 @pytest.mark.parametrize("both", [False, True], ids=["to a pose", "between poses"])
