@@ -46,6 +46,8 @@ class Payload:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.mass) and self.mass >= 0):
             raise InvalidProblem("payload.mass", "payload.mass must be a finite number of kg, zero or more.")
+        # Pinocchio takes no number of numpy's other types
+        object.__setattr__(self, "mass", float(self.mass))
         object.__setattr__(self, "com", frozen(self.com, (3,), "payload.com"))
         object.__setattr__(self, "inertia", frozen(self.inertia, (3, 3), "payload.inertia"))
         if np.abs(self.inertia - self.inertia.T).max() > 1e-9 * np.abs(self.inertia).max():

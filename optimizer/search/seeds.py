@@ -15,6 +15,7 @@ import numpy as np
 
 from models.robot import Array, Mask
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.ends import EndConfiguration
 from optimizer.solution import CandidateStatus
@@ -27,6 +28,8 @@ TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3
 MOST_ESTIMATED = 384
 # seeds need at most this ratio of the least estimate, and so many of them are solved at a time
 NEAR, MOST_SEEDS = 1.12, 4
+# of mechanical work, the best motions do but a part of what the straight line does, and some a much smaller one
+NEAR_IN_WORK, MOST_SEEDS_FOR_WORK = 2.5, 12
 
 
 def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> bool:
@@ -35,13 +38,17 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     if not known:
         return False
     if len(known) > MOST_ESTIMATED:
-        # the others keep their order, in which neighbours are next to each other
-        most = sorted(each.lower_bound for each in known)[MOST_ESTIMATED]
-        known = [each for each in known if each.lower_bound < most]
+        # many bounds may be the same: zero, where the way down pays for everything. The others keep their order, in
+        # which neighbours are next to each other
+        by_bound = np.lexsort(([each.shortest for each in known], [each.lower_bound for each in known]))
+        known = [known[k] for k in np.sort(by_bound[:MOST_ESTIMATED]).tolist()]
     energy = estimates(prepared, known)
     least = _least(known, energy)
     order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]
-    chosen = [k for k in order if energy[k] <= NEAR * energy[order[0]]][:MOST_SEEDS]
+    near, count = (NEAR_IN_WORK, MOST_SEEDS_FOR_WORK) if _is_work(prepared.problem) else (NEAR, MOST_SEEDS)
+    # an energy is negative where the supply takes more back than it gives
+    most = energy[order[0]] + (near - 1) * abs(energy[order[0]])
+    chosen = [k for k in order if energy[k] <= most][:count]
     for k in chosen:
         known[k].deferred = False
         known[k].settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
@@ -49,19 +56,32 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
 
 
 def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
-    """Energies (n,) [J] of quintics on straight lines, each of its best duration, raised where a torque is too high."""
+    """Objectives (n,) [J] of quintics on straight lines, of the best of a few durations, raised where a torque is too
+    high."""
     q_start, q_goal = (np.array([getattr(each, name) for each in candidates]) for name in ("q_start", "q_goal"))
-    shortest = np.array([each.shortest for each in candidates])[:, None, None]
     (at, rate, acceleration), weights = _quintic()
     way, best = (q_goal - q_start)[:, None], np.full(len(candidates), np.inf)
     q = q_start[:, None] + way * at
-    for scale in TIME_SCALES:
-        T = scale * shortest
+    for durations in _durations(prepared.problem, np.array([each.shortest for each in candidates])):
+        T = durations[:, None, None]
         y = np.concatenate([q, way * rate / T, way * acceleration / T**2], axis=2)
         cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
         beyond = np.abs(tau / prepared.arm.active_limits.tau_max).max(axis=1).reshape(len(candidates), -1).max(axis=1)
-        best = np.minimum(best, T[:, 0, 0] * (cost.reshape(len(candidates), -1) @ weights) * np.maximum(beyond, 1.0))
+        energy = durations * (cost.reshape(len(candidates), -1) @ weights)
+        best = np.minimum(best, energy + np.abs(energy) * np.maximum(beyond - 1, 0.0))
     return best
+
+
+def _durations(problem: Problem, shortest: Array) -> list[Array]:
+    """The durations (n,) [s] that are tried, within those that are allowed; for work the longest one, too."""
+    least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
+    most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    tried = [np.clip(scale * shortest, least, most) for scale in TIME_SCALES]
+    return [*tried, np.full_like(shortest, most)] if _is_work(problem) else tried
+
+
+def _is_work(problem: Problem) -> bool:
+    return problem.objective == "mechanical"
 
 
 @cache

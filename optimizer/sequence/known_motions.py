@@ -105,6 +105,9 @@ def _content(value: Any) -> Iterator[bytes]:
     match value:
         case None | bool() | int() | float() | str() | bytes():
             yield repr(value).encode() + b";"
+        case np.generic():
+            # numbers that a caller took from an array
+            yield from _content(value.item())
         case np.ndarray():
             yield repr((value.dtype.str, value.shape)).encode() + np.ascontiguousarray(value).tobytes()
         case pin.Model():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +14,14 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.optimize import optimize
-from optimizer.problem.arm import Arm
+from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.bus import Bus
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.search.run import Run
-from optimizer.search.seeds import MOST_SEEDS, NEAR, activate_seeds, estimates
+from optimizer.search.seeds import MOST_ESTIMATED, MOST_SEEDS, NEAR, activate_seeds, estimates
 from optimizer.solution import CandidateStatus
+from optimizer.trajectories.time_scalings import quintic_spline
 
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
@@ -25,6 +29,12 @@ AMPLE = 300.0
 HIGHEST = 1.4
 # m, rad
 HELD = 1e-9
+# s: several times what the motion takes by itself
+SLOW = 8.0
+# relative: an estimate is a quadrature of a few points, of smoothed friction and corners
+FEW_POINTS = 1e-2
+# relative: from a seed, a motion comes to a local optimum
+LOCAL = 0.1
 
 
 def problem_of(name: str, index: int, both: bool = False) -> Problem:
@@ -51,6 +61,29 @@ def test_estimates_are_above_the_lower_bounds_and_near_the_least_energy(name: st
     assert (energy >= np.array([each.lower_bound for each in known])).all()
     least = optimize(run.problem).energy.electrical.total
     assert least <= energy.min() <= HIGHEST * least
+
+
+def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
+    asked = replace(problem_of("panda", 1), duration_min=SLOW, duration_max=SLOW)
+    run = Run(asked)
+    run.prepare()
+    some = run.incumbent.candidates[::9]
+    energy = [
+        run.incumbent.prepared.energy(quintic_spline(each.q_start, each.q_goal, SLOW)).electrical.total for each in some
+    ]
+    np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
+
+
+def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
+    """A posture that needs much more than others on a straight line, and less than these on the best motion."""
+    robot, rng = load_robot("panda"), np.random.default_rng([77, 0])
+    arm, start, goal = Arm(robot=robot), collision_free(rng, robot), collision_free(rng, robot)
+    given: dict[str, Any] = {"arm": arm, "objective": "mechanical", "duration_max": 3.0, "deadline": AMPLE}
+    found = optimize(Problem(start=start, goal=Pose(tcp_pose(arm, goal)), **given))
+    good = np.array([2.4536, -0.9365, -0.8697, -0.7589, -0.7433, 0.4103, 0.4834])
+    assert np.abs(tcp_pose(arm, good) - tcp_pose(arm, goal)).max() < 1e-3
+    known = optimize(Problem(start=start, goal=good, **given))
+    assert found.energy.mechanical.total <= known.energy.mechanical.total * (1 + LOCAL)
 
 
 @pytest.mark.parametrize("both", [False, True], ids=["to a pose", "between poses"])
@@ -85,6 +118,38 @@ def test_the_next_seeds_follow_until_none_is_left() -> None:
         rounds += 1
         assert rounds <= len(incumbent.candidates)
     assert not any(each.deferred and each.status is CandidateStatus.UNVISITED for each in incumbent.candidates)
+
+
+def downwards(name: str, high: list[float], low: list[float], bus: Bus) -> Problem:
+    """With the rated payload from one pose down to another."""
+    robot = load_robot(name)
+    arm = Arm(robot=robot, payload=Payload(mass=robot.rated_payload), collisions=False, bus=bus)
+    start, goal = (Pose(tcp_pose(arm, np.array(q))) for q in (high, low))
+    return Problem(arm=arm, start=start, goal=goal, deadline=AMPLE)
+
+
+def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
+    """Gravity pays for everything: most pairs are bounded by zero."""
+    run = Run(downwards("panda", [0, 0.2, 0, -0.6, 0, 0.8, 0.785], [0, 1.2, 0, -1.6, 0, 2.8, 0.785], Bus()))
+    run.prepare()
+    incumbent = run.incumbent
+    before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    assert sum(each.lower_bound == 0 for each in before) > MOST_ESTIMATED
+    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
+
+
+def test_motions_that_give_energy_back_have_seeds_too() -> None:
+    bus = Bus(mode="recuperating", efficiency=1.0)
+    asked = downwards("iiwa14", [0, 0.2, 0, -0.5, 0, 0.5, 0], [0, 1.4, 0, -1.2, 0, 0.9, 0], bus)
+    run = Run(asked)
+    run.prepare()
+    incumbent = run.incumbent
+    before = [each for each in incumbent.candidates if each.deferred and each.status is CandidateStatus.UNVISITED]
+    assert estimates(incumbent.prepared, before).min() < 0
+    assert activate_seeds(incumbent.prepared, incumbent.candidates)
+    assert any(not each.deferred for each in before)
+    assert run.search().energy.electrical.total < 0
 
 
 def test_an_end_may_slide_onto_a_joint_limit() -> None:

@@ -12,6 +12,7 @@ from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.problem import Problem
 from optimizer.problem.scene import Box, Obstacle, Scene
+from optimizer.problem.stops import Stop
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.known_motions import KnownMotion, KnownMotions, knowing
 from optimizer.sequence.round_solution import RoundSolution
@@ -114,3 +115,12 @@ def test_another_question_has_another_key(other: Problem) -> None:
     assert keys("tried", PROBLEM) != keys("tried", other)
     assert keys("tried", PROBLEM) == keys("tried", replace(PROBLEM, arm=replace(PROBLEM.arm), deadline=1.0))
     assert len({keys("tried", PROBLEM), keys("finished", PROBLEM), keys("tried", PROBLEM, 1.0)}) == 3
+
+
+def test_numbers_out_of_arrays_are_numbers() -> None:
+    arm = Arm(robot=ROBOT, payload=Payload(mass=1.0), tcp_speed=0.5)
+    from_arrays = replace(arm, payload=Payload(mass=np.arange(3)[1]), tcp_speed=np.full(1, 0.5, dtype=np.float32)[0])
+    asked = WorkRound(arm=from_arrays, start=HOME, stops=[Stop(name="near", target=HOME + 0.1)], windings=False)
+    assert_true(asked, optimize_round(asked))
+    keys = KnownMotions().key
+    assert keys("tried", replace(PROBLEM, arm=from_arrays)) == keys("tried", replace(PROBLEM, arm=arm))
