@@ -52,6 +52,8 @@ def _constant(log: Log) -> Iterator[str]:
         same = np.flatnonzero(np.ptp(values, axis=0) == 0)
         if same.size:
             yield f"The {words} of joints {_numbers(same)} never changes."
+    if log.power is not None and np.ptp(log.power) == 0:
+        yield "The power never changes."
 
 
 def _saturated(log: Log) -> Iterator[str]:

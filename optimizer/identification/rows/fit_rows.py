@@ -28,6 +28,8 @@ MOST_ROWS, MOST_REGRESSORS = 20_000, 8_000
 STILL = 1e-3
 # rad/s; a slower joint that stands still has no speed but noise
 SLOW = 0.02
+# times the power at rest by the robot's own figures that no mean of a log reaches, nor the same part of it
+FAR_POWER = 20.0
 # a move longer than this [s] is cut into blocks, each of which counts as a move; the pause [s] between them is left out
 LONGEST, BLOCK, PAUSE = 7.5, 5.0, 0.5
 
@@ -76,12 +78,13 @@ class Rows:
 def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
     """The rows of logs of one robot, with the regressor of its links or without.
 
-    Raises InvalidProblem if a log is of another robot, or has other joints."""
+    Raises InvalidProblem if a log is of another robot, has other joints, or a power that is none of the arm's bus."""
     if not logs:
         raise InvalidProblem("logs", "logs must name at least one log.")
     for log in logs:
         if log.robot != robot.name or log.joints != robot.nq:
             raise InvalidProblem("logs", f"A log is of {log.robot} ({log.joints} joints), not of {robot.name}.")
+        _check_power(robot, log)
     meanings = sorted({log.effort_meaning for log in logs if log.effort_meaning is not None})
     if len(meanings) > 1:
         raise InvalidProblem("logs", f"The efforts of the logs must mean the same, not {' and '.join(meanings)}.")
@@ -98,6 +101,20 @@ def rows_of(robot: Robot, logs: Sequence[Log], regressor: bool = False) -> Rows:
     joined = {name: _joined([piece.pop(name) for piece in pieces]) for name in [*pieces[0]]}
     joined["group"] = groups_of_motions(joined["q"], joined["v"], joined["move"], joined["rest"])
     return Rows(**joined, current=meanings == ["current"])
+
+
+def _check_power(robot: Robot, log: Log) -> None:
+    expected = robot.electronics.idle_power + float(robot.drives.inverter_constant.sum())
+    if log.power is None or expected <= 0 or not np.isfinite(log.power).any():
+        return
+    mean = float(np.nanmean(log.power, dtype=float))
+    if not expected / FAR_POWER < mean < FAR_POWER * expected:
+        raise InvalidProblem(
+            "logs",
+            f"The power of {'a log' if log.name is None else log.name} is {mean:.3g} W in the mean, and {robot.name} "
+            f"draws some {expected:.3g} W at rest: this is not the power of the arm's bus in W. Log it in W, with the "
+            "sign that is positive where the arm draws power, or leave its column out.",
+        )
 
 
 def _joined(parts: list[Any]) -> Any:

@@ -241,6 +241,19 @@ def test_power_is_asked_of_logs_that_have_it() -> None:
         fit(ROBOT, [log], Options(fit=("friction", "power")))
 
 
+@pytest.mark.parametrize("factor", [0.0, 1e-3, 1e3, -1.0])
+def test_what_is_no_power_in_watts_is_refused(factor: float) -> None:
+    """Nothing, kW, mW, and the other sign."""
+    log = recorded(ROBOT, truth_of(ROBOT), moves=4).log()
+    assert log.power is not None
+    wrong = replace(log, power=factor * log.power)
+    with pytest.raises(InvalidProblem, match="not the power") as caught:
+        fit(ROBOT, [wrong], WITHOUT_SPLIT)
+    assert caught.value.field == "logs"
+    with pytest.raises(InvalidProblem, match="not the power"):
+        fit(ROBOT, [log], WITHOUT_SPLIT).validate([wrong])
+
+
 def with_outliers(log: Log) -> Log:
     random = np.random.default_rng(1)
     assert log.effort is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -231,10 +232,10 @@ def test_oddities_are_reported(recording: Recording) -> None:
 def test_constant_saturated_and_misfitting_channels(recording: Recording) -> None:
     current = np.clip(recording.current, -2.0, 2.0)
     current[:, 5] = 0.25
-    odd = with_current(recording, current)
+    odd = replace(with_current(recording, current), power=np.full_like(recording.power, 50.0))
     swapped = csv_of(odd).replace(b"v1,v2", b"v2,v1", 1)
     words = " ".join(read(swapped, ROBOT, LogOptions(effort="current")).report.warnings)
-    assert "effort of joints 6 never changes" in words
+    assert "effort of joints 6 never changes" in words and "The power never changes" in words
     assert "stays at its greatest value" in words
     assert "speeds of joints 1, 2 do not fit" in words
 
