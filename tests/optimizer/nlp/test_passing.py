@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from models.robot import Array
 from optimizer.nlp.coordinates import Coordinates
@@ -15,6 +14,7 @@ from optimizer.trajectories import bspline
 from optimizer.trajectories.passing import deviations
 from optimizer.trajectories.spline import spline_of
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
+from tests.optimizer.nlp.second_differences import assert_curvature
 
 ROUNDING = 1e-12
 # relative; of second differences with steps of 1e-3
@@ -65,27 +65,17 @@ def test_steps_in_the_null_space_keep_the_passes_to_second_order() -> None:
 
 
 def test_the_curvature_is_that_of_the_cost_along_the_curves_that_pass() -> None:
-    """Second differences of the cost of curves that are put back on the passes after each step."""
-    own, rng, T = program(), np.random.default_rng(1), 2.0
+    own = program()
     passes = Passes(own, PASSES)
     free, at = passes.put(straight(own))
-    none = np.zeros((len(own.basis.nodes), 6))
-    line = own.derivatives(free, T, none)
-    gradient = line.gradient[:-1].reshape(free.shape)
-    # a cost whose gradient along the passes is zero: else how a step is put back counts, too
-    hessian = line.hessian[:-1, :-1] + at.curvature(gradient, free.size)
     kept = at.null_space(free.size)
-    for _ in range(5):
-        y = rng.normal(size=kept.shape[1])
-        step = (kept @ (y / np.linalg.norm(y))).reshape(free.shape)
-        h = 1e-3
-        sides = [passes.put(free + sign * h * step, at)[0] for sign in (-1, 1)]
-        # what the putting back adds along the passes is a first-order change of the cost
-        drift = sum(sides) - 2 * free
-        along = kept @ (kept.T @ drift.ravel())
-        second = sum(own.value(each, T)[0] for each in sides) - 2 * line.cost - gradient.ravel() @ along
-        exact = float(step.ravel() @ hessian @ step.ravel()) * h * h
-        assert second == pytest.approx(exact, rel=DIFFERENCES, abs=1e-9 * abs(line.cost))
+    steps = kept @ np.random.default_rng(1).normal(size=(kept.shape[1], 5))
+    steps = (steps / np.linalg.norm(steps, axis=0)).T.reshape(-1, *free.shape)
+
+    def drifted(gradient: Array, drift: Array) -> float:
+        return float(gradient.ravel() @ (kept @ (kept.T @ drift.ravel())))
+
+    assert_curvature(own, free, at, lambda moved: passes.put(moved, at)[0], drifted, list(steps), DIFFERENCES)
 
 
 def test_the_solver_ends_on_the_passes_and_slides_along_them() -> None:

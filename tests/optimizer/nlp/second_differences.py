@@ -1,0 +1,43 @@
+"""The curvature of what an NLP holds against second differences of its cost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from models.robot import Array
+from optimizer.nlp.nonlinear_program import NonlinearProgram
+from optimizer.nlp.passing import Passing
+from optimizer.nlp.sliding_ends import Slide
+
+# s, and of a step
+DURATION, STEP = 2.0, 1e-3
+
+
+def assert_curvature(
+    own: NonlinearProgram,
+    free: Array,
+    at: Passing | Slide,
+    put: Callable[[Array], Array],
+    drifted: Callable[[Array, Array], float],
+    steps: Sequence[Array],
+    relative: float,
+) -> None:
+    """Second differences of the cost of motions that are `put` back on what is held at `free` after each of the `steps`
+    (m, r), of length 1, which keep it to first order.
+
+    `drifted` is what the cost changes by to first order, for its gradient and the drift (m, r) along what is held that
+    putting back makes.
+    """
+    line = own.derivatives(free, DURATION, np.zeros((len(own.basis.nodes), own.r)))
+    gradient = line.gradient[:-1].reshape(free.shape)
+    # a cost whose gradient along what is held is zero: else how a step is put back counts, too
+    hessian = line.hessian[:-1, :-1] + at.curvature(gradient, free.size)
+    for step in steps:
+        sides = [put(free + sign * STEP * step) for sign in (-1, 1)]
+        along = drifted(gradient, sum(sides) - 2 * free)
+        second = sum(own.value(each, DURATION)[0] for each in sides) - 2 * line.cost - along
+        exact = float(step.ravel() @ hessian @ step.ravel()) * STEP * STEP
+        assert second == pytest.approx(exact, rel=relative, abs=1e-9 * abs(line.cost))
