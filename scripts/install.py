@@ -12,7 +12,8 @@ import sys
 from pathlib import Path
 
 PIP = [sys.executable, "-m", "pip", "install", "--disable-pip-version-check", "--require-hashes", "--no-deps"]
-PIP += ["--progress-bar", "off"]
+# most modules are never imported: Python compiles those that are, at their first import
+PIP += ["--progress-bar", "off", "--no-compile"]
 # so many lines of pip tell what went wrong
 LAST = 20
 

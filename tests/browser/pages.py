@@ -25,7 +25,8 @@ def until(page: Page, condition: str, patience: float = ANSWER) -> None:
     """Waits until a JavaScript function of the page returns true. The page's own policy forbids `wait_for_function`."""
     end = time.monotonic() + patience
     while not page.evaluate(condition):
-        assert time.monotonic() < end, condition
+        told = [page.locator(box).inner_text() for box in ("#problem", "#status")] if time.monotonic() > end else None
+        assert told is None, (condition, *told)
         page.wait_for_timeout(20)
 
 

@@ -11,8 +11,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from models.registry import load_robot
-from tests.app.live import CLIENT, Server
-from tests.browser.pages import SHOWN, opened, show, state, until
+from tests.app.live import ANSWER, CLIENT, Server
+from tests.browser.pages import SHOWN, ask, opened, show, state, until
 from tests.browser.test_reading import CONTRASTS, LEAST
 from tests.browsers import BROWSER, MISSING
 from tests.identification_logs import csv_of, recorded, truth_of
@@ -85,9 +85,8 @@ def test_a_log_becomes_figures_that_the_next_motion_has(page: Page, service: Ser
     assert not [found for found in page.evaluate(CONTRASTS) if found[1] < LEAST]
     page.get_by_role("button", name="Use these figures").click()
     assert state(page, "request.figures") == found["figures"] and not page.evaluate(OPENED)
-    before = state(page, "answer.id")
-    send(page)
-    until(page, f"() => studio.state.answer.id !== '{before}'")
+    # on a busy machine, the usual deadline may pass without an answer: these figures need a kernel of their own
+    ask(page, state(page, "request") | {"deadline": ANSWER})
     assert state(page, "asked.figures") == found["figures"]
 
 
