@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
@@ -74,7 +74,7 @@ class Method(ABC):
     # energy of the best motion known [J], in the objective: motions that collide and need more are not solved further
     best_known: float = np.inf
     # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any will do
-    other_goals: Sequence[Array] = ()
+    other_goals: Callable[[], Sequence[Array]] = tuple
     # whether the candidate was postponed: then clearance constraints on its own motion were tried in vain
     was_postponed: bool = False
 

@@ -36,7 +36,7 @@ def plan(method: Method) -> PlannedPaths:
         method.q_start,
         method.q_goal,
         method.deadline.within(PLANNING * left) if np.isfinite(left) else method.deadline,
-        method.other_goals,
+        method.other_goals(),
         MOST_STATES if np.isinf(method.best_known) else FEW_STATES,
     )
 

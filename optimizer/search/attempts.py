@@ -65,7 +65,7 @@ def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> Solve
     if best is not None and best.energy is not None:
         solver.best_known = best.energy
     else:
-        solver.other_goals = _other_goals(incumbent, candidate)
+        solver.other_goals = partial(_other_goals, incumbent, candidate)
     solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
     return solver.solve()
 

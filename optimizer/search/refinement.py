@@ -130,7 +130,9 @@ def _table(incumbent: Incumbent, best: Candidate) -> tuple[list[Baseline], Array
     """The baselines from the start of the best candidate, and the nearest goal (nq,) [rad] that they go to."""
     assert best.energy is not None
     prepared, problem = incumbent.prepared, incumbent.problem
-    q_goals = np.array([each.q_goal for each in incumbent.candidates if (each.q_start == best.q_start).all()])
+    candidates = incumbent.candidates
+    beside = (np.array([each.q_start for each in candidates]) == best.q_start).all(axis=1)
+    q_goals = np.array([each.q_goal for each in candidates])[beside]
     oracle = prepared.torques, prepared.potential, prepared.broken_on_the_way
     table = baselines(problem, best.q_start, q_goals, best.duration, best.energy, *oracle)
     return table, nearest(problem, best.q_start, q_goals)
