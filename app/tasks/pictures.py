@@ -5,7 +5,6 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import logging
-import tempfile
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -15,7 +14,7 @@ import models.meshes
 import models.pictures
 from app.engine.result import TaskResult
 from models.pictures import picture, picture_sources
-from optimizer.energy.kernel_cache import cache_directory
+from optimizer.energy.kernel_cache import cache_directory, workplace
 
 logger = logging.getLogger(__name__)
 
@@ -65,8 +64,8 @@ class PictureTask:
 
 def _written(path: Path, content: bytes) -> bytes:
     """Puts the whole file in its place at once: who reads it never sees a part."""
-    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-        part = Path(folder) / path.name
+    with workplace(path) as folder:
+        part = folder / path.name
         part.write_bytes(content)
         part.replace(path)
     return content

@@ -13,7 +13,8 @@ import os
 import shutil
 import subprocess
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -94,9 +95,9 @@ def compile_kernel(robot: Robot) -> Path:
         command = compiler()
         if command is None:
             raise RuntimeError("no C compiler found")
-        with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-            library, seal = Path(folder) / "kernel.so", Path(folder) / "kernel.sha256"
-            source = _write_source(robot, Path(folder))
+        with workplace(target) as folder:
+            library, seal = folder / "kernel.so", folder / "kernel.sha256"
+            source = _write_source(robot, folder)
             run = subprocess.run(
                 [command, *COMPILER_FLAGS, str(source), "-o", str(library), "-lm"], capture_output=True, text=True
             )
@@ -108,6 +109,18 @@ def compile_kernel(robot: Robot) -> Path:
             library.replace(target)
     _prune(target.parent)
     return target
+
+
+@contextmanager
+def workplace(target: Path) -> Iterator[Path]:
+    """An empty folder beside a file of the cache, in which the holder of its lock makes it.
+
+    A process that is killed leaves its folder behind: the next one that makes this file deletes it.
+    """
+    for left in target.parent.glob(f"{target.name}-*.part"):
+        shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f"{target.name}-", suffix=".part") as folder:
+        yield Path(folder)
 
 
 def mark_used(path: Path) -> None:

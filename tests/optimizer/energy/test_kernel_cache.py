@@ -204,6 +204,17 @@ def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, na
 
 
 @pytest.mark.long
+def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
+    target = kernel_cache.library_path(workshop.robot)
+    target.parent.mkdir()
+    with kernel_cache.workplace(target) as folder:
+        (folder / "kernel.c").write_text("half")
+        left = shutil.copytree(folder, f"{folder}-killed.part")
+    assert workshop.leftovers() == [left.removeprefix(f"{target.parent}/")]
+    compile_kernel(workshop.robot)
+    assert workshop.libraries == [str(target)] and not workshop.leftovers()
+
+
 def test_a_short_script_with_an_empty_cache_ends_well(workshop: Workshop) -> None:
     """It has its answer from the virtual machine and does not wait for the compiler, nor stumble over it."""
     code = (
