@@ -3,7 +3,8 @@
     python -m benchmarks.tool_paths --count 50
     python -m benchmarks.tool_paths --count 20 --corners
     python -m benchmarks.tool_paths --count 50 --about
-    python -m benchmarks.tool_paths --count 20 --free-end
+    python -m benchmarks.tool_paths --count 20 --free goal
+    python -m benchmarks.tool_paths --count 20 --free both
 
 From random configurations of a UR5e a straight line leads 0.1 to 0.5 m in a random direction, and the tool turns by up
 to 0.5 rad on the way. With `--corners` a second line of as much length follows, and the corner between them is rounded
@@ -11,9 +12,10 @@ within 40 mm. Paths are drawn until `--count` of them can be followed. `even spe
 on the same path at its fixed tool angle with smooth ramps, over durations and lengths of the ramps, within the limits
 on speed, acceleration, jerk and torque, which the answers keep. `ramps of even acceleration` is the same with ramps of
 a third each and without the limit on jerk, which no such ramp can keep. With `--about` the tool may turn about its own
-axis between the ends of the path: `saved by turns` is against the answer at the fixed tool angle. With `--free-end` the
-goal leaves this rotation free, too: `saved by turns` is against the answer at the fixed tool angle, whose end is turned
-as little as may be, and `saved by the free end` against the answer with turns between this start and this end.
+axis between the ends of the path: `saved by turns` is against the answer at the fixed tool angle. With `--free goal`
+the goal leaves this rotation free, too: `saved by turns` is against the answer at the fixed tool angle, whose end is
+turned as little as may be, and `saved by free ends` against the answer with turns between this start and this end.
+With `--free both` so does the start; then every branch of it is tried in all of these.
 """
 
 from __future__ import annotations
@@ -123,29 +125,33 @@ def smooth(path: Spline, duration: float, ramp: float) -> SampledMotion:
     return SampledMotion(tau * duration, weights * duration, path.curve(s), v, a, *peaks)
 
 
-def measured(problem: Problem, about: bool, free_end: bool) -> dict[str, float]:
-    """The figures of one path. Raises PathInfeasible or NoTrajectory."""
-    turning, free = problem, None
-    if about or free_end:
+def measured(problem: Problem, about: bool, free: str | None) -> dict[str, float]:
+    """The figures of one path, whose ends are `free`: the goal, or both. Raises PathInfeasible or NoTrajectory."""
+    turning, free_start, free_goal = problem, None, None
+    if about or free:
         path = problem.tool_path
         assert path is not None and isinstance(problem.goal, Pose)
-        if free_end:
-            free = ConeOrientedPose.about(problem.goal, np.array(TOOL_AXIS))
-            before = path.via[-1].T if path.via else tcp_pose(problem.arm, np.asarray(problem.start))
-            problem = replace(problem, goal=free.with_orientation(nearest_orientation(free, before[:3, :3])))
+        start = Pose(tcp_pose(problem.arm, np.asarray(problem.start)))
+        if free:
+            free_goal = ConeOrientedPose.about(problem.goal, np.array(TOOL_AXIS))
+            before = path.via[-1].T if path.via else start.T
+            problem = replace(problem, goal=free_goal.with_orientation(nearest_orientation(free_goal, before[:3, :3])))
+        if free == "both":
+            free_start = ConeOrientedPose.about(start, np.array(TOOL_AXIS))
+            problem = replace(problem, start=start)
         turning = replace(problem, tool_path=replace(path, about=TOOL_AXIS))
     began = time.perf_counter()
     answer = fixed = optimize(problem)
     row = {"time [s]": time.perf_counter() - began}
     at_fixed_angle = fixed.energy.electrical.total
-    if about or free_end:
-        between = optimize(turning).energy.electrical.total if free_end else np.nan
+    if about or free:
+        between = optimize(turning).energy.electrical.total if free else np.nan
         began = time.perf_counter()
-        answer = optimize(turning if free is None else replace(turning, goal=free))
+        answer = optimize(replace(turning, start=free_start or turning.start, goal=free_goal or turning.goal))
         row = {"time [s]": time.perf_counter() - began}
         row["saved by turns"] = 1 - answer.energy.electrical.total / at_fixed_angle
-        if free_end:
-            row["saved by the free end"] = 1 - answer.energy.electrical.total / between
+        if free:
+            row["saved by free ends"] = 1 - answer.energy.electrical.total / between
     ratio, energy = answer.certificate.worst_ratio, answer.energy.electrical.total
     row["gap"] = 1 - answer.lower_bound / energy
     row["deviation [m]"] = ratio["path_position"] * ToolPath().position_tolerance
@@ -161,7 +167,7 @@ def main() -> None:
     arguments.add_argument("--count", type=int, default=50, help="paths that can be followed (%(default)s)")
     arguments.add_argument("--corners", action="store_true", help="two lines with a rounded corner")
     arguments.add_argument("--about", action="store_true", help="the tool may turn about its own axis")
-    arguments.add_argument("--free-end", action="store_true", help="its angle about this axis is free at the goal, too")
+    arguments.add_argument("--free", choices=["goal", "both"], help="ends where its angle about this axis is free, too")
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
@@ -171,7 +177,7 @@ def main() -> None:
     refused, failed, held = 0, 0, 0
     for problem in tasks(given.seed, given.corners):
         try:
-            row = measured(problem, given.about, given.free_end)
+            row = measured(problem, given.about, given.free)
         except PathInfeasible:
             refused += 1
             continue

@@ -170,7 +170,6 @@ class _Replay:
             each.T if isinstance(each, Pose) else each if isinstance(each, ConeOrientedPose) else self.tcp_pose(each)
             for each in (single(problem.start), single(problem.goal))
         )
-        assert not isinstance(start, ConeOrientedPose)
         course = ToolCourse.of(path, start, goal)
         instants = np.append(np.arange(0, len(self.q) - 1, len(self.q) // ON_PATH + 1), len(self.q) - 1)
         T = np.array([self.tcp_pose(self.q[k]) for k in instants])

@@ -68,12 +68,12 @@ class PreparedProblem(Plant):
         path, start, goal = self.problem.tool_path, self.problem.start, self.problem.goal
         if path is None:
             return None
-        if isinstance(goal, ConeOrientedPose):
-            return ToolCourse.of(path, self._pose(start), goal)
         return ToolCourse.of(path, self._pose(start), self._pose(goal))
 
-    def _pose(self, end: Target) -> Array:
-        """T_base_tcp (4, 4) at an end that is a pose or joint positions."""
+    def _pose(self, end: Target) -> Array | ConeOrientedPose:
+        """T_base_tcp (4, 4) at an end that is a pose or joint positions; the end itself if a rotation is free there."""
+        if isinstance(end, ConeOrientedPose):
+            return end
         return end.T if isinstance(end, Pose) else tcp_pose(self.arm, np.asarray(end))
 
     @cached_property

@@ -89,9 +89,9 @@ class PathTolerance(Request):
     )
     about: Axis | None = described(
         "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must to follow the path, "
-        "and as needs least energy. `rotation` is for the direction of this axis then. At the start the tool has its "
-        "full orientation; at the end, too, but for a `goal` of `POST /optimize` whose orientation is `free_about` the "
-        "same axis. Null: the orientation is that of the path.",
+        "and as needs least energy. `rotation` is for the direction of this axis then. At both ends "
+        "the tool has its full orientation, but for a `start` or `goal` of `POST /optimize` whose orientation is "
+        "`free_about` the same axis. Null: the orientation is that of the path.",
         "1",
         [0.0, 0.0, 1.0],
         default=None,

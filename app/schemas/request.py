@@ -45,7 +45,8 @@ class PoseTarget(Request):
     """A target as a pose of the TCP. Every arm configuration that reaches it is a candidate."""
 
     pose: TargetPose = described(
-        "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal may be free in part.",
+        "Pose of the TCP in the robot's base frame, or in its `frame`. The orientation of a goal may be free in part, "
+        "and that of a start with a `path`.",
         None,
         {"position": [0.4, -0.2, 0.3], "quaternion": [0, 1, 0, 0]},
     )
@@ -243,7 +244,7 @@ class OptimizeRequest(MotionRequest):
     )
     path: Path | None = described(
         "How the TCP goes from `start` to `goal`, which are joint positions or one pose each then. The orientation of "
-        "the goal may be `free_about` the axis `tolerance.about`. `method` and `windings` do not matter. Null: the "
+        "either may be `free_about` the axis `tolerance.about`. `method` and `windings` do not matter. Null: the "
         "motion is free.",
         None,
         {"tolerance": {"position": 1e-4}},

@@ -20,7 +20,7 @@ from optimizer.kinematics import newton
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.tcp import flange_pose, tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
-from optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_through
+from optimizer.kinematics.turning_sheet import TurningSheet, shortest, turning_of, turning_through, values_of
 from optimizer.problem.arm import Arm
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline
@@ -39,6 +39,8 @@ FIRST_SPANS, MOST_SPANS, SAMPLES_IN_SPAN, SHARE = 2, 500, 2, 0.5
 
 # values by which a turning is given: the first that leads to the end of the course counts
 KNOTS = (10, 18, 34)
+# longest step [rad] of a turn of the tool at the start
+TURN_STEP = 0.1
 
 Obstacle = Literal["unreachable", "singular"]
 
@@ -71,42 +73,80 @@ def chain_of(robot: Robot) -> Chain:
 def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
     """The course followed from each configuration q_start (n, nq) [rad] of its first pose.
 
-    Where the tool may turn about an axis, it does so where the course cannot be followed without.
+    Where the tool may turn about an axis, it does so where the course cannot be followed without. From a free start it
+    turns evenly to the end, or not at all if that is free, too.
     """
-    found = _traces(arm, course, q_start)
+    if course.free_start and course.turning is None:
+        return _evenly_turned(arm, course, q_start)
+    found = _traces(arm, [course], q_start)
     if course.path.about is None or course.turning is not None:
         return found
-    return [each if each.obstacle is None else _with_turning(arm, course, each) for each in found]
+    return [each if each.obstacle is None else with_turning(arm, course, each) for each in found]
 
 
-def _with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
-    """The trace of a turning with which the course is followed to its end; if there is none, how far it is followed."""
-    sheet = TurningSheet.of(arm, chain_of(arm.robot), course, stopped.q[0])
-    chosen = sheet.least(shortest, course.free_end)
+def _evenly_turned(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
+    turned = np.array([_angle_at(arm, course, q) for q in q_start])
+    free = course.free_end, course.free_start
+    angles = np.linspace(turned, turned * course.free_end, KNOTS[0], axis=1)
+    courses = [replace(course, turning=turning_of(values_of(each, *free), *free)) for each in angles]
+    found = zip(courses, _traces(arm, courses, q_start), strict=True)
+    return [replace(trace, turning=own.turning) for own, trace in found]
+
+
+def _angle_at(arm: Arm, course: ToolCourse, q_start: Array) -> float:
+    """The angle [rad] by which the tool is turned at the start of a course in a configuration q_start (nq,) [rad]."""
+    return course.angle_at_start(tcp_pose(arm, q_start)) if course.free_start else 0.0
+
+
+def turned_start(arm: Arm, course: ToolCourse, q_start: Array, before: float, after: float) -> Array | None:
+    """The configuration (nq,) [rad] to which the arm turns the tool at the start of a course, from q_start (nq,) at one
+    angle [rad] to another one; None if it cannot."""
+    chain, q = chain_of(arm.robot), q_start
+    (T,) = replace(course, turning=None).poses(np.zeros(1))
+    angles = np.linspace(before, after, int(np.ceil(abs(after - before) / TURN_STEP)) + 1)[1:]
+    for pose in flange_pose(course.turned(np.tile(T, (len(angles), 1, 1)), angles), arm.T_flange_tcp):
+        (found,), (missed,) = newton.solved(chain, q[None], pose)
+        if missed > REACHED or np.abs(found - q).max() > JUMP:
+            return None
+        q = found
+    return q
+
+
+def with_turning(arm: Arm, course: ToolCourse, stopped: Trace) -> Trace:
+    """The trace of a turning with which the course is followed to its end, where another one is `stopped` on the way.
+
+    If there is none: how far the course is followed.
+    """
+    angle = _angle_at(arm, course, stopped.q[0])
+    sheet = TurningSheet.of(arm, chain_of(arm.robot), course, stopped.q[0], turned=angle)
+    chosen = sheet.least(shortest, course.free_end, course.free_start)
     for knots in KNOTS if chosen is not None else ():
-        turning = turning_through(sheet.at, sheet.angles[chosen], knots, course.free_end)
-        (trace,) = _traces(arm, replace(course, turning=turning), stopped.q[:1])
+        turning = turning_through(sheet.at, sheet.angles[chosen], knots, course.free_end, course.free_start)
+        q_start = turned_start(arm, course, stopped.q[0], angle, float(turning(0.0)))
+        if q_start is None:
+            continue
+        (trace,) = _traces(arm, [replace(course, turning=turning)], q_start[None])
         if trace.obstacle is None:
             return replace(trace, turning=turning)
     return replace(stopped, farthest=sheet.reached if chosen is None else 0.0)
 
 
-def _traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
-    """The course with its turning, if any, followed from each start.
+def _traces(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> list[Trace]:
+    """A course with its turning, if any, followed from each start: one for all, or one each, of the same shape.
 
     Where joints move far from point to point, it is followed once more with more points.
     """
-    at = course.grid(ON_PIECE, STEP)
-    found = _traced(arm, course, q_start, at)
+    found = _traced(arm, courses, q_start, courses[0].grid(ON_PIECE, STEP))
     coarse = [k for k, each in enumerate(found) if len(each.q) > 1 and np.abs(np.diff(each.q, axis=0)).max() > FAR]
     if coarse:
-        finer = _traced(arm, course, q_start[coarse], course.grid(FINER * ON_PIECE, STEP / FINER))
+        own = courses if len(courses) == 1 else [courses[k] for k in coarse]
+        finer = _traced(arm, own, q_start[coarse], courses[0].grid(FINER * ON_PIECE, STEP / FINER))
         found = [finer[coarse.index(k)] if k in coarse else each for k, each in enumerate(found)]
     return found
 
 
-def _traced(arm: Arm, course: ToolCourse, q_start: Array, at: Array) -> list[Trace]:
-    poses, chain = course.poses(at), chain_of(arm.robot)
+def _traced(arm: Arm, courses: Sequence[ToolCourse], q_start: Array, at: Array) -> list[Trace]:
+    poses, chain = np.stack([course.poses(at) for course in courses]), chain_of(arm.robot)
     q = np.full((len(q_start), len(at), q_start.shape[1]), np.nan)
     q[:, 0] = q_start
     last, obstacle = np.zeros(len(q_start), dtype=int), list[Obstacle | None]([None] * len(q_start))
@@ -116,7 +156,8 @@ def _traced(arm: Arm, course: ToolCourse, q_start: Array, at: Array) -> list[Tra
         guess = before = q[going, k - 1]
         if k > 1:
             guess = before + (before - q[going, k - 2]) * ((at[k] - at[k - 1]) / (at[k - 1] - at[k - 2]))
-        found, missed = newton.solved(chain, guess, flange_pose(poses[k], arm.T_flange_tcp))
+        pose = poses[0, k] if len(courses) == 1 else poses[going, k]
+        found, missed = newton.solved(chain, guess, flange_pose(pose, arm.T_flange_tcp))
         jumped = np.abs(found - before).max(axis=1) > JUMP
         for node, is_missed, is_jump in zip(going, missed > REACHED, jumped, strict=True):
             if is_missed or is_jump:

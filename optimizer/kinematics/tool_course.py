@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -15,6 +16,8 @@ from optimizer.kinematics.course_shapes import Shape, shape_of
 from optimizer.kinematics.orientation_tolerance import nearest_orientation
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
+
+Side = Literal["start", "goal"]
 
 # poses of the course that a motion is compared with, on each piece of its shape at least, and the way between two [m]
 # at most
@@ -39,27 +42,32 @@ class ToolCourse:
     by_distance: tuple[Array, Array] | None = None
     # the angle [rad] by which the tool is turned about the path's free axis at a fraction of the way; None: by none
     turning: CubicSpline | None = None
-    # whether the tool may be turned about this axis at the goal, too
+    # whether the tool may be turned about this axis at the start and at the goal, too
+    free_start: bool = False
     free_end: bool = False
     # the part of the shape that the course follows, from one fraction to another one, in this direction
     first: float = 0.0
     last: float = 1.0
 
     @classmethod
-    def of(cls, path: ToolPath, T_start: Array, goal: Array | ConeOrientedPose) -> ToolCourse:
-        """The course of a path, or a section of it, from the pose T_start (4, 4) to a `goal`.
+    def of(cls, path: ToolPath, start: Array | ConeOrientedPose, goal: Array | ConeOrientedPose) -> ToolCourse:
+        """The course of a path, or a section of it, from a `start` to a `goal`.
 
-        The goal is a pose (4, 4). Or the rotation about the path's free axis is free there: then the tool turns as
-        little as may be from the pose before.
+        Both are poses (4, 4). Or the rotation about the path's free axis is free there: then the tool turns as little
+        as may be to the pose after the start, and from the one before the goal.
 
         Raises InvalidProblem; see `shape_of`. The ramps of a path must leave something between them.
         """
         if path.section is not None:
-            T_start, goal = path.section.start.T, path.section.goal.T
-        known, free_end = [T_start, *(pose.T for pose in path.via)], isinstance(goal, ConeOrientedPose)
+            start, goal = path.section.start.T, path.section.goal.T
+        free_start, free_end = (isinstance(end, ConeOrientedPose) for end in (start, goal))
+        poses = [start, *(pose.T for pose in path.via), goal]
+        if isinstance(start, ConeOrientedPose):
+            after = poses[1]
+            poses[0] = _turned_least(start, np.eye(3) if isinstance(after, ConeOrientedPose) else after[:3, :3])
         if isinstance(goal, ConeOrientedPose):
-            goal = goal.with_orientation(nearest_orientation(goal, known[-1][:3, :3])).T
-        course = cls(path, shape_of(path, np.array([*known, goal])), free_end=free_end)
+            poses[-1] = _turned_least(goal, np.asarray(poses[-2])[:3, :3])
+        course = cls(path, shape_of(path, np.array(poses)), free_start=free_start, free_end=free_end)
         if path.least_speed is not None:
             course = course._by_distance()
         if path.section is not None:
@@ -71,6 +79,12 @@ class ToolCourse:
     def part(self, first: float, last: float) -> ToolCourse:
         """The course from one fraction of the whole way to another one."""
         return replace(self, first=first, last=last)
+
+    @property
+    def free_sides(self) -> list[Side]:
+        """The ends at which the tool may be turned about the path's free axis."""
+        free: dict[Side, bool] = {"start": self.free_start, "goal": self.free_end}
+        return [side for side, is_free in free.items() if is_free]
 
     @property
     def length(self) -> float:
@@ -120,6 +134,11 @@ class ToolCourse:
         T = T.copy()
         T[:, :3, :3] @= Rotation.from_rotvec(angle[:, None] * np.array(self.path.about)).as_matrix()
         return T
+
+    def angle_at_start(self, T: Array) -> float:
+        """The angle [rad] about the path's free axis by which a pose T (4, 4) at a free start is turned."""
+        turned = self.poses(np.zeros(1))[0, :3, :3].T @ T[:3, :3]
+        return float(Rotation.from_matrix(turned).as_rotvec() @ np.array(self.path.about))
 
     def deviation(self, T: Array) -> tuple[Array, Array]:
         """How far poses T (k, 4, 4) of a motion and the course are from each other: at most so many metres and radians.
@@ -204,3 +223,8 @@ class ToolCourse:
         if self.path.about is not None:
             return np.hstack([T[:, :3, 3], TURNING * T[:, :3, :3] @ np.array(self.path.about)])
         return np.hstack([T[:, :3, 3], TURNING / np.sqrt(2) * T[:, :3, :3].reshape(len(T), 9)])
+
+
+def _turned_least(end: ConeOrientedPose, R: Array) -> Array:
+    """The pose (4, 4) at an end whose orientation is nearest to R (3, 3)."""
+    return end.with_orientation(nearest_orientation(end, R)).T

@@ -46,16 +46,25 @@ class TurningSheet:
 
     @classmethod
     def of(
-        cls, arm: Arm, chain: Chain, course: ToolCourse, q_start: Array, steps: int = STEPS, most: float = np.pi
+        cls,
+        arm: Arm,
+        chain: Chain,
+        course: ToolCourse,
+        q_start: Array,
+        steps: int = STEPS,
+        most: float = np.pi,
+        turned: float = 0.0,
     ) -> TurningSheet:
         """The sheet of a course, from a configuration q_start (nq,) [rad] of its first pose.
 
-        It has angles up to `most` [rad] to either side.
+        This pose is `turned` by an angle [rad]. The sheet has angles up to `most` [rad] to either side.
         """
+        most = max(most, abs(turned))
         at, angles = np.linspace(0.0, 1.0, steps), np.linspace(-most, most, ANGLES)
         q = np.full((steps, ANGLES, len(q_start)), np.nan)
-        q[0, ANGLES // 2] = q_start
-        poses = course.poses(at)
+        first, poses = int(np.abs(angles - turned).argmin()), course.poses(at)
+        T_first = flange_pose(course.turned(poses[:1], angles[[first]]), arm.T_flange_tcp)
+        q[0, first] = q_start if angles[first] == turned else _followed(chain, q_start[None], T_first)[0]
         for k in range(steps):
             checkpoint()
             T = flange_pose(course.turned(np.tile(poses[k], (ANGLES, 1, 1)), angles), arm.T_flange_tcp)
@@ -84,16 +93,19 @@ class TurningSheet:
         return float(self.at[np.isfinite(self.q[:, :, 0]).any(axis=1)].max(initial=0.0))
 
     def least(
-        self, cost: Callable[[Array, Array, npt.NDArray[np.intp]], Array], free_end: bool = False
+        self,
+        cost: Callable[[Array, Array, npt.NDArray[np.intp]], Array],
+        free_end: bool = False,
+        free_start: bool = False,
     ) -> npt.NDArray[np.intp] | None:
-        """The numbers (s,) of the angles of the turning of least cost that begins without a turn.
+        """The numbers (s,) of the angles of the turning of least cost that begins and ends without a turn.
 
-        It ends without one, too, or at any angle if its end is free.
+        Where the start or the end is free, it begins or ends at any angle.
         `cost` gives that of steps from q to others (n, nq) [rad] from the points (n,) of the way. None if no turning
         leads to the end.
         """
         middle, steps = ANGLES // 2, len(self.at) - 1
-        reached = np.full(ANGLES, np.inf)
+        reached = np.where(free_start & np.isfinite(self.q[0, :, 0]), 0.0, np.inf)
         reached[middle] = 0.0
         came = np.zeros((steps, ANGLES), dtype=np.intp)
         weights = self._weights(cost)
@@ -130,23 +142,31 @@ def shortest(first: Array, second: Array, at: npt.NDArray[np.intp]) -> Array:
     return np.asarray(((second - first) ** 2).sum(axis=1))
 
 
-def turning_through(at: Array, angle: Array, knots: int, free_end: bool = False) -> CubicSpline:
+def turning_through(
+    at: Array, angle: Array, knots: int, free_end: bool = False, free_start: bool = False
+) -> CubicSpline:
     """A smooth turning near angles (k,) [rad] at fractions (k,), by values at `knots` even fractions; see
     `turning_of`."""
-    x = np.linspace(0.0, 1.0, knots)
-    units = CubicSpline(x, np.eye(knots), bc_type=_NATURAL if free_end else _AT_REST)(at)
-    chosen = units[:, 1:] if free_end else units[:, 1:-1]
-    return turning_of(np.asarray(np.linalg.lstsq(chosen, angle, rcond=None)[0], dtype=float), free_end)
+    x, natural = np.linspace(0.0, 1.0, knots), free_end or free_start
+    units = CubicSpline(x, np.eye(knots), bc_type=_NATURAL if natural else _AT_REST)(at)
+    chosen = units[:, 0 if free_start else 1 : knots if free_end else -1]
+    return turning_of(np.asarray(np.linalg.lstsq(chosen, angle, rcond=None)[0], dtype=float), free_end, free_start)
 
 
-def turning_of(values: Array, free_end: bool = False) -> CubicSpline:
-    """The turning with values (k,) [rad] at even fractions after the start, where it is zero.
+def turning_of(values: Array, free_end: bool = False, free_start: bool = False) -> CubicSpline:
+    """The turning with values (k,) [rad] at even fractions between the start and the end, where it is zero.
 
-    The last value is that at the end if this is free, and an even turning is one of them. Else it is zero there, too,
-    and the turning begins and ends at rest.
+    The first value is that at the start, and the last one that at the end, if this is free: then an even turning is one
+    of them. Else the turning begins and ends at rest.
     """
-    angles = np.concatenate([[0.0], values, [] if free_end else [0.0]])
-    return CubicSpline(np.linspace(0.0, 1.0, len(angles)), angles, bc_type=_NATURAL if free_end else _AT_REST)
+    angles = np.concatenate([[] if free_start else [0.0], values, [] if free_end else [0.0]])
+    natural = free_end or free_start
+    return CubicSpline(np.linspace(0.0, 1.0, len(angles)), angles, bc_type=_NATURAL if natural else _AT_REST)
+
+
+def values_of(angles: Array, free_end: bool = False, free_start: bool = False) -> Array:
+    """The values (k,) [rad] of a turning, of its angles at even fractions, both ends included: see `turning_of`."""
+    return angles[0 if free_start else 1 : len(angles) if free_end else -1]
 
 
 def _followed(chain: Chain, q: Array, T: Array) -> Array:

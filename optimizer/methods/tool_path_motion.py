@@ -18,7 +18,7 @@ from optimizer.methods.even_speed import EvenSpeed
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
 from optimizer.methods.path_retiming import PathRetiming
 from optimizer.methods.sqp_method import with_effort
-from optimizer.methods.tool_turning import TurnedToEnd, turned_paths
+from optimizer.methods.tool_turning import TurnedAtEnd, turned_paths
 from optimizer.problem.tool_path import ToolPath
 from optimizer.trajectories import quintic, ramped
 from optimizer.trajectories.bspline import DEGREE, Basis, clamped
@@ -110,42 +110,46 @@ class ToolPathMotion(Method):
 
         The path of the best one is kept if it needs less than `least` [J]; and no other is looked for again.
         """
-        prepared, best = self.prepared, least
+        prepared, best, q_start = self.prepared, least, self.q_start
         assert prepared.course is not None
-        prepared.choose(self.q_start)
+        prepared.choose(q_start)
 
         def is_best(trace: Trace, path: Spline, result: SolveResult) -> bool:
             nonlocal best
             results.append(result)
             cost = prepared.cost_of(result.spline)
-            if cost >= best:
+            if result.spline is None or cost >= best:
                 return False
             best = cost
-            prepared.choose(self.q_start, trace, path)
+            # a motion of its control points begins there
+            for first in (trace.q[0], result.spline.control_points[0]):
+                prepared.choose(first, trace, path)
             return True
 
-        found = self._at_best_angle(results) if prepared.course.free_end else None
-        if found is not None:
-            trace, path, coarse = found
-            assert coarse.spline is not None
-            own = _on_path(path, *sampled(coarse.spline))
-            fine = self._clear(self._kept(path, self.interval, scaling, own))
-            if any([is_best(trace, path, coarse), is_best(trace, path, fine)]):
-                law = own
-        for trace, path in turned_paths(prepared, self.q_start, self.q_goal, *law):
+        for side in prepared.course.free_sides:
+            found = self._at_best_angle(TurnedAtEnd(prepared, q_start, self.q_goal, side), results)
+            if found is not None:
+                trace, path, coarse = found
+                assert coarse.spline is not None
+                own = _on_path(path, *sampled(coarse.spline))
+                fine = self._clear(self._kept(path, self.interval, scaling, own))
+                if any([is_best(trace, path, coarse), is_best(trace, path, fine)]):
+                    q_start, law = trace.q[0], own
+        for trace, path in turned_paths(prepared, q_start, self.q_goal, *law):
             is_best(trace, path, self._clear(self._kept(path, self.interval, scaling, law)))
 
-    def _at_best_angle(self, results: list[SolveResult]) -> tuple[Trace, Spline, SolveResult] | None:
-        """The trace, the joints' path and a motion at the best angle of the tool at the end; None if there is none.
+    def _at_best_angle(
+        self, turned: TurnedAtEnd, results: list[SolveResult]
+    ) -> tuple[Trace, Spline, SolveResult] | None:
+        """The trace, the joints' path and a motion at the best angle of the tool at an end; None if there is none.
 
         All angles, the present one included, are compared by motions of the first time scaling. The effort for them
         goes into `results`.
         """
         found = list[tuple[float, Trace, Spline, SolveResult]]()
-        to_end = TurnedToEnd(self.prepared, self.q_start)
 
         def cost(angle: float) -> float:
-            followed = to_end.at(angle)
+            followed = turned.by(angle)
             if followed is None:
                 return np.inf
             result = self._clear(self._kept(followed[1], self.interval, self._scaling(1)))

@@ -20,9 +20,10 @@ from optimizer.energy.bus_flow import drawn_at
 from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import power_flow
 from optimizer.kinematics import newton
-from optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, within
+from optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, turned_start, within
 from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through
+from optimizer.kinematics.tool_course import Side
+from optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through, values_of
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.quadrature import simpson_weights
 from optimizer.trajectories.spline import Spline
@@ -44,8 +45,8 @@ def turned_paths(
 ) -> Iterator[tuple[Trace, Spline]]:
     """Traces and joint paths of turnings from q_start to q_goal (nq,) [rad] that should need less; the better one last.
 
-    If the end of the course is free, they lead to any angle there. `s` (k,) are the fractions of the course at times t
-    (k,) [s] of a motion.
+    If an end of the course is free, they begin or end at any angle there. `s` (k,) are the fractions of the course at
+    times t (k,) [s] of a motion.
     """
     law, known = _TimeLaw(prepared, q_start, s, t), _known(prepared, q_start)
     wanted, coarse = None if law.course.free_end else q_goal, law.coarse()
@@ -55,41 +56,58 @@ def turned_paths(
             yield followed
 
 
-class TurnedToEnd:
-    """Paths from q_start (nq,) [rad] that end at other angles of a course whose end is free: the tool turns evenly to
-    them, beside what it turns now."""
+class TurnedAtEnd:
+    """Paths from q_start to q_goal (nq,) [rad] that have another angle of the tool at the `side` of a course that is
+    free: the tool turns evenly from or to it, beside what it turns now."""
 
-    def __init__(self, prepared: PreparedProblem, q_start: Array) -> None:
+    def __init__(self, prepared: PreparedProblem, q_start: Array, q_goal: Array, side: Side) -> None:
+        assert prepared.course is not None
         self.prepared, self.q_start, self.known = prepared, q_start, _known(prepared, q_start)
+        self.free = prepared.course.free_end, prepared.course.free_start
+        self.q_goal, self.side = None if prepared.course.free_end else q_goal, side
 
-    def at(self, angle: float) -> tuple[Trace, Spline] | None:
-        """The trace and the joint path that end at an angle [rad] to the present one; None if the arm cannot follow
-        them."""
+    def by(self, angle: float) -> tuple[Trace, Spline] | None:
+        """The trace and the joint path at an angle [rad] to the present one; None if the arm cannot follow them."""
         x = self.known.x
-        return _followed(self.prepared, self.q_start, None, turning_of((self.known(x) + angle * x)[1:], free_end=True))
+        angles = self.known(x) + angle * (x if self.side == "goal" else 1 - x)
+        turning = turning_of(values_of(angles, *self.free), *self.free)
+        return _followed(self.prepared, self.q_start, self.q_goal, turning)
 
 
 def _known(prepared: PreparedProblem, q_start: Array) -> CubicSpline:
     """The turning with which the course is followed from q_start (nq,) [rad]."""
     assert prepared.course is not None
-    free_end = prepared.course.free_end
-    return prepared.traces[q_start.tobytes()].turning or turning_of(np.zeros(KNOTS - 2 + free_end), free_end)
+    free = prepared.course.free_end, prepared.course.free_start
+    return prepared.traces[q_start.tobytes()].turning or turning_of(np.zeros(KNOTS - 2 + sum(free)), *free)
 
 
 def _followed(
     prepared: PreparedProblem, q_start: Array, q_goal: Array | None, turning: CubicSpline
 ) -> tuple[Trace, Spline] | None:
     """The trace and the joint path of a turning from q_start to q_goal (nq,) [rad]; None if it leads elsewhere, or the
-    arm cannot follow it. Without q_goal it may lead anywhere."""
+    arm cannot follow it. Without q_goal it may lead anywhere. From a free start, it begins where the tool is turned to
+    from q_start."""
     assert prepared.course is not None
     course, limits = replace(prepared.course, turning=turning), prepared.arm.active_limits
-    (trace,) = traces(prepared.arm, course, q_start[None])
+    first = _first_of(prepared, q_start, turning)
+    if first is None:
+        return None
+    (trace,) = traces(prepared.arm, course, first[None])
     trace = replace(trace, turning=turning)
     leads_there = q_goal is None or np.abs(trace.q[-1] - q_goal).max() < SAME
     if trace.obstacle is not None or not leads_there or not within(trace, limits.q_min, limits.q_max):
         return None
     path = joint_path(prepared.arm, course, trace)
     return None if path is None else (trace, path)
+
+
+def _first_of(prepared: PreparedProblem, q_start: Array, turning: CubicSpline) -> Array | None:
+    """The configuration (nq,) [rad] in which a turning begins, near q_start (nq,); None if there is none."""
+    assert prepared.course is not None
+    if not prepared.course.free_start:
+        return q_start
+    before = float(_known(prepared, q_start)(0.0))
+    return turned_start(prepared.arm, prepared.course, q_start, before, float(turning(0.0)))
 
 
 class _TimeLaw:
@@ -107,10 +125,11 @@ class _TimeLaw:
 
     def coarse(self) -> CubicSpline | None:
         """The turning of least cost by dynamic programming; None if there is none but the one without a turn."""
-        way_back = 1 if self.course.free_end else 2
-        most = min(float(self.prepared.arm.active_limits.v_max.max() * self.t[-1] / way_back), np.pi)
+        free = self.course.free_end, self.course.free_start
+        most = min(float(self.prepared.arm.active_limits.v_max.max() * self.t[-1] / (1 if any(free) else 2)), np.pi)
         steps = FIRST_STEPS + BEND_STEPS * self.course.shape.bends
-        sheet = TurningSheet.of(self.prepared.arm, self.chain, self.course, self.q_start, steps, most)
+        turned = float(_known(self.prepared, self.q_start)(0.0))
+        sheet = TurningSheet.of(self.prepared.arm, self.chain, self.course, self.q_start, steps, most, turned)
         sheet = sheet.without(self._excluded)
         lengths = np.diff(np.interp(sheet.at, self.s, self.t))
 
@@ -118,17 +137,17 @@ class _TimeLaw:
             v = (second - first) / np.maximum(lengths[k], 1e-9)[:, None]
             return lengths[k] * self._drawn((first + second) / 2, v, np.zeros_like(v))
 
-        chosen = sheet.least(cost, self.course.free_end)
-        if chosen is None or (chosen == chosen[0]).all():
+        chosen = sheet.least(cost, *free)
+        if chosen is None or (not self.course.free_start and (chosen == chosen[0]).all()):
             return None
-        return turning_through(sheet.at, sheet.angles[chosen], KNOTS, self.course.free_end)
+        return turning_through(sheet.at, sheet.angles[chosen], KNOTS, *free)
 
     def refined(self, turning: CubicSpline) -> CubicSpline:
         """The turning near another one that needs the least with this time law."""
-        angles = turning(turning.x)
-        values = angles[1:] if self.course.free_end else angles[1:-1]
-        q = self._configurations(values[None], self._first(turning))[0]
-        if not np.isfinite(q).all():
+        free = self.course.free_end, self.course.free_start
+        values, near = values_of(turning(turning.x), *free), self._first(turning)
+        q = None if near is None else self._configurations(values[None], near)[0]
+        if q is None or not np.isfinite(q).all():
             return turning
         first = max(abs(float(self._costs(q[None])[0])), 1e-9)
         best = [q]
@@ -143,17 +162,21 @@ class _TimeLaw:
             return float(values[0]), (values[1:] - values[0]) / STEP
 
         found = minimize(cost, values, jac=True, method="L-BFGS-B", options={"maxiter": ITERATIONS, "ftol": PROGRESS})
-        return turning_of(np.asarray(found.x, dtype=float), self.course.free_end)
+        return turning_of(np.asarray(found.x, dtype=float), *free)
 
-    def _first(self, turning: CubicSpline) -> Array:
-        """Configurations (INSTANTS, nq) [rad] of a turning, followed from the start."""
-        (trace,) = traces(self.prepared.arm, replace(self.course, turning=turning), self.q_start[None])
+    def _first(self, turning: CubicSpline) -> Array | None:
+        """Configurations (INSTANTS, nq) [rad] of a turning, followed from its start; None without a start."""
+        first = _first_of(self.prepared, self.q_start, turning)
+        if first is None:
+            return None
+        (trace,) = traces(self.prepared.arm, replace(self.course, turning=turning), first[None])
         return np.stack([np.interp(self.at, trace.at, q) for q in trace.q.T], axis=1)
 
     def _configurations(self, values: Array, near: Array) -> Array:
         """Configurations (n, INSTANTS, nq) [rad] of turnings by their values (n, k), near others; NaN where none is."""
         count, nq = len(values), near.shape[1]
-        angles = np.concatenate([turning_of(each, self.course.free_end)(self.at) for each in values])
+        free = self.course.free_end, self.course.free_start
+        angles = np.concatenate([turning_of(each, *free)(self.at) for each in values])
         T = flange_pose(self.course.turned(np.tile(self.poses, (count, 1, 1)), angles), self.prepared.arm.T_flange_tcp)
         q, missed = newton.solved(self.chain, np.tile(near, (count, 1)), T, steps=20)
         q[missed > REACHED] = np.nan

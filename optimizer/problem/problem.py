@@ -38,7 +38,7 @@ class Problem:
 
     With a `tool_path` the TCP goes along it from `start` to `goal`, which are a pose or joint positions each: only the
     branch and the timing are free, and `method` and `windings` do not matter. If the tool may turn about an axis on the
-    way, the goal may leave the rotation about it free.
+    way, start and goal may leave the rotation about it free: a `ConeOrientedPose` each.
 
     With `passes`, joint positions (nq,) [rad], the motion passes through them in their order, at times that are free;
     then start and goal are joint positions, too, and `method` does not matter.
@@ -69,7 +69,8 @@ class Problem:
 
     def __post_init__(self) -> None:
         for name in ("start", "goal"):
-            object.__setattr__(self, name, validated(self.arm, name, getattr(self, name)))
+            end = validated(self.arm, name, getattr(self, name), on_path=self.tool_path is not None)
+            object.__setattr__(self, name, end)
         for name in ("duration_min", "duration_max"):
             value = getattr(self, name)
             if value is not None and not (np.isfinite(value) and value > 0):
@@ -78,10 +79,11 @@ class Problem:
             raise InvalidProblem("duration", "duration.min must not exceed duration.max.")
         if self.tool_path is not None:
             for name in ("start", "goal"):
-                if isinstance(getattr(self, name), AnyOf):
+                end = getattr(self, name)
+                if isinstance(end, AnyOf):
                     raise InvalidProblem(name, f"With a path, {name} must be one pose or joint positions.")
-            if isinstance(self.goal, ConeOrientedPose):
-                self.tool_path.check_free_goal(self.goal)
+                if isinstance(end, ConeOrientedPose):
+                    self.tool_path.check_free(name, end)
             self.tool_path.check_speed(self.arm.tcp_speed)
         passed = tuple(validated(self.arm, f"passes.{k}", q) for k, q in enumerate(self.passes))
         object.__setattr__(self, "passes", passed)

@@ -49,14 +49,16 @@ def single(target: Target) -> Single:
     return target
 
 
-def validated(arm: Arm, name: str, target: Target) -> Target:
+def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Target:
     """The target `name` (start or goal) of a problem, with its joint positions as read-only arrays.
 
-    Raises InvalidProblem, also for a start with an orientation tolerance, and OutsideLimits for joint positions out of
-    range. Joint positions of an AnyOf may be out of range: they count as unreachable.
+    Raises InvalidProblem, also for a start with an orientation tolerance unless it is `on_path`, and OutsideLimits for
+    joint positions out of range. Joint positions of an AnyOf may be out of range: they count as unreachable.
     """
-    if name == "start" and any(isinstance(member, ConeOrientedPose) for member in members(target)):
-        raise InvalidProblem(name, "Only a goal's orientation may be free: give the start's in full.")
+    if name == "start" and not on_path and any(isinstance(member, ConeOrientedPose) for member in members(target)):
+        raise InvalidProblem(
+            name, "Only a goal's orientation may be free, or a start's with a path: give the start's in full."
+        )
     if isinstance(target, AnyOf):
         nq = (arm.robot.nq,)
         fields = [f"{name}.any_of.{k}.q" for k in range(len(target.targets))]

@@ -106,14 +106,17 @@ class ToolPath:
                 f'tolerance, {self.position_tolerance:g} m, one path for each line, or the shape "curve".',
             )
 
-    def check_free_goal(self, goal: ConeOrientedPose) -> None:
-        """Raises InvalidProblem unless the rotation about the path's free axis is all that the goal leaves free."""
-        along = 0.0 if self.about is None else abs(float(goal.axis @ np.array(self.about)))
-        if goal.half_angle > 0 or along < 1 - SAME_AXIS:
+    def check_free(self, name: str, end: ConeOrientedPose) -> None:
+        """Raises InvalidProblem unless the rotation about the path's free axis is all that an end leaves free.
+
+        `name` is that of the end: start or goal.
+        """
+        along = 0.0 if self.about is None else abs(float(end.axis @ np.array(self.about)))
+        if end.half_angle > 0 or along < 1 - SAME_AXIS:
             raise InvalidProblem(
-                "goal.pose.orientation",
-                "With a path, the goal's orientation may be free about the axis path.tolerance.about alone: give the "
-                "same axis as free_about, or the orientation in full.",
+                f"{name}.pose.orientation",
+                f"With a path, the {name}'s orientation may be free about the axis path.tolerance.about alone: give "
+                "the same axis as free_about, or the orientation in full.",
             )
 
     def check_speed(self, most: float | None) -> None:

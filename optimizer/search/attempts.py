@@ -80,8 +80,9 @@ def _attempted(
     solver, prepared = solver_of(incumbent, candidate, interval), incumbent.prepared
     sliding = released(prepared, candidate, solver)
     result = in_time(incumbent, partial(attempt, solver))
-    # the turn of the tool along a path is chosen, and with it where the path may end
-    turned = incumbent.problem.tool_path is not None and candidate.goal.tolerance is not None
+    # the turn of the tool along a path is chosen, and with it where the path begins and ends
+    free = candidate.start.tolerance is not None or candidate.goal.tolerance is not None
+    turned = incumbent.problem.tool_path is not None and free
     if result.spline is None or not (sliding or turned):
         return result, candidate
     moved = moved_to(prepared, incumbent.candidates, candidate, result.spline)

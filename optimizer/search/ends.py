@@ -63,22 +63,24 @@ def ends(prepared: PreparedProblem, name: str) -> tuple[list[EndConfiguration], 
 
 
 def ends_of(
-    prepared: PreparedProblem, name: str, target: Target
+    prepared: PreparedProblem, name: str, target: Target, samples: int = SAMPLES
 ) -> tuple[list[EndConfiguration], list[UnreachableTarget]]:
     """The branches of a target, called `name`, that the problem allows; and its members without any.
+
+    Of all of its poses of free orientation together so many `samples` are taken, or a few more.
 
     Raises NoReachableTarget if none of several targets has a branch; for a single pose UnreachablePose (also if the
     branch asked for does not reach it) or SingularPose; InvalidProblem for a pose of an arm without inverse kinematics.
     """
     if not isinstance(target, AnyOf):
-        return _ends_of(prepared, name, target, 0), []
+        return _ends_of(prepared, name, target, 0, samples), []
     tolerance = sum(isinstance(member, ConeOrientedPose) for member in target.targets)
     reached: list[EndConfiguration] = []
     unreachable: list[UnreachableTarget] = []
     for index, member in enumerate(target.targets):
         checkpoint()
         try:
-            reached += _ends_of(prepared, name, member, index, max(SAMPLES // max(tolerance, 1), LEAST_SAMPLES))
+            reached += _ends_of(prepared, name, member, index, max(samples // max(tolerance, 1), LEAST_SAMPLES))
         except (UnreachablePose, SingularPose, OutsideLimits) as error:
             unreachable.append(UnreachableTarget(name, index, str(error)))
     if not reached:

@@ -92,7 +92,7 @@ def family_bound(
     a deadline, give a weaker bound; the search ends once it reaches `enough` [J], after FEW rounds once it is within
     the share `nearly` of that.
     """
-    return _BoxSearch(_Family(prepared, pose, given), starts, half).run(rounds, deadline, enough, nearly)
+    return _BoxSearch(Family(prepared, pose, given), starts, half).run(rounds, deadline, enough, nearly)
 
 
 def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array | None) -> Array:
@@ -101,6 +101,20 @@ def _greatest_potentials(prepared: PreparedProblem, centre: Array, half: Array |
     if half is None:
         return potentials
     return np.asarray(potentials + half @ potential_rates(prepared.model, prepared.arm.gravity))
+
+
+def whole_turns(nq: int, along: int) -> tuple[Array, Array]:
+    """Middles and half sides (b, nq) [rad] of boxes that cover one turn of every joint, so many along each inner
+    one."""
+    inner, side = max(nq - OUTER, 0), np.pi / along
+    one_side = -np.pi + side * (2 * np.arange(along) + 1)
+    # both ways of bending the wrist
+    parts = np.array(list(product(*[one_side] * inner, *[(-np.pi / 2, np.pi / 2)] * (nq > OUTER))))
+    centre, half = np.zeros((len(parts), nq)), np.full((len(parts), nq), np.pi)
+    if nq > OUTER:
+        centre[:, :inner], half[:, :inner] = parts[:, :inner], side
+        centre[:, inner + 1], half[:, inner + 1] = parts[:, inner], np.pi / 2
+    return centre, half
 
 
 @dataclass(frozen=True)
@@ -129,7 +143,7 @@ class _Boxes:
 class _BoxSearch:
     """Branch and bound over boxes for one family of goal configurations."""
 
-    def __init__(self, family: _Family, starts: Array, half: Array | None) -> None:
+    def __init__(self, family: Family, starts: Array, half: Array | None) -> None:
         self.family, self.starts = family, starts
         self.start_half = np.zeros_like(starts) if half is None else half
         self.potentials = _greatest_potentials(family.prepared, starts, half)
@@ -153,26 +167,13 @@ class _BoxSearch:
         nq, count = self.starts.shape[1], len(self.starts)
         inner = max(nq - OUTER, 0)
         along = next((n for n in FIRST_BOXES if 2 * n**inner * count <= MOST_FIRST), FIRST_BOXES[-1])
-        side = np.pi / along
-        one_side = -np.pi + side * (2 * np.arange(along) + 1)
-        # both ways of bending the wrist
-        parts = np.array(list(product(*[one_side] * inner, *[(-np.pi / 2, np.pi / 2)] * (nq > OUTER))))
-        centre, half = np.zeros((len(parts), nq)), np.full((len(parts), nq), np.pi)
-        if nq > OUTER:
-            centre[:, :inner], half[:, :inner] = parts[:, :inner], side
-            centre[:, inner + 1], half[:, inner + 1] = parts[:, inner], np.pi / 2
-        start = np.repeat(np.arange(count), len(parts))
+        centre, half = whole_turns(nq, along)
+        start = np.repeat(np.arange(count), len(centre))
         return self.bounded(start, np.tile(centre, (count, 1)), np.tile(half, (count, 1)))
 
     def halved(self, boxes: _Boxes) -> _Boxes:
-        """Both halves of every box, split along the side that moves the TCP most."""
-        widest = (np.minimum(boxes.half, WIDE) * self.family.weights).argmax(axis=1)
-        rows = np.arange(len(widest))
-        step = np.zeros_like(boxes.half)
-        step[rows, widest] = boxes.half[rows, widest] / 2
-        start = np.concatenate([boxes.start, boxes.start])
-        centre = np.concatenate([boxes.centre - step, boxes.centre + step])
-        halves = self.bounded(start, centre, np.concatenate([boxes.half - step, boxes.half - step]))
+        """Both halves of every box, with their bounds."""
+        halves = self.bounded(np.tile(boxes.start, 2), *halved(self.family, boxes.centre, boxes.half))
         # the bound of a part is at least that of the whole
         value = np.maximum(halves.value, np.concatenate([boxes.value, boxes.value]))
         return _Boxes(halves.start, halves.centre, halves.half, value)
@@ -187,7 +188,7 @@ class _BoxSearch:
 
 
 @dataclass(frozen=True)
-class _Family:
+class Family:
     """The configurations that reach a pose with any orientation that it allows. `given`: see `EndCurves`."""
 
     prepared: PreparedProblem
@@ -223,6 +224,10 @@ class _Family:
         """Path of the TCP [m/rad] per joint (nq,), nearly; 0 for a joint that the pose leaves free."""
         return np.where(self._boxes.free, 0.0, self._boxes.levers + RADIAN)
 
+    def sizes(self, half: Array) -> Array:
+        """How much the sides of boxes, by their halves (b, nq) [rad], move the TCP (b, nq) [m], nearly."""
+        return np.minimum(half, WIDE) * self.weights
+
     def settled(self, half: Array) -> bool:
         """Whether a box of half sides (nq,) [rad] is not worth splitting."""
         return bool(half[~self._boxes.free].max(initial=0.0) < SMALLEST)
@@ -250,8 +255,11 @@ class _Family:
         (b, nq)."""
         limits = self.prepared.arm.active_limits
         displacement, possible = least_displacement(limits, starts, start_halves, centres, halves, self.given)
-        lowest = np.maximum(self._boxes.least_potential(centres, halves), self._hanging(centres, halves))
-        return np.where(possible, self._bound.of(displacement, lowest - potentials), np.inf)
+        return np.where(possible, self._bound.of(displacement, self.lowest(centres, halves) - potentials), np.inf)
+
+    def lowest(self, centres: Array, halves: Array) -> Array:
+        """Least potential energy (b,) [J] of configurations of the pose in boxes (b, nq), or less."""
+        return np.maximum(self._boxes.least_potential(centres, halves), self._hanging(centres, halves))
 
     def _hanging(self, centres: Array, halves: Array) -> Array:
         """Bound (b,) [J] on the potential energy in boxes, whatever the wrist does: it hangs from the inner joints, and
@@ -267,3 +275,11 @@ class _Family:
             # as low as it can hang from the wrist, and as low as it can be about the goal
             lowest += body.mass * np.maximum(hanging - body.reach * strength, body.least_potential)
         return lowest
+
+
+def halved(family: Family, centre: Array, half: Array) -> tuple[Array, Array]:
+    """Both halves (2 b, nq) of boxes (b, nq), split along the side that moves the TCP most: the lower ones first."""
+    widest, rows = family.sizes(half).argmax(axis=1), np.arange(len(half))
+    step = np.zeros_like(half)
+    step[rows, widest] = half[rows, widest] / 2
+    return np.concatenate([centre - step, centre + step]), np.tile(half - step, (2, 1))

@@ -11,17 +11,22 @@ from models.robot import Array, Limits
 from optimizer.deadline import Deadline
 from optimizer.exceptions import PathAttempt, PathInfeasible
 from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.course_tracing import Trace, traces, turned, within
+from optimizer.kinematics.course_tracing import Trace, traces, turned, with_turning, within
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target
-from optimizer.search.candidates import Candidate, bound, pairs
-from optimizer.search.ends import EndConfiguration, ends, label_of
+from optimizer.search.candidates import Candidate, Reason, bound, pairs
+from optimizer.search.ends import EndConfiguration, ends, ends_of, label_of
+from optimizer.search.free_ends_bound import backwards, bound_between
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.missed_branches import bound_of_others
+from optimizer.solution import CandidateStatus
 
 # rad: where a path leads, and joint positions that are given for its end
 SAME = 1e-6
+# samples of a start whose orientation is free, of any rotation: of one about an axis a quarter of them
+ANGLES = 48
 
 
 def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
@@ -31,9 +36,9 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     """
     course, limits = prepared.course, prepared.arm.active_limits
     assert course is not None
-    starts, _ = ends(prepared, "start")
+    starts, _ = ends_of(prepared, "start", prepared.problem.start, ANGLES)
     found, attempts = list[Candidate](), list[PathAttempt]()
-    for start, trace in zip(starts, traces(prepared.arm, course, np.array([each.q for each in starts])), strict=True):
+    for start, trace in zip(starts, _traces(prepared, starts), strict=True):
         choices = _choices(start, trace, prepared.problem.goal)
         whole = trace if start.fixed else turned(trace, limits.q_min, limits.q_max, choices)
         if trace.obstacle is None and whole is not None and within(whole, limits.q_min, limits.q_max):
@@ -48,24 +53,54 @@ def path_candidates(prepared: PreparedProblem) -> list[Candidate]:
     return found
 
 
+def _traces(prepared: PreparedProblem, starts: Sequence[EndConfiguration]) -> list[Trace]:
+    """The tool path as it is followed from each start.
+
+    From a free start the tool turns evenly; where no angle of a branch leads to the end so, as it must from one.
+    """
+    course, arm = prepared.course, prepared.arm
+    assert course is not None
+    found = traces(arm, course, np.array([each.q for each in starts]))
+    if not course.free_start:
+        return found
+    followed = {start.label for start, trace in zip(starts, found, strict=True) if trace.obstacle is None}
+    for k, start in enumerate(starts):
+        if start.label not in followed:
+            followed.add(start.label)
+            found[k] = with_turning(arm, course, found[k])
+    return found
+
+
 def bound_beside(prepared: PreparedProblem, followed: Sequence[Candidate], deadline: Deadline, enough: float) -> float:
     """Lower bound [J] on motions along the tool path to which none of the `followed` candidates leads.
 
     A path may come so near to a singularity that a motion within its tolerance goes on in another branch than the one
     that was followed; and of a self-motion at its start only samples were followed. So this is the bound of all motions
-    between the first pose and the last one, in any other configurations; and where the goal leaves a rotation free, of
+    between the first pose and the last one, in any other configurations; and where an end leaves a rotation free, of
     all of them: that of these ends once it reaches `enough` [J].
     """
-    free = PreparedProblem.of(replace(prepared.problem, tool_path=None))
+    start, goal = prepared.problem.start, prepared.problem.goal
+    if isinstance(start, ConeOrientedPose) and isinstance(goal, ConeOrientedPose):
+        known = replace(prepared.problem, tool_path=None, start=followed[0].q_start)
+        return bound_between(PreparedProblem.of(known), start, goal, deadline, enough)
+    if isinstance(start, ConeOrientedPose):
+        return _bound_to_free(backwards(prepared.problem, goal, start), followed[0].start, deadline, enough)
+    problem = replace(prepared.problem, tool_path=None)
+    if isinstance(goal, ConeOrientedPose):
+        return _bound_to_free(problem, followed[0].goal, deadline, enough)
+    free = PreparedProblem.of(problem)
     starts, _ = ends(free, "start")
-    if isinstance(prepared.problem.goal, ConeOrientedPose):
-        goal = followed[0].goal
-        anywhere = [Candidate(start, goal, start.q, goal.q) for start in starts]
-        return min(family_bound_of(free, anywhere, deadline, enough), bound_of_others(free, anywhere, deadline))
     candidates = pairs(free, starts, ends(free, "goal")[0])
     bound(free, candidates)
     others = (each.lower_bound for each in candidates if not each.sampled and not _is_among(each, followed))
     return min([bound_of_others(free, candidates, deadline), *others])
+
+
+def _bound_to_free(problem: Problem, goal: EndConfiguration, deadline: Deadline, enough: float) -> float:
+    """Lower bound [J] on motions to any configuration of a goal that is free in part, of which one is given."""
+    prepared = PreparedProblem.of(problem)
+    anywhere = [Candidate(start, goal, start.q, goal.q) for start in ends(prepared, "start")[0]]
+    return min(family_bound_of(prepared, anywhere, deadline, enough), bound_of_others(prepared, anywhere, deadline))
 
 
 def _is_among(pair: Candidate, followed: Sequence[Candidate]) -> bool:
@@ -92,7 +127,11 @@ def _candidate(prepared: PreparedProblem, start: EndConfiguration, trace: Trace)
         start.target,
         given if isinstance(given, ConeOrientedPose) else None,
     )
-    return Candidate(start, goal, q_start, q_goal)
+    candidate = Candidate(start, goal, q_start, q_goal)
+    if start.tolerance is not None:
+        candidate.deferred = True
+        candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
+    return candidate
 
 
 def _choices(start: EndConfiguration, trace: Trace, goal: Target) -> list[list[float]]:

@@ -35,9 +35,9 @@ CLOSE, MIDDLES = 1e-3, 4
 def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
     """Bound [J] on motions between targets of which at least one is held on a self-motion; inf if there are none.
 
-    Goals of free orientation are left to `free_goal_bound`.
+    Ends of free orientation are left to `free_goal_bound` and `free_ends_bound`.
     """
-    pairs = [each for each in candidates if each.sampled and each.goal.tolerance is None]
+    pairs = [each for each in candidates if each.sampled and not (each.start.tolerance or each.goal.tolerance)]
     if not pairs:
         return np.inf
     return _CellSearch(

@@ -1,0 +1,141 @@
+"""A lower bound on motions between two poses, of which the start, or both, leave the rotation about an axis free.
+
+The bound of a motion grows with the displacement of its joints and with its gain of potential energy; it has no
+direction. So a motion from a free start has that of its way back under gravity turned round: a motion to a free goal.
+Where both ends are free, the boxes of joint positions of each end are halved until they are small: then the bound of a
+pair of them says something. Pairs with the least bounds are halved further, the end that moves the TCP more first. See
+`free_goal_bound`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import prod
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.collision.bodies import Indices
+from optimizer.deadline import Deadline
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import Target
+from optimizer.search.ends import within_cone
+from optimizer.search.free_goal_bound import FEW, NEARLY, ROUNDS, SPLIT, TIGHT_ROUNDS, Family, halved, whole_turns
+from optimizer.search.least_displacement import least_displacement
+from optimizer.search.lower_bound import LeastBound
+
+# boxes along each inner joint at first, of either end; how often they are halved before they are paired, as long as an
+# end has not more boxes, nor both together more pairs
+ALONG, HALVINGS, MOST_BOXES, MOST_PAIRS = 2, 21, 2000, 50_000
+
+
+def backwards(problem: Problem, start: Target, goal: Target) -> Problem:
+    """The problem of the way back, from `start` to `goal`, under gravity turned round: its motions have the bounds of
+    those there."""
+    arm = replace(problem.arm, gravity=-np.asarray(problem.arm.gravity))
+    return replace(problem, arm=arm, start=start, goal=goal, tool_path=None)
+
+
+def bound_between(
+    prepared: PreparedProblem, start: ConeOrientedPose, goal: ConeOrientedPose, deadline: Deadline, enough: float
+) -> float:
+    """Lower bound [J] on motions from any configuration of `start` to any of `goal`; the search for it ends once it
+    reaches `enough` [J]."""
+    search = _PairSearch(prepared, within_cone(prepared, start), within_cone(prepared, goal))
+    tight = prepared.problem.bound == "tight"
+    return search.run(TIGHT_ROUNDS if tight else ROUNDS, deadline, enough, 0.0 if tight else NEARLY)
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Pairs of boxes: middles and half sides (b, 2, nq) [rad] at the start and the goal, and the bound (b,) [J]."""
+
+    centre: Array
+    half: Array
+    value: Array
+
+    def __getitem__(self, chosen: Indices) -> _Pairs:
+        return _Pairs(self.centre[chosen], self.half[chosen], self.value[chosen])
+
+    def joined(self, other: _Pairs) -> _Pairs:
+        """These pairs, then the others."""
+        return _Pairs(
+            np.concatenate([self.centre, other.centre]),
+            np.concatenate([self.half, other.half]),
+            np.concatenate([self.value, other.value]),
+        )
+
+
+class _PairSearch:
+    """Branch and bound over pairs of boxes."""
+
+    def __init__(self, prepared: PreparedProblem, start: ConeOrientedPose, goal: ConeOrientedPose) -> None:
+        problem = prepared.problem
+        back = PreparedProblem.of(backwards(problem, problem.start, problem.goal))
+        self.limits, self.bound = prepared.arm.active_limits, LeastBound(prepared)
+        # the highest that the start can be is the lowest under gravity turned round
+        self.families = Family(back, start, False), Family(prepared, goal, False)
+
+    def run(self, rounds: int, deadline: Deadline, enough: float, nearly: float) -> float:
+        """The least bound [J] of any pair after at most so many rounds of halving, or once it is enough."""
+        pairs = self._first()
+        for n in range(rounds):
+            pairs = pairs[np.flatnonzero(np.isfinite(pairs.value))]
+            order = np.argsort(pairs.value, kind="stable")
+            will_do = enough if n < FEW else enough - nearly * abs(enough)
+            if not len(order) or pairs.value[order[0]] >= will_do or deadline.passed:
+                break
+            least = pairs.half[order[0]]
+            if all(family.settled(half) for family, half in zip(self.families, least, strict=True)):
+                break
+            pairs = pairs[order[SPLIT:]].joined(self._halved(pairs[order[:SPLIT]]))
+        return float(pairs.value.min(initial=np.inf))
+
+    def _first(self) -> _Pairs:
+        """Pairs that cover every position of the joints at both ends: of the smallest boxes of which there are not too
+        many."""
+        nq = len(self.limits.q_min)
+        sides = [_held(family, *whole_turns(nq, ALONG)) for family in self.families]
+        chosen = sides
+        for _ in range(HALVINGS):
+            sides = [_held(family, *halved(family, *side)) for family, side in zip(self.families, sides, strict=True)]
+            counts = [len(centre) for centre, _ in sides]
+            if max(counts) > MOST_BOXES:
+                break
+            if prod(counts) <= MOST_PAIRS:
+                chosen = sides
+        a, b = (each.ravel() for each in np.indices([len(centre) for centre, _ in chosen]))
+        centre, half = (np.stack([chosen[0][k][a], chosen[1][k][b]], axis=1) for k in (0, 1))
+        return _Pairs(centre, half, self._bounds(centre, half))
+
+    def _halved(self, pairs: _Pairs) -> _Pairs:
+        """Both halves of every pair, split along the side of the box that moves the TCP most."""
+        sizes = np.stack([family.sizes(pairs.half[:, k]) for k, family in enumerate(self.families)], axis=1)
+        end = sizes.max(axis=2).argmax(axis=1)
+        centre, half = np.tile(pairs.centre, (2, 1, 1)), np.tile(pairs.half, (2, 1, 1))
+        held, ends = np.ones(len(centre), dtype=bool), np.tile(end, 2)
+        for k, family in enumerate(self.families):
+            own = np.flatnonzero(ends == k)
+            if len(own):
+                parts = halved(family, pairs.centre[end == k, k], pairs.half[end == k, k])
+                centre[own, k], half[own, k], held[own] = family.narrowed(*parts)
+        # the bound of a part is at least that of the whole
+        value = np.tile(pairs.value, 2)
+        value[held] = np.maximum(value[held], self._bounds(centre[held], half[held]))
+        return _Pairs(centre, half, np.where(held, value, np.inf))
+
+    def _bounds(self, centre: Array, half: Array) -> Array:
+        """Bounds (b,) [J] on motions between boxes (b, 2, nq)."""
+        displacement, possible = least_displacement(
+            self.limits, centre[:, 0], half[:, 0], centre[:, 1], half[:, 1], given=False
+        )
+        lowest = [family.lowest(centre[:, k], half[:, k]) for k, family in enumerate(self.families)]
+        return np.where(possible, self.bound.of(displacement, lowest[1] + lowest[0]), np.inf)
+
+
+def _held(family: Family, centre: Array, half: Array) -> tuple[Array, Array]:
+    """Those of boxes (b, nq) [rad] that may hold configurations of a family, narrowed."""
+    centre, half, held = family.narrowed(centre, half)
+    return centre[held], half[held]
