@@ -251,8 +251,7 @@ def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
     assert against(found)["stopping"] >= -ROUNDING
 
 
-def test_the_certified_speed_at_a_pass_is_that_of_the_spline() -> None:
-    """Passes of one motion follow each other in time, and payloads are those of the way."""
+def test_a_pass_carries_what_its_motion_carries() -> None:
     stops = [
         Stop(name="pick", target=Q[0], payload=PART),
         Stop(name="by", target=Q[1], passed=True),
