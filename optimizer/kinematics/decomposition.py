@@ -30,7 +30,7 @@ from optimizer.kinematics.jacobians import geometric_jacobian
 from optimizer.kinematics.joint_axes import JointAxes
 from optimizer.kinematics.named_branches import NamedBranches, in_order, numbered
 from optimizer.kinematics.newton import EXACT, solved
-from optimizer.kinematics.spherical_wrist import ALIGNED, SphericalWrist
+from optimizer.kinematics.spherical_wrist import ALIGNED, LABELS, SphericalWrist, branch_numbers
 from optimizer.kinematics.ur_closed_form import URClosedForm
 from optimizer.kinematics.valley import along_valleys
 from optimizer.kinematics.wrist_angles import WristAngles
@@ -128,9 +128,11 @@ class DecomposedArm:
 
     def _solve(self, matrix: bytes) -> _Found:
         T = np.frombuffer(matrix).reshape(4, 4)
+        rows = self._rows(T)
+        if (found := self._regular(rows, T)) is not None:
+            return found
         if self._wrist is not None and self._wrist.wrist.turns_freely(T):
             raise SingularPose("goal", 0.0)
-        rows = self._rows(T)
         motions, q, frames = list[AlignedWrist](), rows, link_frames(self._chain.placements, rows)
         if self._wrist is not None and len(rows):
             sines = self._wrist.sines(frames, T)
@@ -155,6 +157,21 @@ class DecomposedArm:
             order = sorted(range(len(q)), key=lambda k: (str(names[k]), *q[k].tolist()))
             q, labels = q[order], [names[k] for k in order]
         return _Found(q, labels, motions)
+
+    def _regular(self, rows: Array, T: Array) -> _Found | None:
+        """The rows (n, 6), if all are exact, each of a branch of its own, and far from any singularity; else None.
+
+        Nearly every pose of an arm with a spherical wrist is so.
+        """
+        if self._wrist is None or not len(rows) or np.abs(rows).max() > np.pi:
+            return None
+        measures = self._wrist.wrist.measures(rows)
+        if np.abs(measures).min() < REGULAR or np.abs(self._chain.flange(rows) - T).max() > IMPROVED / 2:
+            return None
+        numbers = branch_numbers(measures)
+        order = numbers.argsort()
+        branches = numbers[order].tolist()
+        return _Found(rows[order], [LABELS[k] for k in branches], []) if len(set(branches)) == len(branches) else None
 
     def _is_twice_singular(self, rows: Array, sines: Array) -> bool:
         """Whether two singularities meet in one of rows (n, 6), whose wrist angles have the sines (n,).

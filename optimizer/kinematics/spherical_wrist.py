@@ -11,14 +11,16 @@ a spherical wrist" (2014).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from math import atan2, hypot, sqrt
+from typing import get_args
 
 import numpy as np
 
 from models.robot import Array
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.joint_axes import MEETING, PARALLEL, JointAxes, meeting_point
-from optimizer.problem.branches import Label
+from optimizer.problem.branches import Elbow, Label, Shoulder, Wrist
 
 # sine of the wrist angle below which the wrist counts as aligned: then every member of its self-motion reaches the pose
 # to half of what is promised of a solution
@@ -28,6 +30,16 @@ ROUNDING = 1e-10
 # a part of the label is singular where its sine, or the shoulder's distance [m], is below this: nearer to it, a pose
 # that is rounded to double precision no longer determines the joints to 1e-9 rad
 SINGULAR = 1e-6
+
+
+# all branches, in the order of their names
+LABELS = tuple(Label(*parts) for parts in product(*(sorted(get_args(part)) for part in (Shoulder, Elbow, Wrist))))
+
+
+def branch_numbers(measures: Array) -> Array:
+    """The branches (...), as indices of LABELS, with these `SphericalWrist.measures` (..., 3)."""
+    ahead, elbow, wrist = measures[..., 0], measures[..., 1], measures[..., 2]
+    return np.asarray(4 * (ahead >= 0) + 2 * (ahead * elbow < 0) + (wrist < 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +100,7 @@ class SphericalWrist:
 
     def label(self, q: Array) -> Label:
         """The branch of a configuration (6,) [rad]; on a singularity, one of those that meet there."""
-        ahead, elbow, wrist = self.measures(q)
-        return Label(
-            shoulder="left" if ahead < 0 else "right",
-            elbow="up" if ahead * elbow < 0 else "down",
-            wrist="no_flip" if wrist < 0 else "flip",
-        )
+        return LABELS[int(branch_numbers(self.measures(q)))]
 
     def singular_parts(self, q: Array) -> tuple[str, ...]:
         """The parts of the label that are singular at a configuration (6,) [rad]."""

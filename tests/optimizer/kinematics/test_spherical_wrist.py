@@ -13,6 +13,7 @@ from models.robot import Array
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
+from optimizer.kinematics.decomposition import DecomposedArm
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.joint_axes import JointAxes
 from optimizer.kinematics.spherical_wrist import SphericalWrist
@@ -56,6 +57,26 @@ def test_every_configuration_is_found_once(count: int) -> None:
         assert len(found.branches) in (4, 8)
         assert len({str(each.label) for each in found.branches}) == len(found.branches)
     assert IK.complete
+
+
+@pytest.mark.parametrize("off", [1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 1.0])
+def test_far_from_singularities_the_short_way_finds_the_same(off: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So far from one of them, too: where the short way begins, and on both sides of that."""
+    rng, folded = np.random.default_rng(8), stretched()
+    starts = [inside(KUKA, rng) for _ in range(30)]
+    for k, q in enumerate(starts):
+        q[(2, 4)[k % 2]] = (folded, 0.0)[k % 2] + off
+    poses = [flange(KUKA, q) for q in starts]
+    form = DecomposedArm.of(KUKA.model) or pytest.fail("the arm has a decomposition")
+    short = [form.solve(T) for T in poses]
+    assert [form._regular(form._rows(T), T) is not None for T in poses].count(True) >= (15 if off > 1e-4 else 0)
+    monkeypatch.setattr(DecomposedArm, "_regular", lambda *_: None)
+    form = DecomposedArm.of(KUKA.model) or pytest.fail("the arm has a decomposition")
+    for T, (q, labels) in zip(poses, short, strict=True):
+        q_long, labels_long = form.solve(T)
+        assert labels == labels_long
+        # rounding over the smallest singular value, which is some tenth of the distance
+        assert np.abs(wrapped(q - q_long)).max() < 1e-13 + 1e-11 * 1e-3 / off
 
 
 @pytest.mark.parametrize("off", [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3])
