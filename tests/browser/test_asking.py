@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,6 +37,11 @@ CARRIED = """() => {
 }"""
 
 
+def edit(page: Page, text: str) -> None:
+    """Puts a text into the field of the request, whether it is seen or not."""
+    page.locator("#json").evaluate("(it, text) => { it.value = text; it.dispatchEvent(new Event('change')); }", text)
+
+
 def test_a_wrong_request_is_explained(page: Page) -> None:
     show(page, "json")
     page.locator("#json").fill(json.dumps({**FIRST, "sample_period": -1}))
@@ -43,18 +49,53 @@ def test_a_wrong_request_is_explained(page: Page) -> None:
     page.locator("#optimise").click()
     expect(page.locator("#problem")).to_contain_text("sample_period")
     assert page.locator("#problem a").get_attribute("href") == "problems/validation"
-    page.locator("#json").fill("{")
-    page.locator("#json").blur()
-    expect(page.locator("#problem")).to_contain_text("no JSON")
+    for text in ("{", "3", '"x"', "null", "[]"):
+        edit(page, text)
+        expect(page.locator("#problem")).to_contain_text("no request")
+        expect(page.locator("#optimise")).to_be_disabled()
+    edit(page, json.dumps(FIRST))
+    expect(page.locator("#problem")).to_be_hidden()
+    expect(page.locator("#optimise")).to_be_enabled()
+
+
+# of wrong types, at places that the form, the handles and the picture read
+WRONG: list[dict[str, Any]] = [
+    {"start": 3},
+    {"start": {"q": "x"}},
+    {"payload": "x"},
+    {"scene": {"obstacles": {}}},
+    {"scene": {"obstacles": [3]}},
+    {"scene": {"obstacles": [None]}},
+    {"scene": {"obstacles": [{"name": "x", "shape": "box", "size": 3, "pose": FIRST["start"]["pose"]}]}},
+    {"stops": 3},
+    {"stops": [None]},
+    {"logs": 3},
+]
+
+
+def test_values_of_wrong_types_are_shown(page: Page) -> None:
+    """Until the service says what is wrong with them, in the form as it is sent from JSON."""
+    show(page, "form")
+    for wrong in WRONG:
+        edit(page, json.dumps({**FIRST, **wrong}))
+        (name,) = wrong
+        expect(page.locator(f"#form [data-path='{name}']")).to_be_attached()
+        assert state(page, "request") == {**FIRST, **wrong}
+        expect(page.locator("#problem")).to_be_hidden()
+    show(page, "json")
+    edit(page, json.dumps({**FIRST, "payload": "x"}))
+    page.locator("#optimise").click()
+    expect(page.locator("#problem")).to_contain_text("payload")
+    show(page, "form")
+    expect(page.locator("[data-path='payload'] .error")).to_be_visible()
+    edit(page, json.dumps(FIRST))
 
 
 def test_the_form_keeps_every_example(page: Page) -> None:
     """What the form shows, it does not change; what is changed in it comes back."""
     show(page, "form")
     for name, body in EXAMPLES.items():
-        page.locator("#json").evaluate(
-            "(it, text) => { it.value = text; it.dispatchEvent(new Event('change')); }", json.dumps(body)
-        )
+        edit(page, json.dumps(body))
         until(page, "() => document.querySelectorAll('#form > .fields > *').length > 2")
         assert state(page, "request") == body, name
         field = page.get_by_label("deadline in s", exact=True)

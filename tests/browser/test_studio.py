@@ -99,6 +99,18 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
     assert page.evaluate(PIXELS)[1] == before
 
 
+def test_a_coarse_picture_has_no_shadows(page: Page) -> None:
+    """On a machine without a graphics card they take half the time of a moving picture. A still one has them again."""
+    drawn = """fineness => {
+        const { view } = studio;
+        view.setFineness(fineness);
+        view.renderer.shadowMap.needsUpdate = true;
+        view.renderer.render(view.scene, view.camera);
+        return view.renderer.info.render.calls;
+    }"""
+    assert page.evaluate(drawn, 0.5) < page.evaluate(drawn, 1)
+
+
 def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> None:
     shells = "() => studio.view.parts.margins.children.filter(({ visible }) => visible).length"
     x, y = page.evaluate("""() => {
@@ -223,6 +235,19 @@ def test_a_link_holds_the_request(browser: Browser, page: Page) -> None:
         assert state(other, "answer.energy.electrical.total") == pytest.approx(energy, rel=1e-9)
 
 
+def test_a_broken_link_says_so(browser: Browser, page: Page) -> None:
+    """The example is shown instead. Another link in the same tab is opened."""
+    page.locator("#share").click()
+    until(page, "() => location.hash.startsWith('#r=')")
+    link = page.url
+    with opened(browser, link[:-20]) as other:
+        expect(other.locator("#problem")).to_contain_text("The link is broken")
+        assert state(other, "asked") == FIRST
+        other.evaluate("link => { location.href = link; }", link.split("#")[0] + "#answer=none")
+        expect(other.locator("#problem")).to_contain_text("No stored answer has this id")
+        expect(other.locator("#joules")).to_contain_text("J")
+
+
 def test_branches_side_by_side(page: Page) -> None:
     """A branch that the search ruled out: as a ghost, then as a second arm on the same clock."""
     ask(page, {**FIRST, "branch": {"shoulder": "left", "elbow": "up"}, "candidates": "all"})
@@ -264,6 +289,8 @@ def test_without_webgl_the_figures_are_there(browser: Browser, service: Server) 
         expect(page.locator("#no-view")).to_be_visible()
         assert page.locator("#plot-power canvas").count() == 1
         assert page.locator("#limits li").count() >= 5
+        for of_the_picture in ("#drag-tools", "#show"):
+            expect(page.locator(of_the_picture)).to_be_hidden()
     plain.close()
 
 

@@ -32,13 +32,7 @@ export async function send(path, options) {
   }
   if (response.ok) return response;
   if (response.status === 401 && (await askForKey())) return send(path, options);
-  const text = await response.text();
-  let details;
-  try {
-    details = JSON.parse(text);
-  } catch {
-    details = { title: `The service answered ${response.status}`, detail: text.slice(0, 300) };
-  }
+  const details = await response.json().catch(() => ({ title: `The service answered ${response.status}` })); // a proxy's own page
   throw new Problem({ status: response.status, retry: Number(response.headers.get("Retry-After")) || null, ...details });
 }
 

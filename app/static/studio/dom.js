@@ -77,5 +77,4 @@ export function tabs(list, chosen) {
     event.stopPropagation();
     event.preventDefault();
   });
-  return choose;
 }

@@ -4,7 +4,7 @@ import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { post } from "./api.js";
 import { Chain, cellOf, multiply, ofOrigin, ofPose, quaternionOf } from "./chain.js";
 import { $, el } from "./dom.js";
-import { robotOf } from "./request.js";
+import { problem, robotOf } from "./request.js";
 import { follow, set, state } from "./store.js";
 
 const HEIGHT = 0.2; // of a box that is drawn [m]
@@ -27,7 +27,7 @@ export function createDrag(picture) {
     view.controls.enabled = !value;
     if (!value) release();
   });
-  $("drag").onchange = () => choose($("drag").value);
+  $("drag").onchange = () => choose($("drag").value).catch(problem);
   $("turn").onchange = () => gizmo.setMode($("turn").checked ? "rotate" : "translate");
   $("draw-box").onclick = drawBox;
   follow("request answer", offer);
@@ -37,8 +37,9 @@ const tell = (text) => { $("drag-note").textContent = text; };
 
 function offer() {
   const { scene, stops } = state.request ?? {};
-  const ends = stops ? stops.map((stop, k) => [`stop ${k}`, stopName(stop, k)]).filter((_, k) => stops[k].target) : [["goal", "goal"]];
-  const names = [["", "nothing"], ["start", "start"], ...ends, ...(scene?.obstacles ?? []).map(({ name }, k) => [`${k}`, name])];
+  const list = (value) => (Array.isArray(value) ? value.map((each) => each ?? {}) : []); // what is edited may be of a wrong type
+  const ends = stops ? list(stops).map((stop, k) => [`stop ${k}`, stop.target && stopName(stop, k)]).filter(([, name]) => name) : [["goal", "goal"]];
+  const names = [["", "nothing"], ["start", "start"], ...ends, ...list(scene?.obstacles).map(({ name }, k) => [`${k}`, name])];
   $("drag").replaceChildren(...names.map(([value, text]) => el("option", { value }, text)));
   $("drag").value = names.some(([value]) => value === target) ? target : "";
   if (!$("drag").value) gizmo.detach();

@@ -16,7 +16,7 @@ export function createForm() {
   follow("request", () => {
     if (!own) showForm().catch(problem);
   });
-  follow("problem", () => placeErrors(state.problem?.details?.errors ?? []));
+  follow("problem", placeErrors);
   // the first answer does not wait for the document
   follow("answer", () => $("form").firstChild || showForm().catch(problem));
   for (const id of ["angles", "lengths"]) $(id).onchange = () => showForm().catch(problem);
@@ -24,13 +24,14 @@ export function createForm() {
 
 /** Draws the form, where it is shown. */
 export async function showForm() {
-  if ($("pane-form").hidden || !state.answer) return;
+  if ($("pane-form").hidden || !(state.answer || state.problem)) return;
   if (!state.request) return $("form").replaceChildren(el("p", { class: "hint" }, "The request of a kept round is not kept. Choose an example, or write one as JSON."));
   schemas ??= (await openapi()).components.schemas;
   if (!$("robots").childElementCount) $("robots").replaceChildren(...(await get("robots")).robots.map(({ name }) => el("option", {}, name)));
   const { schema, path, drawn } = kindOf(state.request);
   $("drag-tools").hidden = !drawn;
   $("form").replaceChildren(fields(schemas[schema] ?? (await querySchema(path)), state.request, []));
+  placeErrors();
 }
 
 /** The query parameters of a POST as a schema. */
@@ -122,6 +123,8 @@ function field(given, value, path, required) {
 function controlOf(schema, value, path, label) {
   const others = alternatives(schema);
   if (others) return choice(others, value, path, label);
+  const wrong = schema.type === "array" ? !Array.isArray(value) : schema.properties && typeof (value ?? {}) !== "object";
+  if (wrong) return { control: el("code", {}, JSON.stringify(value)) };
   if (schema.properties) return { control: fields(schema, value ?? {}, path), block: true };
   if (schema.const !== undefined) return { control: el("code", {}, String(schema.const)) };
   if (schema.enum) return { control: pick(schema.enum.map((each) => [each, each]), value, (chosen) => write(path, chosen, false), label) };
@@ -184,9 +187,9 @@ function number(schema, value, path, label) {
 }
 
 /** Puts errors of the service beside the fields that they name. */
-function placeErrors(errors) {
+function placeErrors() {
   for (const old of document.querySelectorAll("#form .error")) old.remove();
-  for (const { loc, msg } of errors) {
+  for (const { loc, msg } of state.problem?.details?.errors ?? []) {
     let path = "";
     let found = null;
     for (const part of loc) {

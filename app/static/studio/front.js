@@ -14,7 +14,7 @@ export function createFront() {
 }
 
 async function ask() {
-  const { asked } = state;
+  const asked = state.asked ?? state.request;
   const range = typeof asked.duration === "number" ? null : (asked.duration ?? null);
   const { path, ...rest } = asked;
   const answer = await compute("pareto", { ...rest, ...(path ? { path } : {}), duration: range, candidates: "none", deadline: Math.max(30, asked.deadline ?? 10) });

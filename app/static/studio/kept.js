@@ -79,10 +79,11 @@ export const openIdentification = async (id) => (await import("./residuals.js"))
 
 /** Shows a kept answer by its path or id, of a motion or of a round. Throws Problem. */
 export async function openAnswer(path) {
+  problem(null);
   const { answer } = await get(path.includes("/") ? path : `answers/${encodeURIComponent(path)}`);
   // what was asked for cannot be told from a round
-  if (answer.legs) return set({ request: null }), showRound(answer, null);
-  if (!answer.branch) throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
+  if (answer?.legs) return set({ request: null }), showRound(answer, null);
+  if (!answer?.branch) throw new Error("Only motions and rounds are shown here: this answer is of another kind.");
   // the same arm between the same ends: what the answer does not say of its request stays at the defaults
   set({ request: { robot: answer.robot, ...answer.arm, start: { q: answer.branch.start.q }, goal: { q: answer.branch.goal.q } } });
   return showAnswer(answer, state.request);

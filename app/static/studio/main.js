@@ -10,7 +10,7 @@ import { createLimits } from "./limits.js";
 import { createMeshes } from "./meshes.js";
 import { createPlayer, play } from "./player.js";
 import { createPlots } from "./plots.js";
-import { createRequest, optimise, problem, robots, setFirst, showAnswer } from "./request.js";
+import { createRequest, fillExamples, optimise, problem, robots, setFirst, showAnswer } from "./request.js";
 import { createRound } from "./round.js";
 import { createShare, shared } from "./share.js";
 import { embedded } from "./standalone.js";
@@ -34,16 +34,20 @@ follow("answer", headline);
 /** For tests, and for those who look in the console. */
 window.studio = { state, view, tcp: drawnTcp };
 
-start().catch(problem);
+/** Shows the example instead of what a link asks for, and why. */
+const instead = (error) => setFirst().then(() => optimise()).then(() => problem(error));
+
+start().catch((error) => (problem(error), Promise.all([showForm(), fillExamples()]))).catch(problem);
+window.onhashchange = () => /^#(r|answer)=/.test(location.hash) && location.reload(); // another link in this tab
 
 async function start() {
-  const given = inside ?? (await shared());
+  const given = inside ?? (await shared().catch(instead));
   if (inside) {
     robots.set(inside.robot.name, inside.robot);
     await showAnswer(inside.answer, inside.request, inside.round);
-  } else if (given.answer) {
-    await openAnswer(given.answer);
-  } else {
+  } else if (given?.answer) {
+    await openAnswer(given.answer).catch(instead);
+  } else if (given) {
     await (given.request ? set({ request: given.request }) : setFirst());
     await optimise();
   }

@@ -44,7 +44,7 @@ let document_ = null;
 /** The OpenAPI document, asked for once. */
 export const openapi = () => (document_ ??= get("openapi.json"));
 
-async function fillExamples() {
+export async function fillExamples() {
   if ($("examples").options.length) return;
   const [first, { paths }] = await Promise.all([get(FIRST), openapi()]);
   const option = (name, body) => Object.assign(el("option", {}, name), { body });
@@ -61,12 +61,22 @@ function added({ id, warnings }) {
 
 function readJson() {
   try {
-    set({ request: JSON.parse($("json").value) });
+    const request = parsed($("json").value);
+    problem(null);
     $("json").removeAttribute("aria-invalid");
+    set({ request });
   } catch (error) {
     $("json").setAttribute("aria-invalid", "true");
-    problem(new Problem({ title: "This is no JSON", detail: error.message }));
+    $("optimise").disabled = true; // it would send the request before this one
+    problem(new Problem({ title: "This is no request", detail: error.message }));
   }
+}
+
+/** The request that a text holds. Throws SyntaxError. */
+export function parsed(text) {
+  const request = JSON.parse(text);
+  if (typeof request === "object" && request && !Array.isArray(request)) return request;
+  throw new SyntaxError("Give a JSON object: names and values in braces.");
 }
 
 /** What kind of thing a request asks for. */

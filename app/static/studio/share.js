@@ -1,8 +1,9 @@
 // Take away: a link that holds the request, and downloads.
-import { send } from "./api.js";
+import { Problem, send } from "./api.js";
 import { $, el, save } from "./dom.js";
-import { openapi, problem } from "./request.js";
-import { embedded, standalone } from "./standalone.js";
+import { openapi, parsed, problem } from "./request.js";
+import { fromBase64 } from "./shapes.js";
+import { base64, embedded, standalone } from "./standalone.js";
 import { state } from "./store.js";
 
 const WARNING = "Set payload, speed and safety limits on the controller before you run it. No format was run on hardware.";
@@ -37,6 +38,7 @@ async function offerExports() {
 
 async function exportAs(format) {
   $("downloads").open = false;
+  problem(null);
   const { answer } = state;
   const body = { answer: answer.answer ?? answer };
   const response = await send(`export/${format}`, { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
@@ -67,20 +69,20 @@ async function share() {
   }
 }
 
-/** What the address of the page asks for: {request} or {answer}, or nothing. */
+/** What the address of the page asks for: {request} or {answer}, or nothing. Throws Problem. */
 export async function shared() {
   const asked = new URLSearchParams(location.hash.slice(1));
-  const request = asked.get("r") ? JSON.parse(await unpacked(asked.get("r"))) : null;
-  return { request, answer: asked.get("answer") };
+  const broken = () => { throw new Problem({ title: "The link is broken", detail: "A part of it is missing: ask for it again. This is the example." }); };
+  return { request: asked.get("r") && (await unpacked(asked.get("r")).then(parsed).catch(broken)), answer: asked.get("answer") };
 }
 
 async function packed(text) {
   const bytes = await through(new Blob([text]), new CompressionStream("deflate-raw"));
-  return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+  return base64(bytes).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
 }
 
 async function unpacked(text) {
-  const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (letter) => letter.charCodeAt(0));
+  const bytes = fromBase64(text.replaceAll("-", "+").replaceAll("_", "/"));
   return new TextDecoder().decode(await through(new Blob([bytes]), new DecompressionStream("deflate-raw")));
 }
 

@@ -47,7 +47,7 @@ async function gathered(first, map) {
     const url = waiting.pop();
     if (found.has(url)) continue;
     found.set(url, null);
-    const source = await text(nameOf(url).replace(/^/, "studio/"));
+    const source = await text(`studio/${nameOf(url)}`);
     const named = source.replace(IMPORT, (whole, before, quote, name) => {
       const target = resolved(name, url, map);
       if (!target) return whole;
@@ -65,4 +65,4 @@ function resolved(name, from, map) {
   return key ? new URL(map[key] + name.slice(key.length), location.href).href : null;
 }
 
-const base64 = (bytes) => btoa(bytes.reduce((text, byte) => text + String.fromCharCode(byte), ""));
+export const base64 = (bytes) => btoa(bytes.reduce((text, byte) => text + String.fromCharCode(byte), ""));

@@ -139,9 +139,14 @@ class View {
   preview() {
     const { request, robot, cell, answer } = state;
     if (!answer || !request || !kindOf(request).drawn || (request.robot ?? "ur5e") !== answer.robot) return;
-    const edited = cellOf(request, robot);
-    if (JSON.stringify(edited.scene) === JSON.stringify(this.drawnScene ?? cell.scene)) return;
-    this.drawScene(edited.scene);
+    try {
+      const edited = cellOf(request, robot);
+      if (JSON.stringify(edited.scene) === JSON.stringify(this.drawnScene ?? cell.scene)) return;
+      this.drawScene(edited.scene);
+    } catch {
+      // what is wrong with it, the service says
+      this.drawScene(cell.scene);
+    }
     this.draw();
   }
 
@@ -293,6 +298,8 @@ class View {
   setFineness(fineness) {
     if (this.fineness === fineness) return;
     this.fineness = fineness;
+    // without a graphics card, shadows take half the time of a coarse picture
+    this.sun.castShadow = fineness >= 1;
     this.renderer.setPixelRatio(fineness);
   }
 
