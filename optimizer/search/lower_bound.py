@@ -5,21 +5,25 @@ Each term below is proven in its function's docstring; their sum is minimised ov
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
+from numpy.typing import NDArray
 
-from models.robot import Array, FrictionLaw, Limits
+from models.robot import Array
 from optimizer.energy.dwell import holding_power, linear_dwells
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.arm import Arm
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.trajectories.seven_segment import shortest_duration
 
 # max over x ≥ 0 of x - x² / sqrt(x² + 1), rounded up: what spreading Coulomb friction's jump takes from |v|, in knees
 _KNEE_DEFICIT = 0.3003
+# what a quotient's denominator is at least
+_TINY = 1e-300
 # duration of a part of a motion [s] that stands for none
 SHORTEST_PART = 1e-12
 # points of the secant method for the best duration at most; how steep it takes the loss to fall with the duration at
@@ -83,17 +87,17 @@ def travel_bounds(
     displacement (P, nq) [rad] and potential_gain (P,) [J] are those of the parts; `price` [W] of time, no part longer
     than `longest` [s]. What a part draws may be less than its bound, by the kinetic energy that it begins with. But the
     sum over the parts of a motion from rest to rest is a bound on this motion: its kinetic energy adds up to zero, and
-    ∫ P_net dt is bounded as in `electrical`, with three changes. A joint may have any speed at once, so the share of
+    ∫ P_net dt is bounded as in `electrical`, with four changes. A joint may have any speed at once, so the share of
     friction that grows with speed is at least that of even speed, T g(|displacement| / T), as g is convex (Jensen). The
-    least duration is that of the speed limits alone. And the bound by the drawn power, which is never negative, is left
+    least duration is that of the speed limits alone. The bound by the drawn power, which is never negative, is left
     out: it holds for each part, but the greater of the two bounds in each part does not, since a part may draw less for
-    what another one has put into speed.
+    what another one has put into speed. And so is copper loss, η = 0: what bounds it is the work put into a part.
     """
-    distance, limits = np.abs(displacement), prepared.arm.active_limits
-    t_min = np.maximum((distance / limits.v_max).max(axis=-1), SHORTEST_PART)
-    cruise = _Even(distance, prepared.arm.friction_law, limits)
-    waiting = np.full_like(t_min, -price)
-    bound = _net_energy(prepared, cruise, potential_gain, t_min, np.full_like(t_min, longest), waiting)
+    distance = np.abs(displacement)
+    t_min = np.maximum((distance / prepared.arm.active_limits.v_max).max(axis=-1), SHORTEST_PART)
+    cruise = _Even(distance, prepared.arm)
+    net = _NetEnergy.of(prepared.arm, cruise, potential_gain, np.full_like(t_min, -price), most=0.0)
+    bound = net.least(t_min, np.full_like(t_min, longest))
     return np.where(t_min > longest, np.inf, bound)
 
 
@@ -153,8 +157,13 @@ def electrical(
       `energy.bus_flow`) ≥ ∫ P_net dt, as c ≤ s and neither factor exceeds 1. The charge's fall is in the total, so the
       bound holds whatever the store begins with.
 
-    Copper and inverter ≥ their constants. Friction that grows with the load loses v · tau_f(v) of an unloaded joint, or
-    more: its share in that is left out.
+    Friction that grows with the load loses v · tau_f(v) of an unloaded joint, or more: its share in that is left out.
+
+    copper: with c = (copper + quadratic inverter loss) / torque_constant² [W/(N·m)²] of each joint and any η ≥ 0,
+    c (tau + tau_f)² ≥ 2 η v (tau + tau_f) - η² v² / c, the square of a difference. η is the same for all joints, and
+    Σ v (tau + tau_f) is the rate of kinetic and potential energy plus friction. So copper and quadratic inverter loss
+    are at least 2 η (potential_gain + friction) - η² Σ ∫ v² / c dt. What holding against gravity takes beyond that is
+    left out, and so is the inverter's loss beyond its constant and its square.
 
     friction: v · tau_f(v) ≥ coulomb |v| + g(|v|) - deficit with g(v) = v (curved asinh(v / speed) + viscous v) convex.
     The Coulomb part is at least coulomb · |displacement|. For the rest, let m(h) be how long |v| exceeds h: ∫ g dt =
@@ -165,69 +174,119 @@ def electrical(
         |displacement| = ∫_0^c (T - 2 t(h)) dh,      ∫ g dt ≥ ∫_0^c g'(h) (T - 2 t(h)) dh.
 
     This is the value of a linear program whose right-hand side is linear in T, so it is convex in T, with slope
-    g(c) - c g'(c). `_best_durations` finds the least sum in [t_min, t_max].
+    g(c) - c g'(c). So is it of (1 + 2 η) g(v) - η² v² / c in the place of g, as long as that is convex up to the
+    greatest speed: η is no greater. For each T the bound is a parabola in η, and its greatest value is known. The
+    greatest of convex functions is convex: `_NetEnergy.least` finds the least over [t_min, t_max].
     """
-    cruise = _Cruise(np.abs(displacement), prepared.arm.friction_law, prepared.arm.active_limits)
-    return _net_energy(prepared, cruise, potential_gain, t_min, t_max, waiting)
+    cruise = _Cruise(np.abs(displacement), prepared.arm)
+    return _NetEnergy.of(prepared.arm, cruise, potential_gain, waiting, _most_copper(prepared.arm)).least(t_min, t_max)
 
 
-def _net_energy(
-    prepared: PreparedProblem, cruise: _Cruise, potential_gain: Array, t_min: Array, t_max: Array, waiting: Array
-) -> Array:
-    """The bound of `electrical`, with the least loss of `cruise`."""
-    friction, drives = prepared.arm.friction_law, prepared.arm.drives
-    base = prepared.arm.base_power + float(drives.inverter_constant.sum())
-    base -= _KNEE_DEFICIT * friction.knee * float(friction.coulomb.sum())
-    rate = base - waiting
-    T, below = _best_durations(cruise, rate, t_min, np.maximum(t_max, t_min))
-    return np.asarray(rate * T + potential_gain + cruise.distance @ friction.coulomb + cruise.loss(T) - below)
+@dataclass(frozen=True)
+class _NetEnergy:
+    """The bound of `electrical` over the duration T, with the least losses of `cruise`, for P pairs: `power` (P,) [W]
+    that is drawn at all times, and `work` (P,) [J], the gain with the Coulomb loss, less `deficit` [W] times T; η up to
+    `most`."""
+
+    cruise: _Cruise
+    power: Array
+    work: Array
+    deficit: float
+    most: float
+
+    @staticmethod
+    def of(arm: Arm, cruise: _Cruise, potential_gain: Array, waiting: Array, most: float) -> _NetEnergy:
+        """The bound of an arm; `potential_gain` and `waiting` (P,) as of `electrical`."""
+        law = arm.friction_law
+        power = arm.base_power + float(arm.drives.inverter_constant.sum()) - waiting
+        deficit = _KNEE_DEFICIT * law.knee * float(law.coulomb.sum())
+        return _NetEnergy(cruise, power, potential_gain + cruise.distance @ law.coulomb, deficit, most)
+
+    def __getitem__(self, k: NDArray[np.intp]) -> _NetEnergy:
+        return replace(self, cruise=self.cruise[k], power=self.power[k], work=self.work[k])
+
+    def at(self, T: Array) -> tuple[Array, Array]:
+        """The bound (P,) [J] for durations T (P,), and its derivative [W]."""
+        friction, friction_slope, square, square_slope = self.cruise.losses(T)
+        work = self.work + friction - self.deficit * T
+        eta = np.clip(work / np.maximum(square, _TINY), 0.0, self.most)
+        more, squared = 1 + 2 * eta, eta * eta
+        slope = self.power + more * (friction_slope - self.deficit) - squared * square_slope
+        return self.power * T + more * work - squared * square, slope
+
+    def least(self, t_min: Array, t_max: Array) -> Array:
+        """The least bound (P,) [J] over durations from t_min to t_max (P,) [s], or for t_min if that is greater."""
+        rate, longest = self.power - self.deficit, np.maximum(t_min, t_max)
+        value, slope = self.at(np.where(rate > 0, t_min, longest))
+        # most motions are best as fast as they can be
+        slower = np.flatnonzero((rate > 0) & (slope < 0) & (t_min < longest))
+        if len(slower):
+            value[slower] = self[slower]._least_beyond(t_min[slower], slope[slower], longest[slower])
+        return value
+
+    def _least_beyond(self, low: Array, slope: Array, high: Array) -> Array:
+        """The least bound (P,) [J] over durations from `low` to `high` (P,) [s]; it falls with `slope` [W] at `low`.
+
+        It is convex: it stays above its tangent on the interval that is known to hold the best duration. The loss falls
+        nearly with a power of the duration. So the secant method finds by logarithms where it falls as fast as the
+        power adds up; it goes to the middle of the interval instead of out of it.
+        """
+        rate, low, high = self.power - self.deficit, np.log(low), np.log(high)
+        x, over, value, missed = low, np.log(1 - slope / rate), np.zeros_like(low), np.full_like(low, np.inf)
+        step, done = over / _FALL, np.zeros(len(x), dtype=bool)
+        for _ in range(_POINTS):
+            if done.all():
+                break
+            ahead = np.where((x + step > low) & (x + step < high), x + step, (low + high) / 2)
+            ahead = np.where(done, x, ahead)
+            T = np.exp(ahead)
+            value, slope = self.at(T)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                # without a fall, or twice at the same place, there is no step
+                there = np.log(1 - slope / rate)
+                step = there * (ahead - x) / (over - there)
+            low, high = np.where(slope < 0, ahead, low), np.where(slope < 0, high, ahead)
+            x, over = ahead, there
+            missed = np.maximum(slope * (T - np.exp(low)), slope * (T - np.exp(high)))
+            done = missed <= _EXACT * rate * T
+        return value - missed
 
 
-def _best_durations(cruise: _Cruise, rate: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Durations (P,) [s] near those from `low` to `high` (P,) at which `rate` · T and the loss of `cruise` are least
-    together, and how far (P,) [J] this least is below their sum there, at most.
+def copper_loss(arm: Arm) -> Array:
+    """c (nq,) [W/(N·m)²] of `electrical`."""
+    return np.asarray((arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2)
 
-    The sum is convex: it stays above its tangent at T on the interval that is known to hold the best duration. The loss
-    falls nearly with a power of T. So the secant method finds by logarithms where its fall is `rate`; it goes to the
-    middle of the interval instead of out of it.
+
+def _most_copper(arm: Arm) -> float:
+    """The greatest η of `electrical`; 0 for a friction law with a negative coefficient.
+
+    The second derivative of g is least at the greatest speed, and (1 + 2 η) that much less 2 η² / c is not below zero.
     """
-    T, below = np.where(rate > 0, low, high), np.zeros_like(low)
-    fall = -cruise.slope(low)
-    # most motions are best as fast as they can be
-    slower = np.flatnonzero((rate > 0) & (fall > rate))
-    cruise, rate, low, high = cruise.only(slower), rate[slower], np.log(low[slower]), np.log(high[slower])
-    x, over = low, np.log(fall[slower] / rate)
-    step, missed, done = over / _FALL, np.full_like(x, np.inf), np.zeros(len(x), dtype=bool)
-    for _ in range(_POINTS):
-        if done.all():
-            break
-        ahead = np.where((x + step > low) & (x + step < high), x + step, (low + high) / 2)
-        ahead = np.where(done, x, ahead)
-        duration = np.exp(ahead)
-        fall = -cruise.slope(duration)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            # without a fall, or twice at the same place, there is no step
-            there = np.log(fall / rate)
-            step = there * (ahead - x) / (over - there)
-        low, high = np.where(there > 0, ahead, low), np.where(there > 0, high, ahead)
-        x, over, rising = ahead, there, rate - fall
-        missed = np.maximum(rising * (duration - np.exp(low)), rising * (duration - np.exp(high)))
-        done = missed <= _EXACT * rate * duration
-    T[slower], below[slower] = np.exp(x), missed
-    return T, below
+    law, v, c = arm.friction_law, arm.active_limits.v_max, copper_loss(arm)
+    if min(law.coulomb.min(), law.curved.min(), law.viscous.min()) < 0:
+        return 0.0
+    bent = law.curved * (v**2 + 2 * law.speed**2) / np.hypot(v, law.speed) ** 3 + 2 * law.viscous
+    return float((c * bent + np.sqrt(c * bent * (c * bent + 2))).min()) / 2
 
 
 class _Cruise:
-    """The least loss ∫ g(|v|) dt of joints that displacement `distance` (P, nq) under acceleration and jerk limits."""
+    """The least losses of joints that displacement `distance` (P, nq) under acceleration and jerk limits.
 
-    def __init__(self, distance: Array, friction: FrictionLaw, limits: Limits) -> None:
-        self.distance, self.friction, self.limits, self.a = distance, friction, limits, limits.a_max
+    They are ∫ g(|v|) dt of friction, and ∫ v² / c dt.
+    """
+
+    def __init__(self, distance: Array, arm: Arm) -> None:
+        limits = arm.active_limits
+        self.distance, self.friction, self.a = distance, arm.friction_law, limits.a_max
         self.jerk_ramp = limits.a_max / limits.j_max
         self.ramp_speed = limits.a_max * self.jerk_ramp / 2
+        self.slowness = 2 / limits.a_max
+        self.copper = 1 / np.maximum(copper_loss(arm), _TINY)
 
-    def only(self, rows: npt.NDArray[np.intp]) -> Self:
-        """The same of some of the motions."""
-        return type(self)(self.distance[rows], self.friction, self.limits)
+    def __getitem__(self, k: NDArray[np.intp]) -> Self:
+        some = copy(self)
+        some.distance = self.distance[k]
+        return some
 
     def speed(self, T: Array) -> tuple[Array, Array]:
         """c (P, nq) for durations T (P,), and the jerk ramp's time that it is subject to."""
@@ -239,38 +298,38 @@ class _Cruise:
         ramped = with_jerk > self.ramp_speed
         return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
 
-    def slope(self, T: Array) -> Array:
-        """Derivative (P,) of the loss by T [W]."""
-        c, _ = self.speed(T)
-        law = self.friction
-        # g - c g'
-        square = c * c
-        return -np.asarray((square * (law.curved / np.sqrt(square + law.speed**2) + law.viscous)).sum(axis=-1))
+    def losses(self, T: Array) -> tuple[Array, Array, Array, Array]:
+        """Friction's loss (P,) [J] for durations T (P,) and its derivative [W]; ∫ v² / c dt (P,) and its derivative.
 
-    def loss(self, T: Array) -> Array:
-        """The loss (P,) [J], by parts: T g(c) - 2 ∫ g' t dh."""
-        c, ramp = self.speed(T)
-        g, integral = self._g(c)
-        to_speed = (c * g - integral) / self.a
-        ramping = ramp / 2 * (g - self._g(self.ramp_speed)[0])
-        return np.asarray((T[:, None] * g - 2 * (to_speed + ramping)).sum(axis=-1))
+        The losses are by parts: T g(c) - 2 ∫ g' t dh.
+        """
+        (v, ramp), law = self.speed(T), self.friction
+        rise, square = np.arcsinh(v / law.speed), v * v
+        bent = np.sqrt(square + law.speed**2)
+        torque = law.curved * rise + law.viscous * v
+        # ∫_0^v of g
+        below = law.curved * ((square / 2 + law.speed**2 / 4) * rise - v * bent / 4) + law.viscous * v * square / 3
+        friction = T[:, None] * v * torque - self.slowness * (square * torque - below)
+        friction -= ramp * (v * torque - self._ramp_loss)
+        squares = T[:, None] * square - self.slowness * (2 / 3) * v * square - ramp * (square - self.ramp_speed**2)
+        slope = -(law.curved * square / bent + law.viscous * square)
+        return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
 
-    def _g(self, v: Array) -> tuple[Array, Array]:
-        """g(v), and ∫_0^v g."""
-        law, s, square = self.friction, self.friction.speed, v * v
-        bent = np.arcsinh(v / s)
-        curved = (square / 2 + s * s / 4) * bent - v * np.sqrt(square + s * s) / 4
-        return v * (law.curved * bent + law.viscous * v), law.curved * curved + law.viscous * square * v / 3
+    @cached_property
+    def _ramp_loss(self) -> Array:
+        """g (nq,) [W] at the speed at which a jerk ramp ends."""
+        v, law = self.ramp_speed, self.friction
+        return np.asarray(v * (law.curved * np.arcsinh(v / law.speed) + law.viscous * v))
 
 
 class _Even(_Cruise):
-    """The least loss without acceleration limits: every joint moves at an even speed."""
+    """The least losses without acceleration limits: every joint moves at an even speed."""
+
+    def __init__(self, distance: Array, arm: Arm) -> None:
+        super().__init__(distance, arm)
+        self.slowness = np.zeros_like(self.slowness)
 
     def speed(self, T: Array) -> tuple[Array, Array]:
         """The even speeds (P, nq) for durations T (P,); no jerk ramps."""
         even = self.distance / T[:, None]
         return even, np.zeros_like(even)
-
-    def loss(self, T: Array) -> Array:
-        """The loss (P,) [J]."""
-        return np.asarray(T * self._g(self.speed(T)[0])[0].sum(axis=-1))

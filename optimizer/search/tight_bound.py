@@ -31,7 +31,7 @@ from optimizer.energy.dwell import LinearDwell, linear_dwells
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.search.candidates import Candidate
-from optimizer.search.lower_bound import electrical
+from optimizer.search.lower_bound import copper_loss, electrical
 from optimizer.trajectories.spline import sample
 from optimizer.trajectories.time_scalings import quintic_spline
 
@@ -80,10 +80,11 @@ class _Pairs:
             return None
         if friction.load is not None and not np.isfinite(arm.active_limits.a_max).all():
             return None
-        loss = (arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2
         stiffness = friction.stiffness(arm.friction_law)
         # friction of the same torque at every speed has no convexity to spare
-        return cls(prepared, ChainDerivatives.of(arm), friction, loss, stiffness) if stiffness.min() > 0 else None
+        if stiffness.min() <= 0:
+            return None
+        return cls(prepared, ChainDerivatives.of(arm), friction, copper_loss(arm), stiffness)
 
     def bound(self, candidate: Candidate, energy: float, deadline: Deadline) -> float:
         """A bound [J] on the pair's motions, at most `energy`; -inf where the dual bound does not apply."""

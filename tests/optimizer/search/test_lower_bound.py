@@ -44,6 +44,7 @@ LOSSY = replace(
     inverter_linear=np.full(6, 0.3),
     inverter_quadratic=np.full(6, 0.02),
 )
+UNEVEN = np.array([30.0, 0.1, 5.0, 0.02, 10.0, 1.0])
 
 
 def robot(idle: float = 36.7, regeneration: float = 0.0, **given: Any) -> Robot:
@@ -64,6 +65,8 @@ CONDITIONS: dict[str, dict[str, Any]] = {
     "slow limits": {"limits": limits(v_max=0.4, a_max=1.5, j_max=8.0)},
     "weightless": {"gravity": [0, 0, 0]},
     "friction of the load": {"robot": robot(friction_laws={"loaded": LOADED}), "payload": PAYLOAD},
+    "much copper": {"robot": robot(idle=5.0, drives=replace(ROBOT.drives, copper=20 * ROBOT.drives.copper))},
+    "uneven copper": {"robot": robot(drives=replace(ROBOT.drives, copper=UNEVEN * ROBOT.drives.copper))},
     "load, all recovered": {"robot": robot(idle=0.5, regeneration=1.0, friction_laws={"loaded": LOADED})},
 }
 
@@ -204,6 +207,32 @@ def test_the_bound_is_reached_where_only_friction_costs(law: str, speed: float) 
     share = ours[0] / (energy.electrical.total - energy.electrical.braking)
     # while it speeds up the bound allows for no jerk below half its speed, and at 2 rad/s that is much of the way
     assert (0.95 if speed > 1 else 0.99) < share <= 1 + QUADRATURE
+
+
+@pytest.mark.parametrize("share", [1.0, 3.0])
+def test_the_copper_loss_of_friction_counts(share: float) -> None:
+    """A weightless joint that cruises against friction: the bound has most of its copper loss, whatever it is."""
+    drives = replace(ROBOT.drives, copper=share * ROBOT.drives.copper)
+    task = problem(gravity=[0, 0, 0], robot=robot(idle=1.0, drives=drives), limits=limits(v_max=0.2))
+    torques = Torques(task)
+    start, goal = np.zeros(6), 3.0 * np.eye(6)[5]
+    least = float(shortest_duration(goal - start, task.arm.active_limits))
+    motion = guesses(task, start, goal, least)["ruckig"]
+    energy = motion_energy(task, motion, torques(motion.q, motion.v, motion.a), torques.task.potential).electrical
+    ours, _ = bound(torques, start[None], goal[None], **fixed(least * (1 + 1e-9)))
+    left = energy.total - energy.braking - float(ours[0])
+    assert 0 <= left < 0.25 * energy.copper
+
+
+def test_one_share_of_the_copper_loss_is_for_all_joints() -> None:
+    """The proof takes the same η for every joint, as links pass work from one to another."""
+    torques = Torques(problem(robot=robot(drives=replace(ROBOT.drives, copper=0 * ROBOT.drives.copper))))
+    start, goal = ends(12)
+    without, _ = bound(torques, start, goal)
+    # one joint without copper loss leaves nothing for the others
+    one = np.array([1.0, 1.0, 0.0, 1.0, 1.0, 1.0])
+    torques = Torques(problem(robot=robot(drives=replace(ROBOT.drives, copper=one * ROBOT.drives.copper))))
+    assert bound(torques, start, goal)[0] == pytest.approx(without, rel=EXACT)
 
 
 def test_standing_still_costs_idling() -> None:
