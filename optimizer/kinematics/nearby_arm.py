@@ -24,10 +24,12 @@ STARTS = 4
 
 @dataclass(frozen=True, eq=False)
 class NearbyArm:
-    """The closed form of the arm nearby; `mirrored` if it is of this form from the flange on."""
+    """The closed form of the arm nearby; `mirrored` if it is of this form from the flange on. `axes` are its own, from
+    the flange on if it is mirrored."""
 
     arm: RedundantArm
     mirrored: bool
+    axes: JointAxes
 
     @classmethod
     def of(cls, chain: Chain) -> NearbyArm | None:
@@ -36,7 +38,7 @@ class NearbyArm:
         for mirrored, each in ((False, simple), (True, simple.mirrored())):
             form = SphericalShoulder.of_chain(each)
             if form is not None:
-                return cls(RedundantArm(form), mirrored)
+                return cls(RedundantArm(form), mirrored, JointAxes.of(each))
         return None
 
     def starts(self, T: Array) -> Array:

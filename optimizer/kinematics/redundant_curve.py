@@ -162,14 +162,20 @@ def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list
 
 def _joined(curves: Sequence[RedundantCurve], parts: Array) -> list[RedundantCurve]:
     """The curves, cut to parts (3, n): index of a curve, lower and upper end."""
+    found = joined(parts, len(curves))
+    return [replace(curve, arcs=own) for curve, own in zip(curves, found, strict=True) if own]
+
+
+def joined(parts: Array, count: int) -> list[list[tuple[float, float]]]:
+    """The arcs of each of so many curves that parts (3, n) make up: index of a curve, lower and upper end."""
     owner, lower, upper = parts[:, np.lexsort((parts[1], parts[0]))]
     goes_on = (owner[1:] == owner[:-1]) & (lower[1:] == upper[:-1])
     starts, stops = np.append(True, ~goes_on), np.append(~goes_on, True)
-    found: list[list[tuple[float, float]]] = [[] for _ in curves]
+    found: list[list[tuple[float, float]]] = [[] for _ in range(count)]
     if len(owner):
         for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
             found[int(k)].append((low, high))
-    return [replace(curve, arcs=own) for curve, own in zip(curves, found, strict=True) if own]
+    return found
 
 
 @dataclass(frozen=True, eq=False)

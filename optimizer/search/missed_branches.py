@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
+from models.robot import Array
 from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.covering_sheets import CoveringSheet, covering_sheets
 from optimizer.kinematics.inverse import inverse_kinematics_for
+from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
-from optimizer.problem.targets import AnyOf, Target
+from optimizer.problem.targets import Target, members
 from optimizer.search.candidates import Candidate
 from optimizer.search.free_goal_bound import FEW, TIGHT_ROUNDS, family_bound
 from optimizer.search.lower_bound import LeastBound
-from optimizer.search.self_motion_bound import EndCurves, self_motion_bound
+from optimizer.search.self_motion_bound import EndCurves, bound_between, self_motion_bound
 
 
 def all_known(problem: Problem) -> bool:
@@ -30,20 +34,45 @@ def bound_of_others(prepared: PreparedProblem, candidates: Sequence[Candidate], 
     """Lower bound [J] on the motions between poses in configurations that are none of the candidates; inf if there are
     none.
 
-    If all branches are known, the others are on self-motions. Else they may be anywhere. From given joint positions
-    the bound is then that of the motions to the goal poses with any rotation about their z axes, by boxes of joint
-    positions that need no inverse kinematics. From poses it is that of the motions between any two configurations.
+    If all branches are known, the others are on self-motions. Else they may be anywhere. Of an arm that is nearly of a
+    form whose curves are known, they are on `covering_sheets`. From given joint positions of any other arm the bound is
+    that of the motions to the goal poses with any rotation about their z axes, by boxes of joint positions that need no
+    inverse kinematics. From poses it is that of the motions between any two configurations.
     """
     problem = prepared.problem
     if all_known(problem):
         return self_motion_bound(prepared, candidates, deadline)
-    if _poses(problem.start):
+    between_poses = bool(_poses(problem.start))
+    if not (between_poses and any(isinstance(each, ConeOrientedPose) for each in members(problem.goal))):
+        starts, goals = _covered(prepared, candidates, "start"), _covered(prepared, candidates, "goal")
+        if starts is not None and goals is not None:
+            return bound_between(prepared, starts, goals, deadline)
+    if between_poses:
         return _bound_of_any(prepared)
     poses = [ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)]
     curves = EndCurves.of([each.start for each in candidates])
-    starts, half = curves.boxes(curves.first())
+    boxes, half = curves.boxes(curves.first())
     rounds = max(1, (TIGHT_ROUNDS if problem.bound == "tight" else FEW) // len(poses))
-    return min(family_bound(prepared, pose, starts, rounds, deadline, half, given=curves.given) for pose in poses)
+    return min(family_bound(prepared, pose, boxes, rounds, deadline, half, given=curves.given) for pose in poses)
+
+
+def _covered(
+    prepared: PreparedProblem, candidates: Sequence[Candidate], name: Literal["start", "goal"]
+) -> EndCurves | None:
+    """Joint positions that are given at one end, and all that reaches its poses; None of an arm whose poses are not
+    covered. Poses of free orientation are left to `free_goal_bound`."""
+    arm, curves = prepared.arm, dict[int, Array | CoveringSheet]()
+    for end in (getattr(candidate, name) for candidate in candidates):
+        if end.fixed and not end.sampled:
+            curves[id(end.q)] = end.q
+    given = True
+    for pose in _poses(getattr(prepared.problem, name)):
+        sheets = covering_sheets(arm.robot, flange_pose(pose.T, arm.T_flange_tcp))
+        if sheets is None:
+            return None
+        curves |= {id(each): each for each in sheets}
+        given = False
+    return EndCurves(arm.robot.nq, list(curves.values()), given)
 
 
 def _bound_of_any(prepared: PreparedProblem) -> float:
@@ -58,4 +87,4 @@ def _bound_of_any(prepared: PreparedProblem) -> float:
 
 def _poses(target: Target) -> list[Pose]:
     """The poses among targets. Of a pose whose orientation is free in part, only samples are solved in any case."""
-    return [each for each in (target.targets if isinstance(target, AnyOf) else (target,)) if isinstance(each, Pose)]
+    return [each for each in members(target) if isinstance(each, Pose)]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.covering_sheets import CoveringSheet
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
@@ -40,9 +41,15 @@ def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate]
     pairs = [each for each in candidates if each.sampled and not (each.start.tolerance or each.goal.tolerance)]
     if not pairs:
         return np.inf
-    return _CellSearch(
-        prepared, EndCurves.of([each.start for each in pairs]), EndCurves.of([each.goal for each in pairs])
-    ).run(deadline)
+    return bound_between(
+        prepared, EndCurves.of([each.start for each in pairs]), EndCurves.of([each.goal for each in pairs]), deadline
+    )
+
+
+def bound_between(prepared: PreparedProblem, starts: EndCurves, goals: EndCurves, deadline: Deadline = NEVER) -> float:
+    """Bound [J] on motions from any of the starts to any of the goals, of which at least one is no isolated
+    configuration."""
+    return _CellSearch(prepared, starts, goals).run(deadline)
 
 
 @dataclass(frozen=True)
@@ -77,13 +84,14 @@ class Cells:
 
 @dataclass(frozen=True)
 class EndCurves:
-    """What reaches the targets at one end: isolated configurations of so many `joints`, and self-motions.
+    """What reaches the targets at one end: isolated configurations of so many `joints`, and self-motions, or sheets
+    that hold whatever reaches a pose.
 
     `given`: all are joint positions that a target gives, without other full turns.
     """
 
     joints: int
-    curves: list[Array | SelfMotion]
+    curves: Sequence[Array | SelfMotion | CoveringSheet]
     given: bool
 
     @staticmethod
@@ -105,7 +113,7 @@ class EndCurves:
                 curve += [k] * count
                 parameter += [lower + side * (2 * n + 1) for n in range(count)]
                 half += [side] * count
-        return Cells(np.array(curve), np.array(parameter), np.array(half))
+        return Cells(np.array(curve, dtype=np.intp), np.array(parameter), np.array(half))
 
     def boxes(self, cells: Cells) -> tuple[Array, Array]:
         """Middle and half sides (n, nq) [rad] of a box around every cell."""
@@ -130,8 +138,10 @@ class _CellSearch:
         self.limits = prepared.arm.active_limits
 
     def run(self, deadline: Deadline) -> float:
-        """The least bound [J] of any pair after at most ROUNDS rounds of halving."""
+        """The least bound [J] of any pair after at most ROUNDS rounds of halving; inf if there is none."""
         starts, goals = self.first()
+        if not len(starts.curve):
+            return np.inf
         value, least = self.bounds(starts, goals), np.inf
         for _ in range(ROUNDS):
             order = np.argsort(value, kind="stable")
