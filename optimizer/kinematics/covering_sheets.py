@@ -18,11 +18,13 @@ beyond the shoulder are shifted together with the third, so that their δ_k are 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.robot import MOST_ROBOTS, Array, Robot
 from optimizer.kinematics.chain import Chain
@@ -55,13 +57,18 @@ class CoveringSheet:
     mirrored: bool
     arcs: list[tuple[float, float]]
 
-    def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
-        """Middles and half sides (n, 7) [rad] around all configurations within `half` (n,) of parameters (n,)."""
-        found = _boxes(self.pose, np.tile(self.sheet, (len(parameter), 1)), parameter, half, self.blur)
-        if self.mirrored:
-            # from the flange on, the joints come in the other order and turn the other way
-            return -found.centre[:, ::-1], found.half[:, ::-1]
-        return found.centre, found.half
+
+def boxes_on(
+    sheets: Sequence[CoveringSheet], rows: NDArray[np.intp], parameter: Array, half: Array
+) -> tuple[Array, Array]:
+    """Middles and half sides (n, 7) [rad] around all configurations within `half` (n,) of parameters (n,), each on the
+    sheet of one pose whose row (n,) is given."""
+    one = sheets[0]
+    found = _boxes(one.pose, np.array([each.sheet for each in sheets])[rows], parameter, half, one.blur)
+    if one.mirrored:
+        # from the flange on, the joints come in the other order and turn the other way
+        return -found.centre[:, ::-1], found.half[:, ::-1]
+    return found.centre, found.half
 
 
 def covering_sheets(robot: Robot, T: Array) -> list[CoveringSheet] | None:

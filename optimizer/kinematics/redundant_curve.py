@@ -107,17 +107,9 @@ class RedundantCurve:
         q7 = self.last_angle(parameter)
         return self.pose.configurations(q7, np.tile(self.sheet, (len(q7), 1)))
 
-    def cells(self, parameter: Array, half: Array) -> Cells:
-        """What is within `half` (n,) of parameters (n,)."""
-        lower, upper = np.asarray(parameter - half), np.asarray(parameter + half)
-        if not self.whole:
-            lower, upper = np.clip(lower, 0.0, np.pi), np.clip(upper, 0.0, np.pi)
-        sheet = np.tile(self.sheet, (len(lower), 1))
-        return Cells(self.last_angle(lower), self.last_angle(upper), sheet)
-
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion` and `redundant_boxes`."""
-        return boxes_of(self.pose, self.cells(np.asarray(parameter, dtype=float), np.asarray(half, dtype=float)))
+        return CurveStack.of([self]).boxes(np.zeros(len(parameter), dtype=np.intp), parameter, half)
 
 
 def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> list[Array]:
@@ -200,6 +192,13 @@ class CurveStack:
     def last_angle(self, u: Array, rows: NDArray[np.intp]) -> Array:
         """q7 (…, n) [rad] at parameters u (…, n) of curves (n,)."""
         return last_angle(u, self.interval[:, rows], self.whole[rows])
+
+    def boxes(self, rows: NDArray[np.intp], parameter: Array, half: Array) -> tuple[Array, Array]:
+        """Boxes as of `SelfMotion`, each of the curve whose row (n,) is given."""
+        ends = np.array([parameter - half, parameter + half])
+        ends = np.where(self.whole[rows], ends, np.clip(ends, 0.0, np.pi))
+        low, high = self.last_angle(ends, rows)
+        return boxes_of(self.pose, Cells(low, high, self.sheet[rows]))
 
 
 def _judged(

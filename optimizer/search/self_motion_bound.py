@@ -9,15 +9,17 @@ their boxes are small. The least value over all pairs bounds the family.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.deadline import NEVER, Deadline
-from optimizer.kinematics.covering_sheets import CoveringSheet
+from optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on
+from optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
@@ -31,6 +33,9 @@ FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-4, 256, 60
 # no bound of a family exceeds that of a single member: halving ends once it is so near to the least of those seen, at
 # the middles of so many pairs in each round
 CLOSE, MIDDLES = 1e-3, 4
+
+# finds boxes from rows in a group of curves (n,), parameters and half sides (n,) [rad]
+_Boxes = Callable[[NDArray[np.intp], Array, Array], tuple[Array, Array]]
 
 
 def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
@@ -119,13 +124,39 @@ class EndCurves:
         """Middle and half sides (n, nq) [rad] of a box around every cell."""
         shape = (len(cells.curve), self.joints)
         centre, half = np.zeros(shape), np.zeros(shape)
-        for k, each in enumerate(self.curves):
-            own = np.flatnonzero(cells.curve == k)
-            if isinstance(each, np.ndarray):
-                centre[own] = each
-            elif len(own):
-                centre[own], half[own] = each.boxes(cells.parameter[own], cells.half[own])
+        for owners, boxes in self._groups:
+            row = np.full(len(self.curves), -1)
+            row[owners] = np.arange(len(owners))
+            rows = row[cells.curve]
+            own = np.flatnonzero(rows >= 0)
+            if len(own):
+                centre[own], half[own] = boxes(rows[own], cells.parameter[own], cells.half[own])
         return centre, half
+
+    @cached_property
+    def _groups(self) -> list[tuple[list[int], _Boxes]]:
+        """Curves by index whose boxes are found at once, and how. Those of one pose and form are."""
+        found: dict[tuple[type, int], list[int]] = {}
+        for k, each in enumerate(self.curves):
+            if isinstance(each, RedundantCurve | CoveringSheet):
+                key = id(each.pose)
+            else:
+                key = 0 if isinstance(each, np.ndarray) else id(each)
+            found.setdefault((type(each), key), []).append(k)
+        return [(owners, _boxes_of([self.curves[k] for k in owners])) for owners in found.values()]
+
+
+def _boxes_of(curves: Sequence[Array | SelfMotion | CoveringSheet]) -> _Boxes:
+    """How the boxes of a group of `EndCurves` are found."""
+    one = curves[0]
+    if isinstance(one, RedundantCurve):
+        return CurveStack.of([each for each in curves if isinstance(each, RedundantCurve)]).boxes
+    if isinstance(one, CoveringSheet):
+        return partial(boxes_on, [each for each in curves if isinstance(each, CoveringSheet)])
+    if isinstance(one, np.ndarray):
+        q = np.array(curves)
+        return lambda rows, _, half: (q[rows], np.zeros((len(half), q.shape[1])))
+    return lambda _, parameter, half: one.boxes(parameter, half)
 
 
 class _CellSearch:

@@ -11,7 +11,7 @@ from models.registry import load_robot
 from models.robot import Array, Robot
 from optimizer.kinematics.angles import nearest_turn, wrapped
 from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.covering_sheets import CoveringSheet, covering_sheets
+from optimizer.kinematics.covering_sheets import CoveringSheet, boxes_on, covering_sheets
 from optimizer.kinematics.redundant_arm import RedundantArm
 from tests.optimizer.chains import serial_chain
 from tests.selection import long_but
@@ -57,7 +57,7 @@ def holding(sheets: list[CoveringSheet], q: Array, half: float, shift: float) ->
         for low, high in sheet.arcs:
             own = float(nearest_turn(np.asarray(u), np.asarray((low + high) / 2)))
             if low - ROUNDING <= own <= high + ROUNDING:
-                centre, sides = sheet.boxes(np.array([own + shift * half]), np.array([half]))
+                centre, sides = boxes_on([sheet], np.array([0]), np.array([own + shift * half]), np.array([half]))
                 if (np.abs(wrapped(q - centre[0])) <= sides[0] + ROUNDING).all():
                     found.append(float(sides.max()))
     return found
