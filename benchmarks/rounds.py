@@ -1,15 +1,19 @@
 """Rounds of stops: what deciding all stops together saves against move by move, the proven gap, and the time.
 
     python -m benchmarks.rounds --count 20
+    python -m benchmarks.rounds --count 50 --dwell 0
+    python -m benchmarks.rounds --count 50 --anywhere
     python -m benchmarks.rounds --count 5 --stops 12
     python -m benchmarks.rounds --count 10 --time 1.5
     python -m benchmarks.rounds --count 20 --stops 5 --passes 4
     python -m benchmarks.rounds --count 5 --stops 12 --free
     python -m benchmarks.rounds --count 1 --stops 245 --deadline 600
 
-A UR5e starts from rest over the table, takes up 2 kg at every other stop, puts it down at the next one, and comes back.
-Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each. Collisions are ignored,
-so that every round has an answer. With `--time`, each round gets so many times the duration of least energy. With
+A UR5e starts from rest at given joint positions over the table, takes up 2 kg at every other stop, puts it down at the
+next one, and comes back. Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each,
+or as long as `--dwell` says: what it draws then, no choice of configurations saves. Collisions are ignored, so that
+every round has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
+move, the first move chooses it. With `--time`, each round gets so many times the duration of least energy. With
 `--passes`, it passes through the first stops without a rest, and carries the part nowhere; then a round that needs more
 than the one that stops there ends the benchmark. With `--free`, the order is free, the arm carries nothing either, and
 full turns do not count.
@@ -39,6 +43,9 @@ PART, NOTHING = Payload(mass=2.0, com=np.array([0.0, 0.0, 0.05])), Payload()
 # ring around the base, heights [m], and greatest tilt of the tool [rad]
 NEAREST, FARTHEST, HEIGHTS, TILT = 0.35, 0.7, (0.05, 0.4), 0.2
 
+# of a stop [s]
+DWELL = 0.3
+
 
 def poses(rng: np.random.Generator, count: int) -> list[Pose]:
     """Poses with the tool nearly down."""
@@ -52,27 +59,34 @@ def poses(rng: np.random.Generator, count: int) -> list[Pose]:
 
 
 def rounds(
-    seed: int, count: int, stops: int, deadline: float, passes: int = 0, free: bool = False
+    seed: int,
+    count: int,
+    stops: int,
+    deadline: float,
+    passes: int = 0,
+    free: bool = False,
+    dwell: float = DWELL,
+    anywhere: bool = False,
 ) -> Iterator[WorkRound]:
     """The rounds, each with a generator of its own."""
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
     for k in range(count):
-        targets = poses(np.random.default_rng([seed, k]), stops)
+        *targets, first = poses(np.random.default_rng([seed, k]), stops + 1)
         yield WorkRound(
             arm=arm,
-            start=HOME,
-            stops=[_stop(j, pose, passes, free) for j, pose in enumerate(targets)],
+            start=first if anywhere else HOME,
+            stops=[_stop(j, pose, passes, free, dwell) for j, pose in enumerate(targets)],
             order=FreeOrder() if free else None,
             windings=not free,
             deadline=deadline,
         )
 
 
-def _stop(number: int, pose: Pose, passes: int, free: bool) -> Stop:
+def _stop(number: int, pose: Pose, passes: int, free: bool, dwell: float) -> Stop:
     if passes or free:
         passed = number < passes
-        return Stop(name=str(number), target=pose, dwell=0.0 if passed else 0.3, passed=passed)
-    return Stop(name=str(number), target=pose, dwell=0.3, payload=NOTHING if number % 2 else PART)
+        return Stop(name=str(number), target=pose, dwell=0.0 if passed else dwell, passed=passed)
+    return Stop(name=str(number), target=pose, dwell=dwell, payload=NOTHING if number % 2 else PART)
 
 
 def in_time(asked: WorkRound, factor: float) -> WorkRound:
@@ -89,14 +103,18 @@ def main() -> None:
     arguments.add_argument("--deadline", type=float, default=60.0, help="deadline of a round [s] (%(default)s)")
     arguments.add_argument("--passes", type=int, default=0, help="stops that are passed (%(default)s)")
     arguments.add_argument("--free", action="store_true", help="the order is free")
+    arguments.add_argument("--anywhere", action="store_true", help="the start is a pose, in any configuration")
     arguments.add_argument("--time", type=float, help="give each round so many times its own duration")
+    arguments.add_argument("--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)")
     given = arguments.parse_args()
     on_one_core()
     compile_kernel(load_robot("ur5e"))
     optimize_round(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
     found: dict[str, list[float]] = {}
     optimal = 0
-    for own in rounds(given.seed, given.count, given.stops, given.deadline, given.passes, given.free):
+    for own in rounds(
+        given.seed, given.count, given.stops, given.deadline, given.passes, given.free, given.dwell, given.anywhere
+    ):
         asked = own if given.time is None else in_time(own, given.time)
         began = time.perf_counter()
         answer = optimize_round(asked)

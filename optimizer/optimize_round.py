@@ -162,7 +162,7 @@ def _best_of(search: RoundSearch) -> _Found:
         return _in_time(search, asked.duration_max, None)
     nodes = search.run()
     # what passes has the round with rests instead
-    greedy = None if asked.passes else move_by_move(search, nodes[0])
+    greedy = None if asked.passes else move_by_move(search)
     if greedy is not None and search.cost(greedy) < search.cost(nodes):
         # by what the search could not tell apart: motions that were not yet optimised to the end
         nodes = greedy

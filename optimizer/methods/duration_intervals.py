@@ -11,9 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from models.robot import Array
-from optimizer.energy.dwell import linear_dwells
+from optimizer.energy.dwell import LinearDwell, linear_dwells, waits
 from optimizer.energy.plant import WIDTH
+from optimizer.nlp.goal_holding import GoalHolding
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cycle import Cycle
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 
 
@@ -21,7 +23,8 @@ from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 class DurationInterval:
     """Durations from t_min to t_max [s], packed kernel parameters p, and a constant part of the cost [J].
 
-    `minimum_time`: the duration is the cost. `price` [W]: of time, beside the problem's own objective.
+    `minimum_time`: the duration is the cost. `price` [W]: of time, beside the problem's own objective. `goal_holding`:
+    in a cycle, what waiting at another goal draws beside.
     """
 
     p: Array
@@ -30,6 +33,7 @@ class DurationInterval:
     constant: float = 0.0
     minimum_time: bool = False
     price: float = 0.0
+    goal_holding: GoalHolding | None = None
 
 
 def duration_intervals(
@@ -48,16 +52,24 @@ def duration_intervals(
     if problem.cycle is None or problem.objective == "mechanical":
         weights = {problem.objective: 1.0}
         return [DurationInterval(prepared.parameters(**weights, regeneration=surplus_value, width=width), t_min, t_max)]
+    hold = prepared.holding_power(q_goal)
     return [
         DurationInterval(
             prepared.parameters(electrical=1.0, time=-float(piece.power), regeneration=surplus_value, width=width),
             max(t_min, piece.t_min),
             min(t_max, piece.t_max),
             float(piece.constant),
+            goal_holding=_goal_holding(prepared, problem.cycle, float(hold), piece),
         )
-        for piece in linear_dwells(problem.cycle, problem.arm, prepared.holding_power(q_goal))
+        for piece in linear_dwells(problem.cycle, problem.arm, hold)
         if max(t_min, piece.t_min) <= min(t_max, piece.t_max)
     ]
+
+
+def _goal_holding(prepared: PreparedProblem, cycle: Cycle, hold: float, piece: LinearDwell) -> GoalHolding:
+    first, last = (waits(cycle, T)[0] for T in (piece.t_min, piece.t_max))
+    rate = (first - last) / (piece.t_max - piece.t_min)
+    return GoalHolding(prepared.holding_power, hold, first + rate * piece.t_min, rate)
 
 
 def fastest(prepared: PreparedProblem) -> DurationInterval:

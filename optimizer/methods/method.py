@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.deadline import Deadline
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.prepared_problem import PreparedProblem
@@ -19,6 +19,14 @@ from optimizer.trajectories.spline import Spline
 
 DEADLINE_PASSED = "the deadline passed"
 CONVERGED = "converged"
+
+
+def with_excess(cost: float, tau: Array, limits: Limits) -> float:
+    """A cost that is greater by the largest share by which torques tau (N, nq) [N·m] exceed their limits.
+
+    A cost may be below zero, where waiting less counts as a gain: then it comes nearer to zero.
+    """
+    return cost + abs(cost) * float(np.maximum(np.abs(tau) / limits.tau_max - 1, 0).max())
 
 
 class SolveStatus(StrEnum):

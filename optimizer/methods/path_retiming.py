@@ -36,7 +36,7 @@ from optimizer.methods.limit_repair import (
     slightly_retimed,
     tightened,
 )
-from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
+from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus, with_excess
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline, lasting, least_time_scale, sample, spline_of
@@ -188,7 +188,7 @@ class PathRetiming:
         best = np.inf
         for duration in durations:
             cost, tau = self._cost(unit, duration)
-            cost *= 1 + float(np.maximum(np.abs(tau) / limits.tau_max - 1, 0).max())
+            cost = with_excess(cost, tau, limits)
             if cost >= best:
                 break
             best, x[-1] = cost, np.log(duration)

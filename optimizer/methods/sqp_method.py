@@ -25,7 +25,7 @@ from optimizer.methods.limit_repair import (
     tightened,
     with_repaired_path,
 )
-from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from optimizer.methods.method import CONVERGED, DEADLINE_PASSED, Method, SolveResult, SolveStatus, with_excess
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH, plan, to_goal, without_path
 from optimizer.nlp.coordinates import Coordinates
 from optimizer.nlp.nonlinear_program import NonlinearProgram
@@ -221,6 +221,7 @@ class SqpMethod(Method):
             passes=self.passes if len(self.passes) else None,
             start_curve=self.start_curve,
             goal_curve=self.goal_curve,
+            goal_holding=interval.goal_holding,
         )
         free = program.free_points(guess.points)
         limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
@@ -240,7 +241,7 @@ class SqpMethod(Method):
             if duration > program.t_max:
                 continue
             cost, tau = program.value(free, duration)
-            cost *= 1 + float(np.maximum(np.abs(tau) / program.limits.tau_max - 1, 0).max())
+            cost = with_excess(cost, tau, program.limits)
             if cost < best:
                 best, chosen = cost, duration
             elif best < np.inf and duration < program.t_max:

@@ -12,7 +12,7 @@ linear model of such a constraint is never looser than the constraint, so a step
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.nlp.active_path_constraints import Index, PathConstraintRows
 from optimizer.nlp.clearance_constraint import CLEARANCE
 from optimizer.nlp.coordinates import Coordinates, GoalConstraints
+from optimizer.nlp.goal_holding import GoalHolding
 from optimizer.trajectories.bspline import Basis
 
 # an NLP counts as feasible if no constraint exceeds its limit by more than this ratio
@@ -54,9 +55,9 @@ class NonlinearProgram:
     `p` is the packed parameter vector of the kernel. The duration lies in [t_min, t_max] [s]; equal bounds fix it.
     `constant` [J] is a part of the cost that no variable changes: it keeps relative changes of the cost in proportion.
     With `goal_constraints` or a `goal_curve` the goal is a decision variable too: the last row of the free control
-    points. With a `start_curve` the start is one, too: the first row. Every ratio of `path` is bounded by `path_bounds`
-    (c,), 1 or a little less. The spline passes through the configurations `passes` (k, r), in their order, at times
-    that are free.
+    points; `goal_holding` is what waiting there draws. With a `start_curve` the start is one, too: the first row. Every
+    ratio of `path` is bounded by `path_bounds` (c,), 1 or a little less. The spline passes through the configurations
+    `passes` (k, r), in their order, at times that are free.
     """
 
     kernel: Kernel
@@ -69,6 +70,7 @@ class NonlinearProgram:
     goal_constraints: GoalConstraints | None = None
     start_curve: HeldPose | None = None
     goal_curve: HeldPose | None = None
+    goal_holding: GoalHolding | None = None
     path: PathConstraints | None = None
     path_bounds: Array = field(default_factory=lambda: np.zeros(0))
     passes: Array | None = None
@@ -157,7 +159,10 @@ class NonlinearProgram:
         """Cost [J] and limited torques (N, nq)."""
         _, y = self._states(free, T)
         cost, tau = self.kernel.value(y, self.p)
-        return self.constant + T * float(self.basis.weights @ cost), tau
+        total = self.constant + T * float(self.basis.weights @ cost)
+        if self.goal_holding is not None and self.free_goal:
+            total += self.goal_holding.value(free[-1], T)
+        return total, tau
 
     def derivatives(self, free: Array, T: float, multiplier: Array) -> Linearisation:
         """Cost and torques with derivatives; `multiplier` (N, nq) weighs the torques in the Hessian."""
@@ -181,7 +186,7 @@ class NonlinearProgram:
         gradient_s = T * (D.reshape(count * 3, -1).T @ wG)
         weighted_torque = (multiplier[:, None, :] @ J.reshape(count, nq, 3 * r)).reshape(count, 3, r)
         lagrangian = T * w[:, None, None] * G + weighted_torque
-        return Linearisation(
+        line = Linearisation(
             cost=self.constant + T * total,
             gradient=np.append(gradient_s.ravel(), total + T * slope),
             hessian=_Nodes(T, z, D, rate, lagrangian, H).hessian(gradient_s, slope),
@@ -189,6 +194,16 @@ class NonlinearProgram:
             jacobian=J,
             rate=rate,
         )
+        return line if self.goal_holding is None or not self.free_goal else self._held(line, free[-1], T)
+
+    def _held(self, line: Linearisation, goal: Array, T: float) -> Linearisation:
+        """The linearisation with what holding the arm at the goal (r,) draws: of the last row, and the duration."""
+        assert self.goal_holding is not None
+        cost, first, second = self.goal_holding.derivatives(goal, T)
+        gradient, hessian, own = line.gradient.copy(), line.hessian.copy(), slice(-len(first), None)
+        gradient[own] += first
+        hessian[own, own] += second
+        return replace(line, cost=line.cost + cost, gradient=gradient, hessian=hessian)
 
     @cached_property
     def _nodes_free(self) -> Array:

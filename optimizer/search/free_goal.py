@@ -151,7 +151,15 @@ def _proposal(incumbent: Incumbent, candidate: Candidate, radius: float) -> tupl
     else:
         allowed = goal_constraints(prepared, pose, candidate.q_goal, radius)
     program = NonlinearProgram(
-        prepared.kernel, space, interval.p, coordinates, interval.t_min, interval.t_max, interval.constant, allowed
+        prepared.kernel,
+        space,
+        interval.p,
+        coordinates,
+        interval.t_min,
+        interval.t_max,
+        interval.constant,
+        allowed,
+        goal_holding=interval.goal_holding,
     )
     free = np.concatenate([points[space.free], candidate.q_goal[None]])
     result = solve(program, free, spline.duration, None, incumbent.deadline, PROGRESS)

@@ -24,18 +24,23 @@ from optimizer.solution import Baseline, Sensitivity, Solution
 from optimizer.trajectories.spline import Spline, lasting
 
 
-def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
-    """The nodes of the chain that takes the move of least energy at each stop, from node `start` of the first layer.
+def move_by_move(search: RoundSearch) -> list[int] | None:
+    """The nodes of the chain that takes the move of least energy at each stop, as single requests would.
 
-    The last move of a closed round has no choice. None if some move has no motion, or the time is up. All motions of
-    the chain are in the search's `solutions` then.
+    The first move chooses the configuration at the start, too; the last one of a closed round has no choice. None if
+    some move has no motion, or the time is up. All motions of the chain are in the search's `solutions` then.
     """
-    nodes = [start]
+    nodes = list[int]()
     for k, leg in enumerate(search.legs):
-        s, goals = nodes[-1], _goals(search, k, start)
+        starts, goals = np.array(nodes[-1:] or range(len(leg.start.q))), np.array(_goals(search, k, nodes))
         while True:
             # the dwell is no part of the move
-            g = min(goals, key=lambda each: float(leg.cost[s, each] - leg.dwell[each]))
+            costs = leg.cost[np.ix_(starts, goals)] - leg.dwell[goals]
+            first, last = np.unravel_index(costs.argmin(), costs.shape)
+            s, g = int(starts[first]), int(goals[last])
+            if len(starts) > 1:
+                # of pairs that differ in common full turns, the one with most range left for the moves to come
+                s, g = leg.pair[leg.kind[s, g]].tolist()
             if not np.isfinite(leg.cost[s, g]):
                 return None
             if leg.known(s, g):
@@ -43,7 +48,7 @@ def move_by_move(search: RoundSearch, start: int) -> list[int] | None:
             if search.search_end.passed:
                 return None
             search.try_kind(k, s, g)
-        nodes.append(g)
+        nodes = [*(nodes or [s]), g]
     try:
         for each in search.pairs(nodes):
             if each not in search.solutions:
@@ -153,7 +158,7 @@ def controller_default(search: RoundSearch, start: int, ours: Needed) -> RoundBa
             nodes.append(node)
             sensitivities.append(own.sensitivity)
             continue
-        goals = _goals(search, k, start)
+        goals = _goals(search, k, nodes)
         prepared, q_start = leg.prepared, leg.start.q[node]
         q_goal = nearest(prepared.problem, q_start, leg.goal.q[goals])
         node = next(g for g in goals if (leg.goal.q[g] == q_goal).all())
@@ -217,7 +222,8 @@ def _on_way(search: RoundSearch, move: int, node: int) -> Solution | None:
     return search.solutions.get(key)
 
 
-def _goals(search: RoundSearch, move: int, start: int) -> list[int]:
-    """The nodes to which a move may lead: a closed round ends in the node `start` from which it went out."""
+def _goals(search: RoundSearch, move: int, nodes: list[int]) -> list[int]:
+    """The nodes to which a move may lead: a closed round ends in the node from which it went out, the first of
+    `nodes`."""
     last = search.asked.closed and move == len(search.legs) - 1
-    return [start] if last else list(range(len(search.legs[move].goal.q)))
+    return nodes[:1] if last else list(range(len(search.legs[move].goal.q)))

@@ -15,7 +15,7 @@ from optimizer.deadline import NEVER
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import DurationTooShort
 from optimizer.methods import METHODS, polynomial_ga
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, with_excess
 from optimizer.methods.polynomial_ga import PolynomialGA
 from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
@@ -191,3 +191,11 @@ def test_the_genetic_algorithm_is_never_optimal_with_energy_storage_either() -> 
     store = Bus(mode="storage", capacity=5.0, power=200.0, efficiency=0.9)
     solution = optimize(problem(method="polynomial_ga", bus=store))
     assert solution.certificate.valid and solution.status == "feasible"
+
+
+@pytest.mark.parametrize("cost", [5.0, -5.0])
+def test_a_torque_beyond_its_limit_costs_more_even_if_the_cost_is_below_zero(cost: float) -> None:
+    """Where waiting less is a gain, costs are negative: then durations that no motor can make were preferred."""
+    own = ROBOT.limits
+    within, beyond = (with_excess(cost, share * own.tau_max[None], own) for share in (0.9, 1.5))
+    assert within == cost and beyond == pytest.approx(cost + 2.5)

@@ -106,14 +106,17 @@ def test_rounds_are_true_and_not_above_move_by_move(seed: int, count: int) -> No
     assert all(each.saving >= -ROUNDING for each in found.baselines if each.name == "move_by_move")
 
 
-def test_move_by_move_is_what_successive_calls_of_optimize_give() -> None:
-    asked = pick_and_place(1, 3)
+@pytest.mark.parametrize("start", [HOME, poses(1, 4)[3]], ids=["joint positions", "pose"])
+def test_move_by_move_is_what_successive_calls_of_optimize_give(start: Array | Pose) -> None:
+    """From a pose, the first of them takes the configuration at the start that is best for itself."""
+    asked = pick_and_place(1, 3, start=start)
     found = optimize_round(asked)
-    q, total = HOME, 0.0
+    q, total, visited = start, 0.0, list[Array]()
     for k, stop in enumerate(asked.stops):
         move = optimize(Problem(arm=asked.arms[k], start=q, goal=stop.target, deadline=AMPLE))
+        visited += [move.start.q] * (k == 0) + [move.goal.q]
         q, total = move.goal.q, total + move.energy.electrical.total
-    total += energy_of(asked, len(asked.stops), q, HOME)
+    total += energy_of(asked, len(asked.stops), visited[-1], visited[0])
     total += sum(move.dwell_energy for move in found.moves)
     (greedy,) = (each for each in found.baselines if each.name == "move_by_move")
     assert greedy.electrical == pytest.approx(total, rel=0.01)  # either may take the other of two equal moves
