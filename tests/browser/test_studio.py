@@ -99,6 +99,27 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
     assert page.evaluate(PIXELS)[1] == before
 
 
+def test_what_stands_before_the_arm_fades(page: Page) -> None:
+    """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does not."""
+    faint = """show => {
+        const { view } = studio;
+        const { position } = view.camera;
+        const before = position.clone();
+        studio.state.show.fade = show;
+        position.set(-2.4, -0.6, 0.45);
+        view.render();
+        const faint = view.parts.obstacles.children.filter(({ userData }) => userData.material.opacity < 0.5);
+        position.copy(before);
+        studio.state.show.fade = true;
+        view.render();
+        return faint.map(({ userData }) => userData.name);
+    }"""
+    tcp(page, state(page, "duration"))
+    found = page.evaluate(faint, True)
+    assert found and all(name.startswith("shelf") for name in found)
+    assert page.evaluate(faint, False) == []
+
+
 def test_a_coarse_picture_has_no_shadows(page: Page) -> None:
     """On a machine without a graphics card they take half the time of a moving picture. A still one has them again."""
     drawn = """fineness => {
