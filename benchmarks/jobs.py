@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 import time
@@ -30,7 +29,7 @@ import numpy as np
 
 from app.schemas.examples.values import HOME, NEAR
 from benchmarks.command import parser, write_json
-from benchmarks.service import COMPUTED, START, Client, Service, a_cluster, running
+from benchmarks.service import COMPUTED, START, Client, Service, a_cluster, processor_time, running
 from benchmarks.statistics import Spread
 from benchmarks.tasks import request_task
 
@@ -76,12 +75,6 @@ def statuses(client: Client, path: str) -> list[Results]:
         page = client.get(f"{path}?limit=1000&after={after}").content
         found, after = found + page["requests"], page["next"]
     return found
-
-
-def processor_time(pid: int) -> float:
-    """Processor time that a process has used [s]."""
-    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
-    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
 
 
 def overhead_of(requests: list[Results], workers_for_jobs: int, **environment: str) -> Results:

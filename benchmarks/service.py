@@ -182,6 +182,25 @@ def _free_port() -> int:
     raise RuntimeError("no free port: end other services")
 
 
+def processor_time(pid: int) -> float:
+    """Processor time that a process has used [s]."""
+    times = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
+
+
+def descendants(pid: int) -> set[int]:
+    """The processes that a process has started, and those that these have started."""
+    parents: dict[int, int] = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parents[int(folder.name)] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+    found, waiting = set[int](), {pid}
+    while waiting:
+        waiting = {child for child, parent in parents.items() if parent in waiting}
+        found |= waiting
+    return found
+
+
 def resident(pid: int) -> float:
     """Resident memory of a process [MiB]; 0 if it has ended."""
     try:

@@ -99,36 +99,6 @@ def test_something_is_drawn_and_switches_change_it(page: Page) -> None:
     assert page.evaluate(PIXELS)[1] == before
 
 
-def test_a_coarse_picture_has_no_shadows(page: Page) -> None:
-    """On a machine without a graphics card they take half the time of a moving picture. A still one has them again."""
-    drawn = """fineness => {
-        const { view } = studio;
-        view.setFineness(fineness);
-        view.renderer.shadowMap.needsUpdate = true;
-        view.renderer.render(view.scene, view.camera);
-        return view.renderer.info.render.calls;
-    }"""
-    assert page.evaluate(drawn, 0.5) < page.evaluate(drawn, 1)
-
-
-def test_an_obstacle_under_the_pointer_tells_its_name_and_margin(page: Page) -> None:
-    shells = "() => studio.view.parts.margins.children.filter(({ visible }) => visible).length"
-    x, y = page.evaluate("""() => {
-        const { view } = studio;
-        const top = view.parts.obstacles.children.find(({ userData }) => userData.name === "shelf top");
-        const at = top.children[0].getWorldPosition(view.camera.position.clone()).project(view.camera);
-        const box = view.renderer.domElement.getBoundingClientRect();
-        return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
-    }""")
-    assert page.evaluate(shells) == 0
-    page.mouse.move(x, y)
-    expect(page.locator(".label.hover")).to_have_text("shelf top, margin 10.0 mm")
-    assert page.evaluate(shells) == 1
-    page.mouse.move(5, 5)
-    expect(page.locator(".label.hover")).to_have_count(0)
-    assert page.evaluate(shells) == 0
-
-
 def test_the_nearest_points_are_those_of_the_certificate(page: Page) -> None:
     clearance = state(page, "answer.certificate.clearance")
     drawn = page.evaluate("""() => [...studio.view.parts.nearest.children.at(-1).geometry.attributes.position.array]""")
@@ -151,18 +121,6 @@ def test_the_makers_meshes_are_drawn(browser: Browser, service: Server, page: Pa
         other.unroute("**/meshes.glb")
         ask(other, move(robot="ur3e"))
         until(other, MESHES)
-
-
-def test_words_stay_in_the_picture(browser: Browser, service: Server) -> None:
-    """On a phone, the name of the nearest pair is wider than the room beside it."""
-    with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
-        until(page, SHOWN)
-        until(page, MESHES)
-        # once more drawn, after the picture was made anew
-        page.evaluate("() => studio.view.render()")
-        label, box = (page.locator(name).bounding_box() for name in (".label.near", "#labels"))
-        assert label and box
-        assert box["x"] <= label["x"] and label["x"] + label["width"] <= box["x"] + box["width"]
 
 
 def test_one_clock(page: Page) -> None:
