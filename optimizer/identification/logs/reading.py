@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 from typing import Any, Literal
@@ -17,7 +17,7 @@ from optimizer.exceptions import InvalidProblem, InvalidTable
 from optimizer.identification.logs.channels import channels_of
 from optimizer.identification.logs.columns import Columns, Group, mapped, recognised
 from optimizer.identification.logs.effort import effort_report
-from optimizer.identification.logs.filters import derivative
+from optimizer.identification.logs.filters import derivative, noise
 from optimizer.identification.logs.grid import Grid, grid_of
 from optimizer.identification.logs.joint_names import by_joint_name, in_order_of_joints
 from optimizer.identification.logs.lag import lag_of
@@ -37,6 +37,7 @@ _MOST_ANGLE = 20 * pi  # rad, ten turns
 _MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
 _MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
+_ROUGHER = 4.0  # times as much noise of positions at their times as row by row: the times are wrong
 # channels that are differentiated twice, or compared, are kept in double precision; any other has fewer digits than
 # single precision, which takes half of the memory
 _PRECISE: tuple[Group, ...] = ("q", "payload")
@@ -105,6 +106,8 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     grid, columns = channels.grid, channels.columns
     rows = len(grid.kept)
     payload, payload_known = _payload(channels, options.payload)
+    _trust_rows(channels, remarks)
+    grid = channels.grid
     q = channels.take("q")
     assert q is not None
     logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
@@ -211,6 +214,20 @@ def _check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) ->
             f"{name} in line {row} is far beyond the joint's range and looks like degrees: give radians, or units=deg.",
             row,
             name,
+        )
+
+
+def _trust_rows(channels: _Channels, remarks: list[str]) -> None:
+    """Takes the rows as evenly spaced where the positions are far smoother so than at their times."""
+    grid, q = channels.grid, channels.values["q"]
+    if grid.uniform or grid.repeated or len(grid.gaps) or len(grid.kept) != len(grid.time):
+        return
+    by_row, by_time = (float(noise(each, grid.rate).sum()) for each in (q, grid.resampled(q, True)))
+    if by_time > _ROUGHER * by_row:
+        channels.grid = replace(grid, uniform=True)
+        remarks.append(
+            "The times jitter, and the positions do not: they are times of writing, and the rows are taken as evenly "
+            "spaced. Log the time of the controller."
         )
 
 

@@ -59,6 +59,15 @@ def test_efforts_in_time_stay_as_they_are(recording: Recording, lag: float) -> N
     np.testing.assert_allclose(reading.log.effort, late.current, atol=1e-5)
 
 
+def test_times_of_writing_are_not_those_of_the_rows(recording: Recording) -> None:
+    random = np.random.default_rng(0)
+    written = recording.time + np.append(0, random.uniform(-0.3, 0.3, len(recording.time) - 1)) / recording.rate
+    reading = read(csv_of(recording, time=written, without="va"), ROBOT, LogOptions())
+    assert any("times of writing" in each for each in reading.report.warnings)
+    np.testing.assert_allclose(reading.log.q, recording.q, atol=1e-7)
+    assert np.abs(reading.log.a - recording.a).std() < 0.1 * recording.a.std()
+
+
 def test_spikes_are_no_lag_and_are_warned_of(recording: Recording) -> None:
     random, current = np.random.default_rng(0), recording.current.copy()
     rows = random.choice(len(current), 12, replace=False)
