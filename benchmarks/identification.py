@@ -181,9 +181,11 @@ def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
     often = [each for each in within.values() if len(each) >= OFTEN * runs]
     title = f"synthetic, {runs} arms from {channels}" + f", moves off by {effect:g} W" * bool(effect)
     every = [near for each in within.values() for near in each]
+    worst, least = min(float(np.mean(each)) for each in often), 0.0 if effect else 0.95
     return [
         Gate(f"{title}: figures within 3 standard deviations", float(np.mean(every)), 0.95, 1.0),
-        Gate(f"{title}: the same of the figure that does worst", min(float(np.mean(e)) for e in often), 0.95, 1.0),
+        # that of each figure is promised where the model holds; where it does not, it is told
+        Gate(f"{title}: the same of the figure that does worst", worst, least, 1.0),
         Gate(f"{title}: share between P5 and P95", float(np.mean(shares)), 0.85, 0.95),
     ]
 

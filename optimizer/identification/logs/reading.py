@@ -37,6 +37,7 @@ _MOST_ANGLE = 20 * pi  # rad, ten turns
 _MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
 _MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
+_COMPARED = 20_000  # rows
 _ROUGHER = 4.0  # times as much noise of positions at their times as row by row: the times are wrong
 # channels that are differentiated twice, or compared, are kept in double precision; any other has fewer digits than
 # single precision, which takes half of the memory
@@ -222,7 +223,9 @@ def _trust_rows(channels: _Channels, remarks: list[str]) -> None:
     grid, q = channels.grid, channels.values["q"]
     if grid.uniform or grid.repeated or len(grid.gaps) or len(grid.kept) != len(grid.time):
         return
-    by_row, by_time = (float(noise(each, grid.rate).sum()) for each in (q, grid.resampled(q, True)))
+    # of the beginning: a log can fill half of the memory
+    part = replace(grid, time=grid.time[:_COMPARED])
+    by_row, by_time = (float(noise(x, grid.rate).sum()) for x in (q[:_COMPARED], part.resampled(q, True)))
     if by_time > _ROUGHER * by_row:
         channels.grid = replace(grid, uniform=True)
         remarks.append(
