@@ -8,7 +8,8 @@
   time predict the rest of the log.
 - `tx40`: friction against published values from the same log, and each half of the log predicted from the other.
 - `synthetic`: simulated UR10e with known figures: how many figures lie within three standard deviations, and how many
-  energies of moves that no fit has seen between P5 and P95. 200 runs take some minutes.
+  energies of moves that no fit has seen between P5 and P95. The same with moves each of which draws a power of its own
+  beside the model's. 200 runs take some minutes.
 - `time`: of a fit to 30 s of log on one core.
 """
 
@@ -37,12 +38,14 @@ from optimizer.identification.quality.interval import energy_sd, spread_of
 from optimizer.identification.quality.validation import power_errors
 from optimizer.identification.rows.clusters import clusters_of
 from optimizer.identification.rows.fit_rows import Rows, rows_of
-from tests.identification_logs import Truth, recorded, truth_of
+from tests.identification_logs import Truth, off_the_model, recorded, truth_of
 
 DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count
 OFTEN = 0.2
+# W, standard deviation of the power that each simulated move draws beside the model's: 1 % of a move's energy
+MOVE_EFFECT = 0.6
 TX40_OPTIONS = Options(terms=("coulomb", "viscous", "offset"), couplings=(WRIST,), held_out=0.0)
 
 
@@ -153,19 +156,21 @@ def agreeing(fitted: BaseFit, reference: dict[str, tuple[float, float]]) -> int:
 
 
 def synthetic(_: Path | None, runs: int) -> list[Gate]:
-    """Simulated arms with known figures: from currents and power, and from power alone.
+    """Simulated arms with known figures: from currents and power, and from power alone; with moves off the model."""
+    return [
+        gate
+        for channels in ("currents and power", "power alone")
+        for effect in (0.0, MOVE_EFFECT)
+        for gate in _of_simulated_arms(channels, effect, runs)
+    ]
 
-    From power alone, intervals may be wider: they hold the figures' ranges before the log, and these arms are nearer.
-    """
-    return [*_of_simulated_arms("currents and power", runs, 0.95), *_of_simulated_arms("power alone", runs, 1.0)]
 
-
-def _of_simulated_arms(what: str, runs: int, most: float) -> list[Gate]:
+def _of_simulated_arms(channels: str, effect: float, runs: int) -> list[Gate]:
     robot, shares, within = load_robot("ur10e"), list[float](), dict[Name, list[bool]]()
     for seed in range(runs):
         truth = truth_of(robot, seed)
-        log = recorded(robot, truth, moves=14, seed=seed).log()
-        found = fit(robot, [replace(log, effort=None, effort_meaning=None) if what == "power alone" else log])
+        log = off_the_model(recorded(robot, truth, moves=14, seed=seed).log(), effect, seed)
+        found = fit(robot, [replace(log, effort=None, effort_meaning=None) if channels == "power alone" else log])
         assert found.validation is not None and found.validation.coverage is not None
         shares.append(found.validation.coverage)
         for each in found.parameters:
@@ -174,12 +179,14 @@ def _of_simulated_arms(what: str, runs: int, most: float) -> list[Gate]:
                 within.setdefault((each.figure, each.joint), []).append(near)
     # of a figure that is told in a few runs alone, a share says little
     often = [each for each in within.values() if len(each) >= OFTEN * runs]
-    title = f"synthetic, {runs} arms from {what}"
+    title = f"synthetic, {runs} arms from {channels}" + f", moves off by {effect:g} W" * bool(effect)
     every = [near for each in within.values() for near in each]
+    worst, least = min(float(np.mean(each)) for each in often), 0.0 if effect else 0.95
     return [
         Gate(f"{title}: figures within 3 standard deviations", float(np.mean(every)), 0.95, 1.0),
-        Gate(f"{title}: the same of the figure that does worst", min(float(np.mean(e)) for e in often), 0.95, 1.0),
-        Gate(f"{title}: share between P5 and P95", float(np.mean(shares)), 0.85, most),
+        # that of each figure is promised where the model holds; where it does not, it is told
+        Gate(f"{title}: the same of the figure that does worst", worst, least, 1.0),
+        Gate(f"{title}: share between P5 and P95", float(np.mean(shares)), 0.85, 0.95),
     ]
 
 

@@ -251,3 +251,12 @@ def csv_of(
 def with_current(recording: Recording, current: Array) -> Recording:
     """The recording with other currents (n, nq) [A]."""
     return replace(recording, current=current, torque=current * recording.robot.drives.torque_constant)
+
+
+def off_the_model(log: Log, effect: float, seed: int) -> Log:
+    """The log with a power of its own in each move: normal, with a standard deviation of `effect` [W]."""
+    random, power = np.random.default_rng([seed, 1]), np.array(log.power)
+    for move in log.moves:
+        if not move.at_rest:
+            power[move.start : move.end] += random.normal() * effect
+    return replace(log, power=power)

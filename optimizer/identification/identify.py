@@ -217,6 +217,8 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Options) -> N
     power = bool(np.isfinite(rows.power).any())
     if "power" in options.fit and not power:
         raise NoPowerChannel
+    if rows.rest.all():
+        raise _not_excited(options.fit, logs, options)
     efforts = bool(np.isfinite(rows.effort).any())
     if not power and not efforts:
         raise _not_excited(options.fit, logs, options)

@@ -92,6 +92,27 @@ def left_out(grouped: Grouped, found: Array, free: Mask, prior: Array | None = N
     return estimates
 
 
+def adjusted(grouped: Grouped, found: Array, free: Mask, prior: Array) -> Array:
+    """Estimates (G, p) whose jackknife is the covariance by the errors of the rows, held to a precision `prior` (p, p).
+
+    An estimate without a group falls back to the prior where that group tells most. The spread of such estimates has
+    the prior's error in it, which is counted elsewhere. Here each group moves the estimate by its own residuals, made
+    as large as its errors are. Residuals r of a group with errors e of covariance V have the covariance V - X P Xᵀ, for
+    columns X and the estimate's covariance P. So V^½ (1 - V^-½ X P Xᵀ V^-½)^-½ V^-½ r has that of e (Bell and McCaffrey
+    2002, "CR2", with the prior as one more observation).
+    """
+    at, groups = np.flatnonzero(free), len(grouped.gram)
+    root = np.linalg.inv(np.linalg.cholesky((grouped.gram.sum(axis=0) + prior)[np.ix_(at, at)]))
+    estimates = np.tile(found, (groups, 1))
+    # `jackknife` takes the same share of every estimate's square
+    wider = np.sqrt(groups / max(groups - 1, 1))
+    for k, (gram, moment) in enumerate(zip(grouped.gram, grouped.moment, strict=True)):
+        told, vectors = np.linalg.eigh(root @ gram[np.ix_(at, at)] @ root.T)
+        pull = vectors.T @ root @ (gram @ found - moment)[at]
+        estimates[k, at] += wider * root.T @ vectors @ (pull / np.sqrt(np.maximum(1 - told, LEAST_EIGENVALUE)))
+    return estimates
+
+
 def jackknife(estimates: Array) -> Array:
     """The covariance (p, p) of an estimate from those (G, p) without each of the groups.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,10 +30,12 @@ HARDLY = "The logs hardly tell it from the robot's own."
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The arm with the fitted figures, the estimate behind it, and the arms (G,) with each cluster left out.
+    """The arm with the fitted figures, the estimate behind it, and the arms (G,) `without` each cluster.
 
-    What the fit takes from the robot's own figures has errors: the `tilted` arms have one of them each, in the torques
-    and in what the electrics make of it. `drift` is the covariance of the packed electrics by their own ranges.
+    The jackknife of the `varied` arms (G,) is the error of the fit by the errors of the rows. What the fit takes from
+    the robot's own figures has errors: the `tilted` arms have one of them each, in the torques and in what the
+    electrics make of it. `drift` is the covariance of the packed electrics by their own ranges, and `lost` (G, p, p)
+    what leaving each cluster out adds to all of their covariance.
     `mean_power` [W] is that of the rows, NaN without power.
     """
 
@@ -40,8 +43,10 @@ class Fitted:
     estimate: Estimate
     clusters: Clusters
     without: tuple[FittedArm, ...]
+    varied: tuple[FittedArm, ...]
     tilted: tuple[FittedArm, ...]
     drift: Array
+    lost: Array
     mean_power: float
 
 
@@ -54,8 +59,10 @@ def fit_rows(robot: Robot, rows: Rows, options: Options) -> Fitted:
         estimate=joined([]),
         clusters=clusters,
         without=(arm,) * clusters.count,
+        varied=(arm,) * clusters.count,
         tilted=(),
         drift=np.zeros((packed_size(robot.nq),) * 2),
+        lost=np.zeros((clusters.count, *(packed_size(robot.nq),) * 2)),
         mean_power=float(np.mean(rows.power[np.isfinite(rows.power) & ~rows.rest])) if with_power else np.nan,
     )
     errors = np.zeros((0, 0))
@@ -75,11 +82,13 @@ def _with_torque(robot: Robot, rows: Rows, torque: Array, fitted: Fitted, option
         return replace(made, bodies=values[terms:] - links) if options.refit else made
 
     errors = _errors(found.drift)
+    without = tuple(arm(values) for values in found.replicates)
     made = replace(
         fitted,
         arm=arm(found.value),
         estimate=found,
-        without=tuple(arm(values) for values in found.replicates),
+        without=without,
+        varied=without,
         tilted=tuple(arm(found.value + error) for error in errors),
     )
     return made, errors
@@ -116,12 +125,13 @@ def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options
         for each in (*others, *fitted.tilted)
     ]).reshape(-1, len(fit.value))  # fmt: skip
     shifts = moved[len(others) :]
-    replicates = fit.replicates + (moved[: len(others)] if torque_known else 0.0)
+    by_torques = moved[: len(others)] if torque_known else 0.0
+    without, varied = fit.without + by_torques, fit.adjusted + by_torques
     turn, constant, names = _figures_of_power(robot, prior, torque_known)
     estimate = Estimate(
         names,
         turn @ fit.value + constant,
-        replicates @ turn.T + constant,
+        varied @ turn.T + constant,
         (),
         turn @ (fit.drift + shifts.T @ shifts) @ turn.T,
     )
@@ -135,15 +145,16 @@ def _with_power(robot: Robot, rows: Rows, fitted: Fitted, errors: Array, options
         fitted,
         arm=_with_electrics(arm, fit.value, torque_known),
         estimate=joined([fitted.estimate, estimate], errors.T @ shifts @ turn.T if torque_known else None),
-        without=tuple(
-            _with_electrics(each, values, torque_known) for each, values in zip(fitted.without, replicates, strict=True)
-        ),
-        tilted=tuple(
-            _with_electrics(each, fit.value + shift, torque_known)
-            for each, shift in zip(fitted.tilted, shifts, strict=True)
-        ),
+        without=_each_with_electrics(fitted.without, without, torque_known),
+        varied=_each_with_electrics(fitted.varied, varied, torque_known),
+        tilted=_each_with_electrics(fitted.tilted, fit.value + shifts, torque_known),
         drift=np.outer(relative, relative) * fit.drift,
+        lost=np.outer(relative, relative) * fit.lost,
     )
+
+
+def _each_with_electrics(arms: Sequence[FittedArm], values: Array, torque_known: bool) -> tuple[FittedArm, ...]:
+    return tuple(_with_electrics(arm, each, torque_known) for arm, each in zip(arms, values, strict=True))
 
 
 def _with_electrics(arm: FittedArm, values: Array, torque_known: bool) -> FittedArm:

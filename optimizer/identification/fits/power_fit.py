@@ -16,12 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from models.robot import Array, Robot
+from models.robot import Array, Mask, Robot
 from models.trust import trust_letters
 from models.uncertainty.ranges import P95, default_ranges, large_joints, lognormal, range_of
 from optimizer.identification.arm.link_errors import LINK_MASS
 from optimizer.identification.arm.power_model import Electrics, Motion, packed_size, power
-from optimizer.identification.estimates.grouped import Grouped, left_out
+from optimizer.identification.estimates.grouped import Grouped, adjusted, jackknife, left_out
 from optimizer.identification.estimates.robust import bisquare_weights
 from optimizer.identification.rows.clusters import Clusters, shared_variance
 
@@ -30,6 +30,8 @@ OFFSET = 0.05
 ITERATIONS, CONVERGED = 30, 1e-9
 # standard deviation of a factor, or of load friction, that is taken as known
 KNOWN = 1e-6
+# groups from which on it is known what the others tell without one of them
+LEAST_LOST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,12 +100,15 @@ def _half_common(sd: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class PowerFit:
-    """Packed figures (p,) and those (G, p) without each cluster. `drift` (p, p) is the covariance that the prior's own
-    error adds. `gain` (p, n) is by how much the figures change for a change of the measured powers."""
+    """Packed figures (p,), those (G, p) without each cluster, and `adjusted` ones (G, p), whose jackknife is the error
+    by the rows. `drift` (p, p) is the covariance that the prior's own error adds, `lost` (G, p, p) what leaving each
+    cluster out adds. `gain` (p, n) is by how much the figures change for a change of the measured powers."""
 
     value: Array
-    replicates: Array
+    without: Array
+    adjusted: Array
     drift: Array
+    lost: Array
     gain: Array
 
 
@@ -138,11 +143,34 @@ def fit_power(
         if iteration > 1 and change < CONVERGED * (1 + np.abs(value).max()):
             break
     free = value > least
-    posterior = np.zeros_like(precision)
-    posterior[np.ix_(free, free)] = np.linalg.inv(precision[np.ix_(free, free)])
+    posterior = _inverse(precision, free)
+    spread = adjusted(grouped, value, free, prior.precision)
     return PowerFit(
         value=value,
-        replicates=left_out(grouped, value, free, prior.precision),
+        without=left_out(grouped, value, free, prior.precision),
+        adjusted=spread,
         drift=posterior @ prior.precision @ posterior,
+        lost=_lost(grouped, precision, prior.precision, free, spread - value),
         gain=posterior @ (slope * (weight / noise)[:, None]).T,
     )
+
+
+def _inverse(precision: Array, free: Mask) -> Array:
+    """The covariance (p, p) of parameters of which those that are not `free` are fixed."""
+    covariance = np.zeros_like(precision)
+    covariance[np.ix_(free, free)] = np.linalg.inv(precision[np.ix_(free, free)])
+    return covariance
+
+
+def _lost(grouped: Grouped, precision: Array, prior: Array, free: Mask, errors: Array) -> Array:
+    """What leaving each group out adds (G, p, p) to the covariance by the rows' `errors` (G, p) and by the prior's."""
+    if len(errors) < LEAST_LOST:
+        return np.zeros_like(grouped.gram)
+    posterior = _inverse(precision, free)
+    whole = jackknife(errors) + posterior @ prior @ posterior
+    lost = np.zeros_like(grouped.gram)
+    for k, gram in enumerate(grouped.gram):
+        rest = _inverse(precision - gram, free)
+        others = np.delete(errors, k, axis=0) @ precision @ rest
+        lost[k] = jackknife(others) + rest @ prior @ rest - whole
+    return lost

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from optimizer.exceptions import InvalidProblem, InvalidTable
@@ -26,19 +26,19 @@ class Form:
     payload: tuple[str, ...] = ()
 
 
-# brackets, underscores or points before the number of a joint
-_AT = r"[._\[]?([0-9]{1,3})\]?"
+AT = r"[._\[]?([0-9]{1,3})\]?"
+"""Brackets, underscores or points before the number of a joint."""
 FORMS = (
     Form(
         "rtde",
         "timestamp",
         {
-            "q": f"actual_q{_AT}",
-            "v": f"actual_qd{_AT}",
-            "a": f"target_qdd{_AT}",
-            "current": f"actual_current{_AT}",
-            "temperature": f"joint_temperatures{_AT}",
-            "commanded": f"target_qd{_AT}",
+            "q": f"actual_q{AT}",
+            "v": f"actual_qd{AT}",
+            "a": f"target_qdd{AT}",
+            "current": f"actual_current{AT}",
+            "temperature": f"joint_temperatures{AT}",
+            "commanded": f"target_qd{AT}",
         },
         ("actual_robot_voltage", "actual_robot_current"),
         ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2"),
@@ -59,9 +59,9 @@ FORMS = (
         "ros",
         "%?time",
         {
-            "q": rf"(?:field\.)?position{_AT}",
-            "v": rf"(?:field\.)?velocity{_AT}",
-            "effort": rf"(?:field\.)?effort{_AT}",
+            "q": rf"(?:field\.)?position{AT}",
+            "v": rf"(?:field\.)?velocity{AT}",
+            "effort": rf"(?:field\.)?effort{AT}",
         },
     ),
 )
@@ -83,10 +83,22 @@ class Columns:
     MAPPED: ClassVar[tuple[str, ...]] = ("time", "q", "v", "a", "current", "torque", "effort", "temperature", "power")
     """What a map of columns may name."""
 
+    def without(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
+        """The columns without the groups of which the `first` row has no number, and these; positions stay."""
+        gone: list[Group] = [
+            group for group, indices in self.groups.items() if group != "q" and all(_empty(first[k]) for k in indices)
+        ]
+        groups = {group: indices for group, indices in self.groups.items() if group not in gone}
+        return replace(self, groups=groups), gone
+
     @property
     def used(self) -> list[int]:
         """All indices, each once, in the order of the file."""
         return sorted({self.time, *(k for group in self.groups.values() for k in group)})
+
+
+def _empty(cell: str) -> bool:
+    return cell.strip().strip('"').lower() in ("", "nan", "none", "null")
 
 
 def recognised(names: Sequence[str], nq: int) -> Columns:

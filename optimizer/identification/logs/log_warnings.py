@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from models.robot import Array, Mask
 from optimizer.identification.logs.columns import Columns
-from optimizer.identification.logs.filters import derivative, low_passed
 from optimizer.identification.logs.grid import Grid
 from optimizer.identification.logs.log import Log
 
 _SATURATED, _LEAST_SATURATED = 0.005, 10
 """Fraction and number of moving rows at exactly the greatest effort beyond which it is cut off there."""
-_MISFIT = 0.2
-"""Greatest deviation of logged speeds from the change of the positions, over the speeds, as standard deviations."""
-_LEAST_SPEED = 0.01  # rad/s, standard deviation from which on speeds are compared
+_NEIGHBOURS = 5
+"""Rows among which one or two are a spike."""
 
 
-def log_warnings(log: Log, grid: Grid, columns: Columns, speeds_logged: bool) -> list[str]:
-    """Gaps, repeated times, constant or saturated channels, speeds that do not fit, what the log does not say."""
-    found = [*_times(grid), *_constant(log), *_saturated(log)]
-    if speeds_logged:
-        found += _misfit(log)
+def log_warnings(log: Log, grid: Grid, columns: Columns, misfits: Sequence[int]) -> list[str]:
+    """Gaps, repeated times, constant or saturated channels, spikes, what the log does not say; joints `misfits` have
+    speeds that do not fit."""
+    found = [*_times(grid), *_constant(log), *_saturated(log), *_spikes(log)]
+    if misfits:
+        found.append(
+            f"The speeds of joints {_numbers(misfits)} do not fit their positions: check units, signs and the order of "
+            "the columns."
+        )
     if not log.payload_known:
         found.append("No payload is given or logged: the arm is taken to have carried nothing.")
     if columns.form == "ros" and any(name.rstrip("]")[-1:].isdigit() for name in columns.names):
@@ -75,19 +77,27 @@ def _cut_off(effort: Array, moving: Mask) -> bool:
     return int((size == size.max()).sum()) > max(_LEAST_SATURATED, _SATURATED * len(size))
 
 
-def _misfit(log: Log) -> Iterator[str]:
-    wrong = [j for j in range(log.joints) if _misfits(log.q[:, j], log.v[:, j], log.rate)]
-    if wrong:
-        yield (
-            f"The speeds of joints {_numbers(wrong)} do not fit their positions: check units, signs and the order of "
-            "the columns."
-        )
+def _spikes(log: Log) -> Iterator[str]:
+    for words, values in (("effort", log.effort), ("power", None if log.power is None else log.power[:, None])):
+        if values is None:
+            continue
+        rows = np.zeros(len(values), dtype=bool)
+        for channel in values.T:
+            rows |= _leaps(channel)
+        if rows.any():
+            yield (
+                f"The {words} has spikes in {rows.sum()} rows, the first at {log.time[int(np.argmax(rows))]:.4g} s: "
+                "delete these rows, or identify with estimator=irls, which gives outliers less weight."
+            )
 
 
-def _misfits(q: Array, v: Array, rate: float) -> bool:
-    smooth = low_passed(v[:, None], rate)
-    size = smooth.std()
-    return bool(size > _LEAST_SPEED and (smooth - derivative(q[:, None], rate)).std() > _MISFIT * size)
+def _leaps(channel: Array) -> Mask:
+    """Where a channel (n,) is farther from the median of its neighbours than nearly all of it is spread."""
+    # every process that serves requests would hold it, and only logs are filtered
+    from scipy.ndimage import median_filter
+
+    low, high = np.percentile(channel, [1, 99])
+    return np.asarray(np.abs(channel - median_filter(channel, _NEIGHBOURS)) > max(high - low, 1e-9))
 
 
 def _numbers(joints: Iterable[int]) -> str:

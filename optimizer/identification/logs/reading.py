@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 from typing import Any, Literal
@@ -17,14 +17,17 @@ from optimizer.exceptions import InvalidProblem, InvalidTable
 from optimizer.identification.logs.channels import channels_of
 from optimizer.identification.logs.columns import Columns, Group, mapped, recognised
 from optimizer.identification.logs.effort import effort_report
-from optimizer.identification.logs.filters import derivative
+from optimizer.identification.logs.filters import derivative, noise
 from optimizer.identification.logs.grid import Grid, grid_of
+from optimizer.identification.logs.joint_names import by_joint_name, in_order_of_joints
+from optimizer.identification.logs.lag import lag_of
 from optimizer.identification.logs.log import EffortMeaning, Log
 from optimizer.identification.logs.log_report import LogReport
 from optimizer.identification.logs.log_warnings import log_warnings
 from optimizer.identification.logs.moves import cut, still_by_command, still_by_speed
 from optimizer.identification.logs.rows import LONGEST_LINE, MOST_BYTES, Rows, Source
-from optimizer.identification.logs.usable_effort import usable
+from optimizer.identification.logs.speeds import misfitting
+from optimizer.identification.logs.usable_effort import check_measured, usable
 from optimizer.problem.arm import Payload
 from optimizer.problem.arrays import frozen
 from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
@@ -34,6 +37,8 @@ _MOST_ANGLE = 20 * pi  # rad, ten turns
 _MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
 _MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
+_COMPARED = 20_000  # rows
+_ROUGHER = 4.0  # times as much noise of positions at their times as row by row: the times are wrong
 # channels that are differentiated twice, or compared, are kept in double precision; any other has fewer digits than
 # single precision, which takes half of the memory
 _PRECISE: tuple[Group, ...] = ("q", "payload")
@@ -97,21 +102,26 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     Raises InvalidTable, with line and column, LogTooLarge, EffortNotUsable, or InvalidProblem for wrong options.
     """
     gravity = frozen(options.gravity, (3,), "gravity")
-    channels, dropped = _channels(source, robot, options)
+    remarks: list[str] = []
+    channels, dropped = _channels(source, robot, options, remarks)
     grid, columns = channels.grid, channels.columns
     rows = len(grid.kept)
     payload, payload_known = _payload(channels, options.payload)
+    _trust_rows(channels, remarks)
+    grid = channels.grid
     q = channels.take("q")
     assert q is not None
     logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
+    misfits = _misfits(q, logged["v"], columns, grid.rate)
     v = logged["v"] if logged["v"] is not None else derivative(q, grid.rate)
     a = logged["a"] if logged["a"] is not None else derivative(v, grid.rate)
-    remarks: list[str] = []
     named = next((group for group in _EFFORTS if group in channels.values), None)
     effort, found = None, None
     if named is not None:
         effort = channels.take(named)
         assert effort is not None
+        check_measured(effort)
+        effort = _in_time(effort, lag_of(robot, payload, gravity, q, v, a, effort, grid.rate), grid.time, remarks)
         found = usable(effort_report(robot, payload, gravity, q, v, a, effort), named, options.effort, remarks)
     power = channels.take("power")
     still = still_by_speed(v, grid.rate) if logged["commanded"] is None else still_by_command(logged["commanded"])
@@ -133,18 +143,33 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
         name=options.name,
         tags=tuple(options.tags),
     )
-    remarks += log_warnings(log, grid, columns, logged["v"] is not None)
+    remarks += log_warnings(log, grid, columns, misfits)
     return Reading(log, LogReport(rows, dropped, grid.jitter, channels_of(log, columns, named), found, tuple(remarks)))
 
 
-def _channels(source: Path | bytes, robot: Robot, options: LogOptions) -> tuple[_Channels, int]:
+def _columns(
+    names: Sequence[str], first: Sequence[str], robot: Robot, options: LogOptions, remarks: list[str]
+) -> Columns:
+    """The columns that are read, by the header and the cells of the `first` row."""
+    if options.columns is not None:
+        columns = mapped(names, options.columns, robot.nq)
+    else:
+        columns = by_joint_name(names, robot.joint_names) or recognised(names, robot.nq)
+        columns = in_order_of_joints(columns, first, robot.joint_names)
+    if len(first) < len(names):
+        return columns
+    columns, gone = columns.without(first)
+    remarks += [f"The columns of {group} are empty in the first row, and are not read." for group in gone]
+    return columns
+
+
+def _channels(source: Path | bytes, robot: Robot, options: LogOptions, remarks: list[str]) -> tuple[_Channels, int]:
     """The channels of the file, in SI units, and the number of dropped lines."""
     with Source(source, options.most_bytes) as file:
         names, separator = header_of(file, LONGEST_LINE, SEPARATORS + " ")
-        nq = robot.nq
-        columns = recognised(names, nq) if options.columns is None else mapped(names, options.columns, nq)
-        used = columns.used
-        rows = Rows(file, names, separator, used)
+        rows = Rows(file, names, separator, ())
+        columns = _columns(names, rows.first(), robot, options, remarks)
+        used = rows.used = columns.used
         where = {group: [used.index(k) for k in indices] for group, indices in columns.groups.items()}
         scales: dict[Group, float] = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
         scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
@@ -191,6 +216,42 @@ def _check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) ->
             row,
             name,
         )
+
+
+def _trust_rows(channels: _Channels, remarks: list[str]) -> None:
+    """Takes the rows as evenly spaced where the positions are far smoother so than at their times."""
+    grid, q = channels.grid, channels.values["q"]
+    if grid.uniform or grid.repeated or len(grid.gaps) or len(grid.kept) != len(grid.time):
+        return
+    # of the beginning: a log can fill half of the memory
+    part = replace(grid, time=grid.time[:_COMPARED])
+    by_row, by_time = (float(noise(x, grid.rate).sum()) for x in (q[:_COMPARED], part.resampled(q, True)))
+    if by_time > _ROUGHER * by_row:
+        channels.grid = replace(grid, uniform=True)
+        remarks.append(
+            "The times jitter, and the positions do not: they are times of writing, and the rows are taken as evenly "
+            "spaced. Log the time of the controller."
+        )
+
+
+def _misfits(q: Array, v: Array | None, columns: Columns, rate: float) -> list[int]:
+    """The joints whose logged speeds are not those of their positions."""
+    return [] if v is None else misfitting(q, v, rate, [columns.names[k] for k in columns.groups["v"]])
+
+
+def _in_time(effort: Array, lag: float, time: Array, remarks: list[str]) -> Array:
+    """Efforts (n, joints) without their lag [s]."""
+    if lag == 0:
+        return effort
+    late = "later" if lag > 0 else "earlier"
+    remarks.append(
+        f"The efforts come {1e3 * abs(lag):.0f} ms {late} than the motion that makes them, and are taken as so much "
+        f"{'earlier' if lag > 0 else 'later'}: log both with the clock of the controller."
+    )
+    shifted = np.empty_like(effort)
+    for joint, channel in enumerate(effort.T):
+        shifted[:, joint] = np.interp(time + lag, time, channel)
+    return shifted
 
 
 def _payload(channels: _Channels, given: Payload | None) -> tuple[Payload, bool]:

@@ -70,6 +70,13 @@ class Rows:
     used: Sequence[int]
     dropped: int = 0
     _first_dropped: InvalidTable | None = None
+    _first: str | None = None
+
+    def first(self) -> list[str]:
+        """The cells of the first row; fewer if the line is short."""
+        self._first = line_of(self.file, FIRST_ROW, LONGEST_LINE)
+        stripped = self._first.strip() if self.separator == " " else self._first.rstrip("\r\n")
+        return stripped.split(self.separator)
 
     def blocks(self) -> Iterator[tuple[Array, Array]]:
         """Blocks of rows. Raises InvalidTable or LogTooLarge."""
@@ -90,6 +97,10 @@ class Rows:
             raise InvalidTable("The file has fewer than two rows of numbers: a log needs more.")
 
     def _lines(self, row: int) -> Iterator[str]:
+        if self._first:
+            first, self._first = self._first, None
+            yield first
+            row += 1
         while line := line_of(self.file, row, LONGEST_LINE):
             yield line
             row += 1

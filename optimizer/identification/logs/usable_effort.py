@@ -4,12 +4,31 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+
+from models.robot import Array
 from optimizer.identification.logs.columns import Group
 from optimizer.identification.logs.effort import EffortReport
 from optimizer.identification.logs.log import EffortMeaning
 from optimizer.identification.logs.log_errors import EffortNotUsable
 
+OTHERWISE = (
+    "Otherwise the joints are in another order than the robot's, from base to flange (name the columns in `columns`), "
+    "or `units`, `current_units`, `payload` or `gravity` are not as given."
+)
+"""What else makes efforts that do not fit the arm."""
 _NAMED: dict[Group, EffortMeaning] = {"current": "current", "torque": "torque"}
+
+
+def check_measured(effort: Array) -> None:
+    """Raises EffortNotUsable for efforts (n, joints) none of which ever changes."""
+    if (np.ptp(effort, axis=0) == 0).all():
+        raise EffortNotUsable(
+            "The logged efforts never change, so they were not measured: log motor currents, or leave their columns "
+            "out to keep motion and power.",
+            None,
+            {},
+        )
 
 
 def usable(
@@ -21,8 +40,9 @@ def usable(
     """
     if found.meaning == "external" and asked != "external":
         raise EffortNotUsable(
-            "The logged efforts are without gravity, and say nothing of the arm: log motor currents (with the driver "
-            "of ROS 2: actual_current_as_torque off), or give effort=external to keep its motion and power.",
+            "The logged efforts do not carry the arm's weight, and say nothing of it. If they are without gravity, log "
+            "motor currents (with the driver of ROS 2: actual_current_as_torque off), or give effort=external to keep "
+            f"motion and power. {OTHERWISE}",
             "external",
             found.slope,
         )
@@ -38,9 +58,17 @@ def usable(
     if named in _NAMED and all(slope is None for slope in found.slope.values()):
         remarks.append(f"The motion does not tell what the efforts are: they are taken as {named}, by their name.")
         return EffortReport(_NAMED[named], 0.0, found.slope)
+    slopes = [slope for slope in found.slope.values() if slope is not None]
+    if slopes and max(slopes) < 0:
+        raise EffortNotUsable(
+            "The logged efforts have the other sign than the weight of the arm: turn the sign of their columns, or "
+            "give `gravity` in the frame of the base if the arm hangs.",
+            None,
+            found.slope,
+        )
     raise EffortNotUsable(
         "It is not clear what the logged efforts are: give effort=current for motor currents [A], effort=torque for "
-        "torques [N·m] or effort=external for torques without gravity.",
+        f"torques [N·m] or effort=external for torques without gravity. {OTHERWISE}",
         None,
         found.slope,
     )

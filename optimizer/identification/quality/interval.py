@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.special import stdtrit
 
+from models.robot import Array
 from models.uncertainty.ranges import P95
 from optimizer.identification.arm.fitted_arm import FittedArm
 from optimizer.identification.estimates.grouped import jackknife
@@ -24,6 +26,8 @@ SESSION = 0.03
 LEAST_SESSIONS = 3
 # share of the square of the moves' mean errors that is their own at least
 LEAST_OWN = 0.1
+# median of the square of a normal error over its variance
+MEDIAN_SQUARE = 0.455
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,7 @@ def without_friction(arm: FittedArm) -> FittedArm:
 
 def figures_variance(fitted: Fitted, rows: Rows) -> float:
     """Variance [J²] of the energy by the errors of the figures: those of the fit, and of the robot's own beneath it."""
-    without = np.array([[_energy(arm, rows)] for arm in fitted.without])
+    without = np.array([[_energy(arm, rows)] for arm in fitted.varied])
     power, slope = fitted.arm.power(rows)
     gradient = rows.weight @ slope
     # what the electrics make of an error of held friction, they make up for in the energy; links load other motions
@@ -78,14 +82,32 @@ def _move_sd(fitted: Fitted, rows: Rows) -> float:
         for move in np.unique(rows.move[use & (fitted.clusters.of_row == cluster)]):
             part = rows.take(use & (rows.move == move) & (fitted.clusters.of_row == cluster))
             time = float(part.weight.sum())
-            error = float(part.weight @ (part.power - fitted.without[cluster].power(part)[0]))
-            squares.append((error / time) ** 2)
-            explained.append(figures_variance(fitted, part) / time**2)
+            blind, slope = fitted.without[cluster].power(part)
+            gradient = part.weight @ slope
+            lost = float(gradient @ fitted.lost[cluster] @ gradient)
+            squares.append((float(part.weight @ (part.power - blind)) / time) ** 2)
+            explained.append((figures_variance(fitted, part) + lost) / time**2)
     if not squares:
         return 0.0
-    own = max(np.mean(squares) - np.mean(explained), LEAST_OWN * np.mean(squares))
+    own = own_variance(np.array(squares), np.maximum(explained, 0.0))
     # of few moves, as wide as Student's distribution is
     return float(np.sqrt(own) * stdtrit(len(squares), 0.95) / P95)
+
+
+def own_variance(squares: Array, explained: Array) -> float:
+    """The variance τ² that errors have besides `explained` variances (n,), from their `squares` (n,).
+
+    Σ squares / (explained + τ²) = n: an error that can be explained by much tells little of τ² (Paule and Mandel 1982).
+    A small share of the errors is their own at least.
+    """
+
+    def excess(own: float) -> float:
+        return float((squares / (explained + own)).sum()) - len(squares)
+
+    least, most = LEAST_OWN * float(np.median(squares)) / MEDIAN_SQUARE, float(squares.sum())
+    if least <= 0 or excess(least) <= 0:
+        return least
+    return float(brentq(excess, least, most))
 
 
 def sessions(fitted: Fitted, rows: Rows) -> tuple[float, ...]:

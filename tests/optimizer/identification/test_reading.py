@@ -184,8 +184,8 @@ def test_effort_without_gravity_is_not_usable(recording: Recording) -> None:
 
 
 def test_effort_of_no_known_meaning_is_not_guessed(recording: Recording) -> None:
-    body = csv_of(with_current(recording, -0.3 * recording.torque))
-    with pytest.raises(EffortNotUsable, match="not clear") as caught:
+    body = csv_of(with_current(recording, 0.3 * recording.torque))
+    with pytest.raises(EffortNotUsable, match=r"not clear.*another order.*payload") as caught:
         read_log(body, ROBOT)
     assert caught.value.meaning is None
     assert read_log(body, ROBOT, effort="torque").effort_meaning == "torque"
