@@ -15,7 +15,7 @@ from optimizer.identification.arm.fitted_arm import own_arm
 from optimizer.identification.errors import NoPowerChannel, NotExcited, PayloadUnknown
 from optimizer.identification.estimates.estimate import Estimate, Name
 from optimizer.identification.estimates.grouped import lag_one
-from optimizer.identification.fits.block import own_value
+from optimizer.identification.fits.block import own_value, terms_of
 from optimizer.identification.fits.fitting import LINK_MASS_SCALE, Fitted, fit_rows, motor_torque
 from optimizer.identification.fits.payload_fit import Carried, joints_without_gravity, loaded, payload_of
 from optimizer.identification.fits.temperature import temperatures_of
@@ -217,8 +217,8 @@ def _check(robot: Robot, rows: Rows, logs: Sequence[Log], options: Options) -> N
     power = bool(np.isfinite(rows.power).any())
     if "power" in options.fit and not power:
         raise NoPowerChannel
-    if rows.rest.all():
-        raise _not_excited(options.fit, logs, options)
+    if options.held_out and rows.rest.all():
+        raise _not_excited(terms_of(options), logs, options)
     efforts = bool(np.isfinite(rows.effort).any())
     if not power and not efforts:
         raise _not_excited(options.fit, logs, options)

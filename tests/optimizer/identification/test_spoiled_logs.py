@@ -15,7 +15,6 @@ from optimizer.identification.errors import NotExcited
 from optimizer.identification.identify import fit
 from optimizer.identification.logs.log_errors import EffortNotUsable
 from optimizer.identification.logs.reading import LogOptions, read, read_log
-from optimizer.identification.options import Options
 from tests.identification_logs import Recording, csv_of, recorded, truth_of, with_current
 
 ROBOT = load_robot("ur10e")
@@ -144,6 +143,6 @@ def test_a_log_of_rest_is_not_excited(recording: Recording) -> None:
     assert first.at_rest
     lines = csv_of(recording).split(b"\n")[: first.end]
     log = read_log(b"\n".join(lines), ROBOT, effort="current")
-    for options in (Options(), Options(held_out=0.0)):
-        with pytest.raises(NotExcited):
-            fit(ROBOT, [log], options)
+    with pytest.raises(NotExcited) as caught:
+        fit(ROBOT, [log])
+    assert "coulomb" in caught.value.parameters and caught.value.advice["parameters"] == ["rotor", "friction"]

@@ -54,6 +54,7 @@ def test_advice_names_what_the_log_tells_least() -> None:
     """Without any rest, idle power and the losses beside it are told least."""
     log = recorded(ROBOT, TRUTH, moves=10).log()
     advice = fit(ROBOT, [log], OPTIONS).advice
-    assert advice is not None and 0 < advice.share <= 1.5 and advice.do.startswith("Log ")
+    # of errors that make up for each other, one alone can have more than the whole
+    assert advice is not None and 0 < advice.share <= 2.0 and advice.do.startswith("Log ")
     parameters = {(each.figure, each.joint) for each in fit(ROBOT, [log], OPTIONS).parameters}
     assert (advice.figure, advice.joint) in parameters
