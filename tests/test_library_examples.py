@@ -77,6 +77,7 @@ def test_pareto_front(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: p
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.long
 def test_many_moves() -> None:
     """As a user runs it: the processes that it starts import the script."""
     name = "many_moves"

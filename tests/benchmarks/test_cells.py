@@ -16,6 +16,7 @@ def test_tasks_repeat_and_both_ends_are_clear(index: int) -> None:
     assert CollisionModel(task.arm).least_distance(np.stack([task.q_start, task.q_goal]), 0.0) > 0
 
 
+@pytest.mark.long
 def test_an_answer_in_collision_fails_a_requirement() -> None:
     outcomes = [run(cell_task(5, 0), kind) for kind in KINDS]
     assert [outcome.collisions for outcome in outcomes] == [0, 0]

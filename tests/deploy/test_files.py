@@ -122,6 +122,7 @@ def test_the_image_is_made_of_what_its_context_has(compose: dict[str, Any]) -> N
         assert any(name == each or name.startswith(f"{each}/") for each in sent), f"{name} is left out of the context"
 
 
+@pytest.mark.long
 def test_every_module_can_be_imported() -> None:
     """As the image does when it is built."""
     command = [sys.executable, ROOT / "scripts" / "import_all.py"]

@@ -84,6 +84,7 @@ def test_a_free_end_never_needs_more_than_the_one_without_a_turn(seed: int) -> N
         assert np.linalg.norm(off, axis=1).max() < path.position_tolerance
 
 
+@pytest.mark.long
 def test_past_a_corner_the_free_end_is_no_worse_than_a_given_one() -> None:
     """Angles are compared by motions of the same fineness: once, a coarse one at a better angle lost to a fine one."""
     rng = np.random.default_rng(1)

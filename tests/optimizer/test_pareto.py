@@ -262,6 +262,7 @@ def test_a_front_whose_deadline_ended_a_search_is_not_optimal() -> None:
             assert pareto(replace(asked, deadline=float(readings)), 100, CountingClock()).status == "feasible"
 
 
+@pytest.mark.long
 def test_a_front_whose_fastest_motion_was_cut_short_is_not_optimal() -> None:
     """The first search has but a share of the time."""
     asked = problem(HOME, HOME + np.array([0.9, 0.4, -0.5, 0.3, 0.2, -0.6]))

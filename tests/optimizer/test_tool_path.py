@@ -90,6 +90,7 @@ def test_an_arc_is_part_of_a_circle() -> None:
     assert (np.diff(angle) > -1e-6).all()
 
 
+@pytest.mark.long
 def test_a_recorded_curve_goes_through_every_pose() -> None:
     """A spiral of one and a half turns that narrows, given by 100 poses, while the tool turns by 0.6 rad."""
     share = np.linspace(0.0, 1.0, 102)[1:]

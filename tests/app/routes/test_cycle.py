@@ -270,6 +270,7 @@ def test_the_round_as_a_table(client: TestClient, answer: dict[str, Any]) -> Non
     }
 
 
+@pytest.mark.long
 def test_a_round_of_least_work_has_its_own_gap(client: TestClient) -> None:
     content = answered(client, a_round(objective="mechanical", time={"max": 8.0}))
     energy = content["energy"]

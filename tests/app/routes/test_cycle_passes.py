@@ -61,6 +61,7 @@ def test_its_answer_is_a_motion_through_the_stop(answer: dict[str, Any], client:
     assert all(each.electrical > leg["electrical"] for each in kept.baselines)
 
 
+@pytest.mark.long
 def test_tables_programs_and_replays_have_the_whole_leg(answer: dict[str, Any], client: TestClient) -> None:
     table = client.post("/cycle", json=a_round(), headers={"Accept": "text/csv"})
     rows = [row for row in csv.DictReader(table.text.splitlines()) if row["leg"] == "2"]

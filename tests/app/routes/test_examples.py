@@ -11,6 +11,7 @@ from fastapi.testclient import TestClient
 from app.schemas.examples import BODY_EXAMPLES, JSON
 from tests.app.live import ROOT
 from tests.app.requests import PATIENT
+from tests.selection import long_but
 
 EXAMPLES = ROOT / "examples"
 WITH_DEADLINE = ("optimize", "compare", "pareto", "cycle", "whatif", "replay")
@@ -21,6 +22,11 @@ IN_THE_DOCUMENT = {
     for name, example in by_media_type.get(JSON, {}).items()
 }
 
+# those of the OpenAPI document are sent by its own test
+SENT = FILES.keys() - IN_THE_DOCUMENT.keys()
+# the angles at both ends of a path are chosen in some seconds
+SLOW = {"optimize/seam_any_turn"}
+
 
 def test_a_file_holds_the_documents_example_of_its_name() -> None:
     shared = FILES.keys() & IN_THE_DOCUMENT.keys()
@@ -30,8 +36,7 @@ def test_a_file_holds_the_documents_example_of_its_name() -> None:
     }
 
 
-# those of the OpenAPI document are sent by its own test
-@pytest.mark.parametrize("name", sorted(FILES.keys() - IN_THE_DOCUMENT.keys()))
+@pytest.mark.parametrize("name", long_but(SENT - SLOW, sorted(SENT)))
 def test_file_is_answered(name: str, client: TestClient) -> None:
     path, body = name.rpartition("/")[0], json.loads(FILES[name].read_text())
     answer = client.post(f"/{path}", json=PATIENT | body if path in WITH_DEADLINE else body)

@@ -155,6 +155,7 @@ def by_genetic_algorithm(start: Any = START, goal: Any = GOAL, **given: Any) -> 
     return solver, solver.solve()
 
 
+@pytest.mark.long
 def test_the_genetic_algorithm_is_deterministic_and_improves_on_its_first_population(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

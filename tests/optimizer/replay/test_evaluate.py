@@ -176,6 +176,7 @@ def test_the_start_of_time_does_not_matter() -> None:
     assert (shifted.total.start, shifted.total.end) == (0.0, pytest.approx(t[-1]))
 
 
+@pytest.mark.long
 def test_memory_does_not_grow_with_the_log() -> None:
     def blocks(count: int) -> Iterator[LogBlock]:
         for k in range(count):

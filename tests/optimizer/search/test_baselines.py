@@ -230,6 +230,7 @@ def test_energies_are_of_the_friction_law_asked_for(friction: str) -> None:
     assert energy.per_joint.friction == pytest.approx(loss, rel=EXACT)
 
 
+@pytest.mark.long
 def test_energies_are_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     """Against twenty times as many quadrature panels, over random moves."""
     rng = np.random.default_rng(6)

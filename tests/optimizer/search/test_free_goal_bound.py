@@ -129,6 +129,7 @@ def test_the_rim_of_the_tools_cone_is_covered() -> None:
     assert within_cone(made, ConeOrientedPose(tcp_pose(GOAL).T[:3, 3])).half_angle == cone.half_angle
 
 
+@pytest.mark.long
 def test_more_boxes_are_halved_where_the_bound_is_far_from_the_energy() -> None:
     """The bound reaches nine tenths of an energy that few rounds leave it far below; what is near ends after a few."""
     made = PreparedProblem.of(problem(HOME, GOAL))

@@ -78,6 +78,7 @@ def test_of_an_edited_round_only_the_moves_that_changed_are_solved() -> None:
     assert found.moves[0].solution.solver.nlp_solves == 0 < found.moves[-1].solution.solver.nlp_solves
 
 
+@pytest.mark.long
 def test_in_a_given_time_too() -> None:
     own = searched()[0].duration
     asked, motions = replace(ASKED, duration_min=1.3 * own, duration_max=1.3 * own), KnownMotions()

@@ -86,6 +86,7 @@ def test_no_random_round_gets_below_the_bound() -> None:
         assert bound <= work
 
 
+@pytest.mark.long
 def test_what_the_price_bounds_holds_for_every_duration() -> None:
     """Against motions from end to end in many durations; without a price it is that of the longest motion."""
     rng, own = np.random.default_rng(1), ROBOT.limits

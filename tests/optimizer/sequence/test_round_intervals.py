@@ -47,6 +47,7 @@ class Replayed:
         return energy + dwell_energy(self.asked.waiting(self.length), resting, hold, 0.0)
 
 
+@pytest.mark.long
 def test_a_round_and_its_savings() -> None:
     """Of moves with and without payload, dwells and a wait, evaluated again with drawn figures."""
     stops = [

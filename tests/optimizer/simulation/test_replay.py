@@ -197,6 +197,7 @@ def test_a_joint_at_its_limit_saturates() -> None:
     assert heavier.limit_ratio.max() == pytest.approx(1.0)
 
 
+@pytest.mark.long
 def test_waiting_counts_in_savings() -> None:
     """A baseline that is faster waits longer, and what it draws then is in its planned energy."""
     found = optimize(problem(payload=PAYLOAD, cycle=Cycle(4.0)))
