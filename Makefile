@@ -27,16 +27,20 @@ endif
 export PYTHONUNBUFFERED := 1
 comma := ,
 
-.PHONY: serve test test-long bench lock clean lint kernels pytest pytest-long
+.PHONY: serve test test-long bench lock clean ready lint kernels pytest pytest-long
 
 serve: $(VENV)/.runtime $(STUDIO)/vendor kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
+# what the tests need, side by side
+ready: $(VENV)/.runtime $(COMPILER)
+	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(STUDIO)/vendor kernels
+
 # the linters run beside the tests
-test: $(VENV)/.dev $(STUDIO)/vendor kernels
+test: ready
 	@$(MAKE) --no-print-directory --jobs=2 lint pytest
 
-test-long: $(VENV)/.dev $(STUDIO)/vendor kernels
+test-long: ready
 	@$(MAKE) --no-print-directory --jobs=2 lint pytest-long
 
 pytest:

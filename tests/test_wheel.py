@@ -112,6 +112,7 @@ def test_the_wheel_holds_all_that_runs(wheel: Path) -> None:
     assert any(name.startswith("app/store/migrations/versions/v0001") for name in held)
 
 
+@pytest.mark.long
 def test_the_library_comes_from_the_wheel(run: Run, environment: Path) -> None:
     code = (
         "import optimizer; from optimizer import Arm, Problem, optimize, load_robot; "

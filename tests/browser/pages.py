@@ -50,8 +50,8 @@ def ask(page: Page, body: dict[str, Any]) -> None:
 
 @contextmanager
 def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
-    """A page of a fresh context, at 1280 x 800, whose errors and foreign requests fail the test."""
-    options = {"viewport": {"width": 1280, "height": 800}, "reduced_motion": "reduce", **options}
+    """A page of a fresh context, at 1024 x 640, whose errors and foreign requests fail the test."""
+    options = {"viewport": {"width": 1024, "height": 640}, "reduced_motion": "reduce", **options}
     context = browser.new_context(accept_downloads=True, **options)
     page = context.new_page()
     page.set_default_timeout(PATIENCE)

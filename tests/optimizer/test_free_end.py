@@ -49,6 +49,7 @@ def stretched() -> Solution:
     return optimize(outwards(free(down(0.8, -0.12, 0.25))))
 
 
+@pytest.mark.long
 def test_a_goal_out_of_reach_is_reached_with_a_turn(stretched: Solution) -> None:
     with pytest.raises(PathInfeasible):
         optimize(outwards(down(0.8, -0.12, 0.25)))

@@ -45,6 +45,7 @@ def retracted() -> Solution:
     return optimize(inwards(free(FAR_AWAY)))
 
 
+@pytest.mark.long
 def test_a_start_out_of_reach_is_left_with_a_turn(retracted: Solution) -> None:
     with pytest.raises(UnreachablePose):
         optimize(inwards(FAR_AWAY))
@@ -56,6 +57,7 @@ def test_a_start_out_of_reach_is_left_with_a_turn(retracted: Solution) -> None:
     assert np.array_equal(retracted.start.q, retracted.trajectory.spline.control_points[0])
 
 
+@pytest.mark.long
 def test_a_known_motion_from_a_free_start_is_certified_as_it_is(retracted: Solution) -> None:
     """Another run has not followed the path from the very start that the first one chose."""
     again = Run(inwards(free(FAR_AWAY))).as_it_is(retracted.trajectory.spline)

@@ -27,6 +27,7 @@ def test_optimize_answers_as_the_service_does(tmp_path: Path) -> None:
     assert answer.trajectory.q[-1] == pytest.approx(NEAR)
 
 
+@pytest.mark.long
 def test_cycle_answers_as_the_service_does() -> None:
     stops = [{"name": "there", "target": {"q": NEAR}, "payload": {"mass": 1.0, "com": [0.0, 0.0, 0.05]}}]
     finished = run("cycle", "-", stdin=json.dumps({"start": {"q": HOME}, "stops": stops, **PATIENT}))
@@ -36,6 +37,7 @@ def test_cycle_answers_as_the_service_does() -> None:
     assert answer.legs[0].goal.q == pytest.approx(NEAR) and answer.legs[1].goal.q == pytest.approx(HOME)
 
 
+@pytest.mark.long
 def test_optimize_reads_standard_input_and_writes_a_file(tmp_path: Path) -> None:
     output = tmp_path / "answer.json"
     finished = run("optimize", "-", "--output", str(output), stdin=request())
@@ -149,6 +151,7 @@ def test_options_for_a_csv_do_not_go_with_json(here: Here, tmp_path: Path) -> No
     assert b"one JSON object" in err
 
 
+@pytest.mark.long
 def test_robots_are_listed_with_their_trust() -> None:
     finished = run("robots")
     assert (finished.returncode, finished.stderr) == (0, b"")

@@ -24,8 +24,8 @@ IN_THE_DOCUMENT = {
 
 # those of the OpenAPI document are sent by its own test
 SENT = FILES.keys() - IN_THE_DOCUMENT.keys()
-# the angles at both ends of a path are chosen in some seconds
-SLOW = {"optimize/seam_any_turn"}
+# answered in seconds
+SLOW = {"optimize/seam_any_turn", "optimize/polynomial_ga"}
 
 
 def test_a_file_holds_the_documents_example_of_its_name() -> None:

@@ -162,6 +162,7 @@ def test_a_broken_zip_is_refused_as_what_it_is(method: int) -> None:
     assert refused > 30
 
 
+@pytest.mark.long
 def test_an_arm_of_others_with_its_meshes(tmp_path: Path) -> None:
     """The UR5e by its visual meshes: every link is within its capsule, as the bundled robot's are."""
     text = (arm_folder("ur5e") / "ur5e.urdf").read_text().replace("<collision>", "<!--").replace("</collision>", "-->")

@@ -336,6 +336,7 @@ def test_the_margin_and_the_radius_are_kept() -> None:
     assert np.abs(plain - wide - 0.025).max() < ROUNDING
 
 
+@pytest.mark.long
 def test_an_arm_that_starts_within_a_closed_mesh_collides() -> None:
     """No surface is near: only the inside tells."""
     room = np.array([6.0, 6.0, 6.0])

@@ -74,6 +74,7 @@ def test_estimates_are_of_motions_in_the_time_that_is_asked_for() -> None:
     np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
 
 
+@pytest.mark.long
 def test_of_work_more_is_tried_than_what_the_straight_line_says() -> None:
     """A posture that needs much more than others on a straight line, and less than these on the best motion."""
     robot, rng = load_robot("panda"), np.random.default_rng([77, 0])

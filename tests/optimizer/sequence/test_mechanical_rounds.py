@@ -65,6 +65,7 @@ def test_more_time_needs_no_more_work() -> None:
     assert longer.price_of_time <= short.price_of_time + ROUNDING
 
 
+@pytest.mark.long
 def test_it_works_less_than_the_round_of_least_electrical_energy() -> None:
     """In the same time, over configurations that either chooses."""
     electrical = optimize_round(replace(ASKED, objective="electrical", duration_max=TIME, duration_min=TIME))

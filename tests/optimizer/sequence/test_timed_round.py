@@ -118,6 +118,7 @@ def test_the_price_is_what_a_second_more_would_save() -> None:
     assert timed(1.3).price_of_time < 0
 
 
+@pytest.mark.long
 def test_brakes_make_waiting_cheap() -> None:
     """Of a brake power below what the electronics draw, next to nothing is saved by slower moves."""
     asked = in_time(replace(ASKED, hold="brakes", brake_delay=0.1, brake_power=1.0), 3.0 * free().duration)
