@@ -37,9 +37,7 @@ def planned(name: str) -> Replay:
     return replay(problem_with(task.q_start, task.q_goal), motion, task.q_start, task.q_goal)
 
 
-@pytest.mark.parametrize(
-    "name", long_but([name for name in PLANNERS if name in ("joulepath", "toppra", "opti")], PLANNERS)
-)
+@pytest.mark.parametrize("name", long_but([name for name in PLANNERS if name in ("joulepath", "toppra")], PLANNERS))
 def test_planners_reach_start_and_goal(name: str) -> None:
     found = planned(name)
     electrical = found.energy.electrical

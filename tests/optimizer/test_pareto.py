@@ -139,6 +139,7 @@ def test_ends_at_the_longest_duration_where_that_costs_least() -> None:
     assert objective(asked, pareto(asked, 3, still).points[-1]) <= objective(asked, longest) * (1 + LOCAL)
 
 
+@pytest.mark.long
 def test_jumps_are_found_where_they_are() -> None:
     """A candidate that is slower to reach and far cheaper takes over at its own fastest motion."""
     front = pareto(jumping(), 12, still)

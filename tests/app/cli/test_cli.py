@@ -95,6 +95,7 @@ def test_an_output_that_cannot_be_written_is_wrong_usage(here: Here, tmp_path: P
     assert b"Traceback" not in err
 
 
+@pytest.mark.long
 def test_evaluate_answers_as_the_service_does() -> None:
     example = next(iter(EVALUATE_EXAMPLES.values()))["value"]
     finished = run("evaluate", "-", stdin=json.dumps(example))

@@ -24,6 +24,7 @@ def with_lines(**fields: Any) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.long
 def test_lines_are_legs_of_their_own(client: TestClient) -> None:
     reply = client.post("/cycle", json=with_lines())
     assert reply.status_code == 200, reply.text

@@ -98,6 +98,7 @@ def test_a_payload_that_is_not_told_is_none_and_the_rest_is_found() -> None:
     assert found.payload is not None and found.payload.mass == 0 and found.payload.why
 
 
+@pytest.mark.long
 def test_held_out_motions_are_predicted_with_the_payload() -> None:
     """It is found without them: with what the log says, the errors are far larger."""
     logs = [log_of(NOTHING, 0, NOTHING), log_of(PAYLOAD, 0, NOTHING, 50)]

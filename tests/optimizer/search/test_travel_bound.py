@@ -82,6 +82,7 @@ def test_no_motion_draws_less_however_it_is_cut(name: str) -> None:
     assert nearest > -0.3, "the attack does not come near"
 
 
+@pytest.mark.long
 def test_the_search_does_not_find_less_either() -> None:
     """The least energy through passes, searched over all their times, speeds and durations."""
     rng, closest = np.random.default_rng(3), 0.0

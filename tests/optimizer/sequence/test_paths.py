@@ -129,6 +129,7 @@ def test_a_path_that_no_branch_follows_says_how_far_each_gets() -> None:
     assert layers_of(a_round(glue(path=near)))["glue"].q.size
 
 
+@pytest.mark.long
 def test_what_ends_a_path_is_told_of_each_branch() -> None:
     """A joint range is in the way of some, another line of the stop in that of others, an obstacle of the last."""
     own = ROBOT.limits

@@ -248,6 +248,7 @@ def memory() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
+@pytest.mark.long
 def test_no_model_leaks() -> None:
     """A model with its data has more than a hundred kilobytes: a hundred that stay would be seen."""
     plan = quintic(in_the_way(above=0.5), duration=0.2)
