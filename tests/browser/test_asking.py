@@ -248,6 +248,7 @@ def test_what_is_kept_opens_again(page: Page, service: Server) -> None:
     until(page, f"() => Math.abs(studio.state.answer.branch.goal.q[0] - {NEAR[0]}) > 0.01")
 
 
+@pytest.mark.long
 def test_a_page_stands_alone(browser: Browser, page: Page, tmp_path: Path) -> None:
     """Opened from a file, with no service and no network."""
     page.locator("#downloads > summary").click()

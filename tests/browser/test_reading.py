@@ -67,7 +67,7 @@ CROWDED = """() => {
 }"""
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", long_but(["dark"], ["light", "dark"]))
 def test_every_text_stands_out(browser: Browser, service: Server, scheme: str) -> None:
     with opened(browser, f"{service.url}/studio", color_scheme=scheme) as page:
         until(page, SHOWN)

@@ -22,7 +22,6 @@ THREADS = 8
 # work for every thread, a second in all, and work for one thread each
 QUICK = (
     "move 2 by time_scaling",
-    "move 5 by bspline",
     "out of reach",
     "replay with storage",
     "replayed log",

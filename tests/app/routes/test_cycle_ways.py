@@ -87,6 +87,7 @@ def with_path(**fields: Any) -> dict[str, Any]:
     return a_round(stops=[stop])
 
 
+@pytest.mark.long
 def test_a_path_is_a_leg_of_its_own(client: TestClient) -> None:
     reply = client.post("/cycle", json=with_path())
     assert reply.status_code == 200, reply.text

@@ -20,6 +20,7 @@ def on_a_line(orientation: Any, **path: Any) -> dict[str, Any]:
     return {"start": start, "goal": {"pose": goal}, "path": path, "collisions": False, "deadline": 60}
 
 
+@pytest.mark.long
 def test_the_angle_at_the_goal_is_chosen(client: TestClient) -> None:
     asked = on_a_line({"free_about": [0, 0, 2], "quaternion": DOWN}, tolerance={"about": Z})
     reply = client.post("/optimize", json=asked)
