@@ -159,11 +159,13 @@ def interactive(given: Any) -> tuple[Results, bool]:
     idle: list[float] = []
     beside: list[float] = []
     bodies = [request_task(given.seed + 1, index).body for index in range(given.answers)]
+    # made before: a connection that rests meanwhile is closed
+    job = random(given.seed, given.beside)
     with running(JOULEPATH_WORKERS=f"{WORKERS}") as service, closing(service.client()) as client:
         for turn in range(given.turns):
             part = bodies[turn :: given.turns]
             idle += [client.optimize(body).wall for body in part]
-            path = send(client, random(given.seed, given.beside), **COMPUTED)
+            path = send(client, job, **COMPUTED)
             beside += [client.optimize(body).wall for body in part]
             assert client.get(f"{path}?limit=1").content["state"] == "running", "the job is too short"
             client.post(f"{path}/cancel", {})
