@@ -32,9 +32,10 @@ comma := ,
 serve: $(VENV)/.runtime $(STUDIO)/vendor kernels
 	JOULEPATH_HOST=$(HOST) PORT=$(PORT) exec $(PY) -m app
 
-# what the tests need, side by side
+# what the tests need, side by side; bytecode, since they start many processes, even where those may write none
 ready: $(VENV)/.runtime $(COMPILER)
 	@$(MAKE) --no-print-directory --jobs=3 $(VENV)/.dev $(STUDIO)/vendor kernels
+	@$(PY) -m compileall -q app optimizer models
 
 # the linters run beside the tests
 test: ready

@@ -12,6 +12,7 @@ from tests.browsers import BROWSER, MISSING
 pytestmark = pytest.mark.skipif(BROWSER is None, reason=MISSING)
 
 
+@pytest.mark.long
 def test_what_stands_before_the_arm_fades(page: Page) -> None:
     """The side of the shelf, seen through it; what stands behind the arm, or is not to fade, does not."""
     faint = """show => {

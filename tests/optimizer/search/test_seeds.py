@@ -140,6 +140,7 @@ def test_pairs_whose_lower_bounds_are_all_the_same_have_seeds_too() -> None:
     assert 0 < sum(not each.deferred for each in before) <= MOST_SEEDS
 
 
+@pytest.mark.long
 def test_motions_that_give_energy_back_have_seeds_too() -> None:
     bus = Bus(mode="recuperating", efficiency=1.0)
     asked = downwards("iiwa14", [0, 0.2, 0, -0.5, 0, 0.5, 0], [0, 1.4, 0, -1.2, 0, 0.9, 0], bus)
