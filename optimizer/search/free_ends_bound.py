@@ -9,20 +9,20 @@ pair of them says something. Pairs with the least bounds are halved further, the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import prod
 
 import numpy as np
 
 from models.robot import Array
-from optimizer.collision.bodies import Indices
 from optimizer.deadline import Deadline
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target
+from optimizer.search.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
 from optimizer.search.ends import within_cone
-from optimizer.search.free_goal_bound import FEW, NEARLY, ROUNDS, SPLIT, TIGHT_ROUNDS, Family, halved, whole_turns
+from optimizer.search.free_goal_bound import Family, halved, whole_turns
 from optimizer.search.least_displacement import least_displacement
 from optimizer.search.lower_bound import LeastBound
 
@@ -48,28 +48,8 @@ def bound_between(
     return search.run(TIGHT_ROUNDS if tight else ROUNDS, deadline, enough, 0.0 if tight else NEARLY)
 
 
-@dataclass(frozen=True)
-class _Pairs:
-    """Pairs of boxes: middles and half sides (b, 2, nq) [rad] at the start and the goal, and the bound (b,) [J]."""
-
-    centre: Array
-    half: Array
-    value: Array
-
-    def __getitem__(self, chosen: Indices) -> _Pairs:
-        return _Pairs(self.centre[chosen], self.half[chosen], self.value[chosen])
-
-    def joined(self, other: _Pairs) -> _Pairs:
-        """These pairs, then the others."""
-        return _Pairs(
-            np.concatenate([self.centre, other.centre]),
-            np.concatenate([self.half, other.half]),
-            np.concatenate([self.value, other.value]),
-        )
-
-
-class _PairSearch:
-    """Branch and bound over pairs of boxes."""
+class _PairSearch(BoxSearch[Boxes]):
+    """Branch and bound over pairs of boxes: (b, 2, nq), at the start and the goal."""
 
     def __init__(self, prepared: PreparedProblem, start: ConeOrientedPose, goal: ConeOrientedPose) -> None:
         problem = prepared.problem
@@ -78,22 +58,11 @@ class _PairSearch:
         # the highest that the start can be is the lowest under gravity turned round
         self.families = Family(back, start, False), Family(prepared, goal, False)
 
-    def run(self, rounds: int, deadline: Deadline, enough: float, nearly: float) -> float:
-        """The least bound [J] of any pair after at most so many rounds of halving, or once it is enough."""
-        pairs = self._first()
-        for n in range(rounds):
-            pairs = pairs[np.flatnonzero(np.isfinite(pairs.value))]
-            order = np.argsort(pairs.value, kind="stable")
-            will_do = enough if n < FEW else enough - nearly * abs(enough)
-            if not len(order) or pairs.value[order[0]] >= will_do or deadline.passed:
-                break
-            least = pairs.half[order[0]]
-            if all(family.settled(half) for family, half in zip(self.families, least, strict=True)):
-                break
-            pairs = pairs[order[SPLIT:]].joined(self._halved(pairs[order[:SPLIT]]))
-        return float(pairs.value.min(initial=np.inf))
+    def settled(self, half: Array) -> bool:
+        """Whether no box of a pair is worth splitting."""
+        return all(family.settled(each) for family, each in zip(self.families, half, strict=True))
 
-    def _first(self) -> _Pairs:
+    def first(self) -> Boxes:
         """Pairs that cover every position of the joints at both ends: of the smallest boxes of which there are not too
         many."""
         nq = len(self.limits.q_min)
@@ -108,9 +77,9 @@ class _PairSearch:
                 chosen = sides
         a, b = (each.ravel() for each in np.indices([len(centre) for centre, _ in chosen]))
         centre, half = (np.stack([chosen[0][k][a], chosen[1][k][b]], axis=1) for k in (0, 1))
-        return _Pairs(centre, half, self._bounds(centre, half))
+        return Boxes(centre, half, self._bounds(centre, half))
 
-    def _halved(self, pairs: _Pairs) -> _Pairs:
+    def halved(self, pairs: Boxes) -> Boxes:
         """Both halves of every pair, split along the side of the box that moves the TCP most."""
         sizes = np.stack([family.sizes(pairs.half[:, k]) for k, family in enumerate(self.families)], axis=1)
         end = sizes.max(axis=2).argmax(axis=1)
@@ -124,7 +93,7 @@ class _PairSearch:
         # the bound of a part is at least that of the whole
         value = np.tile(pairs.value, 2)
         value[held] = np.maximum(value[held], self._bounds(centre[held], half[held]))
-        return _Pairs(centre, half, np.where(held, value, np.inf))
+        return Boxes(centre, half, np.where(held, value, np.inf))
 
     def _bounds(self, centre: Array, half: Array) -> Array:
         """Bounds (b,) [J] on motions between boxes (b, 2, nq)."""

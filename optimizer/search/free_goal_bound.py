@@ -27,17 +27,15 @@ from optimizer.kinematics.wrist_geometry import OUTER, Shell, WristBody, WristGe
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.targets import AnyOf
+from optimizer.search.box_search import NEARLY, ROUNDS, TIGHT_ROUNDS, Boxes, BoxSearch
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import within_cone
 from optimizer.search.least_displacement import least_displacement
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves
 
-# boxes along each inner joint at first, but for so many starts that there would be more than MOST_FIRST in all; boxes
-# split in a round, rounds, and rounds of a tight bound
-FIRST_BOXES, MOST_FIRST, SPLIT, ROUNDS, TIGHT_ROUNDS = (4, 2, 1), 4096, 400, 80, 200
-# after so many rounds, and unless the bound is to be tight, a bound within this share of what is enough will do
-FEW, NEARLY = 24, 0.1
+# boxes along each inner joint at first, but for so many starts that there would be more than MOST_FIRST in all
+FIRST_BOXES, MOST_FIRST = (4, 2, 1), 4096
 # a box is not split once its widest side is below this [rad]
 SMALLEST = 0.002
 # where a side is chosen to split: what a radian of any joint counts as [m] beside the path that it moves the TCP by,
@@ -118,29 +116,13 @@ def whole_turns(nq: int, along: int) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True)
-class _Boxes:
-    """Boxes of joint positions: `start` (b,) the index of each one's start, middle and half sides (b, nq) [rad], and
-    the bound (b,) [J], inf for a box without configurations."""
+class _Boxes(Boxes):
+    """Boxes (b, nq), and `start` (b,), the index of each one's start."""
 
     start: Indices
-    centre: Array
-    half: Array
-    value: Array
-
-    def __getitem__(self, chosen: Indices) -> _Boxes:
-        return _Boxes(self.start[chosen], self.centre[chosen], self.half[chosen], self.value[chosen])
-
-    def joined(self, other: _Boxes) -> _Boxes:
-        """These boxes, then the others."""
-        return _Boxes(
-            np.concatenate([self.start, other.start]),
-            np.concatenate([self.centre, other.centre]),
-            np.concatenate([self.half, other.half]),
-            np.concatenate([self.value, other.value]),
-        )
 
 
-class _BoxSearch:
+class _BoxSearch(BoxSearch[_Boxes]):
     """Branch and bound over boxes for one family of goal configurations."""
 
     def __init__(self, family: Family, starts: Array, half: Array | None) -> None:
@@ -148,19 +130,9 @@ class _BoxSearch:
         self.start_half = np.zeros_like(starts) if half is None else half
         self.potentials = _greatest_potentials(family.prepared, starts, half)
 
-    def run(self, rounds: int, deadline: Deadline, enough: float, nearly: float) -> float:
-        """The least bound [J] of any box after at most so many rounds of splitting, or once it is enough."""
-        boxes = self.first()
-        for n in range(rounds):
-            boxes = boxes[np.flatnonzero(np.isfinite(boxes.value))]
-            order = np.argsort(boxes.value, kind="stable")
-            will_do = enough if n < FEW else enough - nearly * abs(enough)
-            if not len(order) or boxes.value[order[0]] >= will_do or deadline.passed:
-                break
-            if self.family.settled(boxes.half[order[0]]):
-                break
-            boxes = boxes[order[SPLIT:]].joined(self.halved(boxes[order[:SPLIT]]))
-        return float(boxes.value.min(initial=np.inf))
+    def settled(self, half: Array) -> bool:
+        """Whether a box is not worth splitting."""
+        return self.family.settled(half)
 
     def first(self) -> _Boxes:
         """Boxes that cover every position of the joints, for every start: the inner joints' range in parts."""
@@ -176,7 +148,7 @@ class _BoxSearch:
         halves = self.bounded(np.tile(boxes.start, 2), *halved(self.family, boxes.centre, boxes.half))
         # the bound of a part is at least that of the whole
         value = np.maximum(halves.value, np.concatenate([boxes.value, boxes.value]))
-        return _Boxes(halves.start, halves.centre, halves.half, value)
+        return _Boxes(halves.centre, halves.half, value, halves.start)
 
     def bounded(self, start: Indices, centre: Array, half: Array) -> _Boxes:
         """The boxes, narrowed, with their bounds."""
@@ -184,7 +156,7 @@ class _BoxSearch:
         value = np.full(len(centre), np.inf)
         starts, start_half, potentials = (each[start[held]] for each in (self.starts, self.start_half, self.potentials))
         value[held] = self.family.bounds(starts, start_half, potentials, centre[held], half[held])
-        return _Boxes(start, centre, half, value)
+        return _Boxes(centre, half, value, start)
 
 
 @dataclass(frozen=True)

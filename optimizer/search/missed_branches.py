@@ -18,8 +18,9 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target, members
+from optimizer.search.box_search import FEW, TIGHT_ROUNDS
 from optimizer.search.candidates import Candidate
-from optimizer.search.free_goal_bound import FEW, TIGHT_ROUNDS, family_bound
+from optimizer.search.free_goal_bound import family_bound
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import EndCurves, bound_between, self_motion_bound
 

@@ -16,8 +16,9 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.problem import Problem
 from optimizer.problem.tool_cone import ToolCone
 from optimizer.search import free_goal_bound
+from optimizer.search.box_search import FEW, NEARLY, ROUNDS
 from optimizer.search.ends import within_cone
-from optimizer.search.free_goal_bound import FEW, MOST_FIRST, NEARLY, ROUNDS, family_bound
+from optimizer.search.free_goal_bound import MOST_FIRST, family_bound
 from optimizer.search.lower_bound import lower_bounds
 from tests.optimizer.chains import serial_chain
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, TILTED, problem, tcp_pose
