@@ -202,8 +202,9 @@ class Arm:
         # written so that NaN, which compares false with everything, is refused
         for public, name in LIMIT_NAMES.items():
             value, most = getattr(limits, name), getattr(robot, name)
-            if value.shape != most.shape or not (value > 0).all():
-                raise InvalidProblem(f"limits.{public}", f"limits.{public} must be a positive number for every joint.")
+            if value.shape != most.shape or not ((value > 0) & (value < np.inf)).all():
+                message = f"limits.{public} must be a positive number for every joint, and a finite one."
+                raise InvalidProblem(f"limits.{public}", message)
             # the factor allows the robot's own limits after rounding
             if (value > most * (1 + 1e-9)).any():
                 joint = int(np.argmax(value / most))

@@ -78,8 +78,6 @@ class _Pairs:
         friction = FrictionConjugate.of(arm.friction_law, arm.active_limits.v_max)
         if friction is None or arm.robot.nq < GRID_JOINTS:
             return None
-        if friction.load is not None and not np.isfinite(arm.active_limits.a_max).all():
-            return None
         stiffness = friction.stiffness(arm.friction_law)
         # friction of the same torque at every speed has no convexity to spare
         if stiffness.min() <= 0:

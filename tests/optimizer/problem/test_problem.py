@@ -88,6 +88,14 @@ def test_nan_is_no_limit(name: str) -> None:
         problem(limits=replace(ROBOT.limits, **{name: values}))
 
 
+@pytest.mark.parametrize("name", ["v_max", "a_max", "j_max", "tau_max"])
+def test_a_robot_without_a_limit_is_refused(name: str) -> None:
+    """Bounds divide one limit by another."""
+    without = replace(ROBOT.limits, **{name: np.full(6, math.inf)})
+    with pytest.raises(InvalidProblem, match="finite"):
+        problem(robot=replace(ROBOT, limits=without))
+
+
 @pytest.mark.parametrize("name", ["v_max", "a_max", "j_max", "tau_max", "q_min", "q_max"])
 def test_limits_are_one_per_joint(name: str) -> None:
     with pytest.raises(InvalidProblem):
