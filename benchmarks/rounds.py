@@ -15,8 +15,7 @@ or as long as `--dwell` says: what it draws then, no choice of configurations sa
 every round has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
 move, the first move chooses it. With `--time`, each round gets so many times the duration of least energy. With
 `--passes`, it passes through the first stops without a rest, and carries the part nowhere; then a round that needs more
-than the one that stops there ends the benchmark. With `--free`, the order is free, the arm carries nothing either, and
-full turns do not count.
+than the one that stops there ends the benchmark. With `--free`, the order is free, and the arm carries nothing either.
 """
 
 from __future__ import annotations
@@ -77,7 +76,6 @@ def rounds(
             start=first if anywhere else HOME,
             stops=[_stop(j, pose, passes, free, dwell) for j, pose in enumerate(targets)],
             order=FreeOrder() if free else None,
-            windings=not free,
             deadline=deadline,
         )
 

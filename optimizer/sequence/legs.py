@@ -27,7 +27,7 @@ from optimizer.trajectories.spline import Spline
 
 # pairs of configurations of one leg: a matrix of this size takes some 30 MB
 MOST_PAIRS = 4_000_000
-# pairs of all legs of a round: they take some 1.4 GB
+# pairs of all legs of a round: they take some 1.6 GB in a free order
 MOST_PAIRS_OF_ROUND = 30_000_000
 # nodes of a stop with lines or a path: they make a matrix, of which the diagonal alone counts
 MOST_ON_WAY = 2000

@@ -8,27 +8,29 @@ their proven bounds first; those of the least tour are solved, until no tour has
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from models.robot import Array
-from optimizer.deadline import Clock, DeadlinePassed, watch
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem, NoTrajectory
+from optimizer.deadline import Clock, DeadlinePassed, checkpoint, watch
+from optimizer.exceptions import DeadlineExceeded, NoTrajectory
 from optimizer.problem.free_order import earlier_groups, groups_of
 from optimizer.problem.stops import PlannedMove, Stop, moves_over
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.progress import Tell, nobody
 from optimizer.sequence.chains import LeastChain
+from optimizer.sequence.layers import Layer
 from optimizer.sequence.proven_bound import bounded_costs
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.tours import Tours
 
 # share of the deadline that the search for the order may take
 SHARE = 0.5
-# configurations in which the groups are left: every subset of the groups weighs each of them
-MOST_NODES = 2000
 
 
 class OrderSearch:
@@ -44,13 +46,6 @@ class OrderSearch:
         self.moves, self.blocks = _all_moves(asked, self.groups)
         self.search = RoundSearch(replace(asked, deadline=SHARE * asked.deadline), clock, self.moves, tell)
         self.exact, self.bound, self.best = True, -np.inf, list[int]()
-        count = sum(len(self.search.legs[self.blocks[None, k][-1]].goal.q) for k in range(len(self.groups)))
-        if count > MOST_NODES:
-            raise InvalidProblem(
-                "order",
-                f"There are {count} arm configurations at the stops, of at most {MOST_NODES} with a free order: set "
-                "`windings` false, or give a `branch`.",
-            )
 
     def run(self) -> WorkRound:
         """The round with its stops in the best order; once the time is up, in the best one known.
@@ -60,8 +55,6 @@ class OrderSearch:
         search = self.search
         try:
             with watch(search.end):
-                legs = zip(self.moves, search.legs, strict=True)
-                self.bound = self._tours([bounded_costs(self.asked, *leg, search.end) for leg in legs]).least()[0]
                 self._explore()
         except DeadlinePassed:
             self.exact = False
@@ -71,10 +64,17 @@ class OrderSearch:
         return replace(self.asked, stops=stops, order=None)
 
     def _explore(self) -> None:
-        """Find the least tour, all of its moves solved; `best` are its groups so far."""
-        search = self.search
+        """Find the least tour, all of its moves solved; `best` are its groups so far. The first one is the `bound`."""
+        search, costs = self.search, [leg.cost for leg in self.search.legs]
+        known = self.asked.objective == "electrical" and all(leg.closed for leg in search.legs)
+        if not known:
+            # moves weigh more than their bounds, or there are configurations that no node is
+            legs = zip(self.moves, search.legs, strict=True)
+            self.bound = self._tours([bounded_costs(self.asked, *leg, search.end) for leg in legs]).least()[0]
+        tours = self._tours(costs)
         while True:
-            value, groups, ends = self._tours([leg.cost for leg in search.legs]).least()
+            value, groups, ends = tours.least()
+            self.bound = max(self.bound, value) if known and not self.best else self.bound
             if not np.isfinite(value):
                 raise DeadlineExceeded([]) if search.cut_short else NoTrajectory([])
             self.best = groups
@@ -84,10 +84,29 @@ class OrderSearch:
                 return
             for each in open_:
                 search.try_kind(*each)
+            self._put(tours, costs, {k for k, _, _ in open_})
 
-    def _tours(self, costs: list[Array]) -> Tours:
-        blocks = {key: _product([costs[k] for k in legs]) for key, legs in self.blocks.items()}
-        return Tours(blocks, earlier_groups(self.order, self.groups), self.asked.closed)
+    def _tours(self, costs: Sequence[Array]) -> Tours:
+        """The tours with the costs (n, n) [J] of all moves."""
+        ends: dict[int | None, npt.NDArray[np.intp]] = {}
+        for (origin, to), legs in self.blocks.items():
+            if origin is None:
+                ends[None] = _ends(self.search.legs[legs[0]].start, len(costs[legs[0]]))
+                ends[to] = _ends(self.search.legs[legs[-1]].goal, costs[legs[-1]].shape[1])
+        tours = Tours(ends, earlier_groups(self.order, self.groups), self.asked.closed)
+        self._put(tours, costs, set(range(len(costs))))
+        return tours
+
+    def _put(self, tours: Tours, costs: Sequence[Array], changed: set[int]) -> None:
+        """Give the tours the costs of all blocks that have a move of which they changed."""
+        # all ways to a group go on by the same moves
+        inner = dict[int | None, Array | None]()
+        for (origin, to), (first, *others) in self.blocks.items():
+            if not changed.isdisjoint((first, *others)):
+                if to not in inner:
+                    inner[to] = reduce(_through, [costs[k] for k in others]) if others else None
+                rest = inner[to]
+                tours.put(origin, to, costs[first] if rest is None else _through(costs[first], rest))
 
     def _moves_of(self, groups: list[int], ends: list[int]) -> list[tuple[int, int, int]]:
         """Leg, start node and goal node of each move of a tour, which leaves the start and the groups by the nodes
@@ -135,9 +154,22 @@ def _all_moves(
     return moves, blocks
 
 
-def _product(costs: list[Array]) -> Array:
-    """The least cost (n_0, n_m) [J] over all chains from a first to a last node, through legs (n_k, n_k+1)."""
-    total = costs[0]
-    for cost in costs[1:]:
-        total = np.stack([(row[:, None] + cost).min(axis=0) for row in total])
+def _ends(layer: Layer, nodes: int) -> npt.NDArray[np.intp]:
+    """The end (n,) of each node of a layer, ascending from 0; one more for a node that stands for those not known."""
+    ends = np.unique(layer.end, return_inverse=True)[1]
+    return np.append(ends, np.full(nodes - len(ends), ends[-1] + 1))
+
+
+def _through(one: Array, other: Array) -> Array:
+    """The least cost (a, c) [J] over all nodes between, from costs (a, b) and (b, c)."""
+    rows, columns = np.nonzero(np.isfinite(other))
+    if len(np.unique(columns)) == len(columns):
+        # a line or a path, which leads to each node from one other
+        total = np.full((len(one), other.shape[1]), np.inf)
+        total[:, columns] = one[:, rows] + other[rows, columns]
+        return total
+    total = np.empty((len(one), other.shape[1]))
+    for k, row in enumerate(one):
+        checkpoint()
+        total[k] = (row[:, None] + other).min(axis=0)
     return total
