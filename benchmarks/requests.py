@@ -2,6 +2,7 @@
 
     python -m benchmarks.requests --count 300 --seed 0
     python -m benchmarks.requests --count 200 --robot panda --kind "joint to pose"
+    python -m benchmarks.requests --count 100 --kind "joint to pose" --bound tight --line-every 0
 
 Starts the service with its default settings and sends joint-to-pose and pose-to-pose requests in turn. The certificate
 of each answer is checked, its spline is replayed here, and baselines, energy balance and lower bound are compared. Some
@@ -185,13 +186,14 @@ def main() -> int:
     arguments.add_argument("--clients", type=int, default=1, help="simultaneous requests (%(default)s)")
     arguments.add_argument("--robot", choices=robot_names(), default="ur5e", help="(%(default)s)")
     arguments.add_argument("--deadline", type=float, help="of each request [s] (the service's)")
+    arguments.add_argument("--bound", choices=("normal", "tight"), default="normal", help="bound (%(default)s)")
     arguments.add_argument("--kind", choices=KINDS, help="only this kind (default: in turn)")
     arguments.add_argument("--line-every", type=int, default=5, help="compare every n-th task with time scaling")
     arguments.add_argument("--varied", action="store_true", help="random other fields; some requests are infeasible")
     given = arguments.parse_args()
     tasks = list(request_tasks(given.seed, given.count, given.kind, given.varied, given.robot))
-    if given.deadline is not None:
-        tasks = [replace(task, body={**task.body, "deadline": given.deadline}) for task in tasks]
+    settings = {"bound": given.bound} | ({} if given.deadline is None else {"deadline": given.deadline})
+    tasks = [replace(task, body=task.body | settings) for task in tasks]
     with running() as service:
         outcomes = send_all(service, tasks, given.clients, 0 if given.varied else given.line_every)
     results = summary(outcomes)

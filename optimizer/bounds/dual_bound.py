@@ -8,6 +8,11 @@ constants
 
     energy ≥ ΔU + ∫ (base - Σ c λ² + Σ_j (v_j + ω_j) tau_f(v_j) + ω · g - ω̇ · M v - v · N v / 2) dt.
 
+**Work.** ω + 2 η v may stand in the place of ω, for any η above -1/2 that is the same for all joints. The product grows
+by 2 η v · (tau + tau_f), whose integral is 2 η (ΔU + ∫ v · tau_f dt), and what is taken from it by η ω_j v_j / c_j + η²
+v_j² / c_j. So ΔU and the v_j before tau_f get the factor 1 + 2 η, in H_j below, too, which has those two terms more.
+Without ω this is the bound of `search.lower_bound`. Under load η is zero.
+
 **Load.** Friction may grow with the load: tau_f = f(v) + load |tau_l| s, where tau_l = tau - J a is the torque without
 the rotor's, s has the sign of v, and |s| ≤ 1. Then v tau_f ≥ v f(v). The copper's inequality is taken at each instant
 with ω̂ = ω / (1 + load · sign(tau_l) s) and λ̂ = ω̂ / (2 c) in the place of ω and λ: so ω̂ (tau_l + load |tau_l| s) = ω
@@ -69,16 +74,19 @@ from optimizer.bounds.time_parts import TimeParts
 
 # halvings of the interval that holds the multiplier of a joint's displacement
 _BISECTIONS = 13
+# what a joint's loss is at least where it divides
+_TINY = 1e-300
 
 
 @dataclass(frozen=True)
 class Weights:
     """Choices that the bound's quality depends on, and not its validity: the multipliers' factor `scale` and, per joint
-    (nq,) [N·m·s/rad], κ and μ of `dual_bound`."""
+    (nq,) [N·m·s/rad], κ and μ of `dual_bound`; `work` is η."""
 
     scale: float
     confinement: Array
     mixing: Array
+    work: float = 0.0
 
 
 def multiplier_rates(multipliers: Array, loss: Array, load: Array | None) -> Array:
@@ -90,14 +98,15 @@ def multiplier_rates(multipliers: Array, loss: Array, load: Array | None) -> Arr
 
 @dataclass(frozen=True)
 class DualBound:
-    """The bound of a pair: terms along its path, `rates` (S,) [W] by `multiplier_rates`, powers [W] and gain of
-    potential energy [J].
+    """The bound of a pair: terms along its path, `loss` (nq,) [W/(N·m)²] is c, `rates` (S,) [W] by `multiplier_rates`,
+    powers [W] and gain of potential energy [J].
 
     `base` holds the constants of the inverters. `longest` [s] is the duration that the boxes of `terms` are made for,
     `rotor` (nq,) [kg·m²] is J.
     """
 
     terms: PathTerms
+    loss: Array
     rates: Array
     friction: FrictionConjugate
     limits: Limits
@@ -130,7 +139,7 @@ class DualBound:
 
         `waiting` [W] is what a motion saves by every second that it takes.
         """
-        assert longest.max() <= self.longest
+        assert longest.max() <= self.longest and (weights.work == 0 or self.friction.load is None)
         terms, S = self.terms, len(self.rates)
         middle, fast, slow = np.sqrt(shortest * longest), 1 / shortest, 1 / longest
         # Γ' by the share of the duration, and Γ at the nodes
@@ -139,7 +148,7 @@ class DualBound:
         momentum = weights.scale * self._momentum / middle[:, None, None]
         parts = TimeParts.of(S, self.limits, longest)
         stiffness = weights.confinement + weights.mixing + weights.scale * terms.spread
-        conjugate = _Conjugate(self, parts, weights.scale, costate, momentum, stiffness)
+        conjugate = _Conjugate(self, parts, weights.scale, weights.work, costate, momentum, stiffness)
         m = conjugate.multiplier(middle)
         at_fast, at_slow = conjugate.integral(m, fast), conjugate.integral(m, slow)
         span = fast - slow
@@ -155,7 +164,8 @@ class DualBound:
             + (least - weights.scale**2 * self.rates).mean(axis=1)
             - A
         )
-        return np.asarray(self.potential_gain - B + np.minimum(shortest * rate, longest * rate))
+        gain = (1 + 2 * weights.work) * self.potential_gain
+        return np.asarray(gain - B + np.minimum(shortest * rate, longest * rate))
 
 
 @dataclass(frozen=True)
@@ -165,6 +175,7 @@ class _Conjugate:
     bound: DualBound
     parts: TimeParts
     scale: float
+    work: float
     costate: Array
     momentum: Array
     stiffness: Array
@@ -172,6 +183,11 @@ class _Conjugate:
     @cached_property
     def _omega(self) -> Array:
         return self.parts.ends(self.scale * self.bound.terms.omega)
+
+    @cached_property
+    def _slowness(self) -> Array:
+        """η / c (nq,)."""
+        return np.asarray(self.work / np.maximum(self.bound.loss, _TINY))
 
     @cached_property
     def _p(self) -> Array:
@@ -182,11 +198,14 @@ class _Conjugate:
         """H (B, parts, 2, nq) [W] and the speeds where it is reached, for m (B, nq) and 1 / T = beta (B,)."""
         b = (beta[:, None, None] * self.bound.terms.x_rate)[:, self.parts.step, None]
         stiffness = self.stiffness[self.parts.step, None]
-        p = self._p + m[:, None, None]
+        p, more = self._p + m[:, None, None], 1 + 2 * self.work
+        linear = p - stiffness * b + self._slowness * self._omega
+        square = stiffness / 2 + self.work * self._slowness
+        # (1 + 2 η) v + ω is more · (v + ω / more)
         value, v = self.bound.friction.greatest(
-            p - stiffness * b, self._omega, stiffness / 2, self.parts.speed[:, :, None]
+            linear / more, self._omega / more, square / more, self.parts.speed[:, :, None]
         )
-        return value - p * b + stiffness * b * b / 2, v
+        return more * value - p * b + stiffness * b * b / 2, v
 
     def integral(self, m: Array, beta: Array) -> Array:
         """Trapezoids (B,) [W] of Σ_j H_j over the share of the duration."""

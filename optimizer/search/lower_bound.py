@@ -5,10 +5,8 @@ Each term below is proven in its function's docstring; their sum is minimised ov
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +16,11 @@ from optimizer.energy.dwell import holding_power, linear_dwells
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
+from optimizer.search.cruise import TINY, Cruise, EvenTravel, copper_loss
 from optimizer.trajectories.seven_segment import shortest_duration
 
 # max over x ≥ 0 of x - x² / sqrt(x² + 1), rounded up: what spreading Coulomb friction's jump takes from |v|, in knees
 _KNEE_DEFICIT = 0.3003
-# what a quotient's denominator is at least
-_TINY = 1e-300
 # duration of a part of a motion [s] that stands for none
 SHORTEST_PART = 1e-12
 # points of the secant method for the best duration at most; how steep it takes the loss to fall with the duration at
@@ -95,7 +92,7 @@ def travel_bounds(
     """
     distance = np.abs(displacement)
     t_min = np.maximum((distance / prepared.arm.active_limits.v_max).max(axis=-1), SHORTEST_PART)
-    cruise = _Even(distance, prepared.arm)
+    cruise = EvenTravel(distance, prepared.arm)
     net = _NetEnergy.of(prepared.arm, cruise, potential_gain, np.full_like(t_min, -price), most=0.0)
     bound = net.least(t_min, np.full_like(t_min, longest))
     return np.where(t_min > longest, np.inf, bound)
@@ -178,8 +175,17 @@ def electrical(
     greatest speed: η is no greater. For each T the bound is a parabola in η, and its greatest value is known. The
     greatest of convex functions is convex: `_NetEnergy.least` finds the least over [t_min, t_max].
     """
-    cruise = _Cruise(np.abs(displacement), prepared.arm)
+    cruise = Cruise(np.abs(displacement), prepared.arm)
     return _NetEnergy.of(prepared.arm, cruise, potential_gain, waiting, _most_copper(prepared.arm)).least(t_min, t_max)
+
+
+def copper_multiplier(prepared: PreparedProblem, displacement: Array, potential_gain: float, duration: float) -> float:
+    """The η of `electrical` with which the bound on motions of one displacement (nq,) [rad] and duration [s] is
+    greatest."""
+    arm, gain = prepared.arm, np.array([potential_gain])
+    cruise = Cruise(np.abs(displacement)[None], arm)
+    net = _NetEnergy.of(arm, cruise, gain, np.zeros(1), _most_copper(arm))
+    return float(net.multiplier(np.array([duration]))[0])
 
 
 @dataclass(frozen=True)
@@ -188,14 +194,14 @@ class _NetEnergy:
     that is drawn at all times, and `work` (P,) [J], the gain with the Coulomb loss, less `deficit` [W] times T; η up to
     `most`."""
 
-    cruise: _Cruise
+    cruise: Cruise
     power: Array
     work: Array
     deficit: float
     most: float
 
     @staticmethod
-    def of(arm: Arm, cruise: _Cruise, potential_gain: Array, waiting: Array, most: float) -> _NetEnergy:
+    def of(arm: Arm, cruise: Cruise, potential_gain: Array, waiting: Array, most: float) -> _NetEnergy:
         """The bound of an arm; `potential_gain` and `waiting` (P,) as of `electrical`."""
         law = arm.friction_law
         power = arm.base_power + float(arm.drives.inverter_constant.sum()) - waiting
@@ -209,10 +215,18 @@ class _NetEnergy:
         """The bound (P,) [J] for durations T (P,), and its derivative [W]."""
         friction, friction_slope, square, square_slope = self.cruise.losses(T)
         work = self.work + friction - self.deficit * T
-        eta = np.clip(work / np.maximum(square, _TINY), 0.0, self.most)
+        eta = self._best(work, square)
         more, squared = 1 + 2 * eta, eta * eta
         slope = self.power + more * (friction_slope - self.deficit) - squared * square_slope
         return self.power * T + more * work - squared * square, slope
+
+    def multiplier(self, T: Array) -> Array:
+        """η (P,) with which the bound for durations T (P,) is greatest."""
+        friction, _, square, _ = self.cruise.losses(T)
+        return self._best(self.work + friction - self.deficit * T, square)
+
+    def _best(self, work: Array, square: Array) -> Array:
+        return np.clip(work / np.maximum(square, TINY), 0.0, self.most)
 
     def least(self, t_min: Array, t_max: Array) -> Array:
         """The least bound (P,) [J] over durations from t_min to t_max (P,) [s], or for t_min if that is greater."""
@@ -252,11 +266,6 @@ class _NetEnergy:
         return value - missed
 
 
-def copper_loss(arm: Arm) -> Array:
-    """c (nq,) [W/(N·m)²] of `electrical`."""
-    return np.asarray((arm.drives.copper + arm.drives.inverter_quadratic) / arm.drives.torque_constant**2)
-
-
 def _most_copper(arm: Arm) -> float:
     """The greatest η of `electrical`; 0 for a friction law with a negative coefficient.
 
@@ -267,69 +276,3 @@ def _most_copper(arm: Arm) -> float:
         return 0.0
     bent = law.curved * (v**2 + 2 * law.speed**2) / np.hypot(v, law.speed) ** 3 + 2 * law.viscous
     return float((c * bent + np.sqrt(c * bent * (c * bent + 2))).min()) / 2
-
-
-class _Cruise:
-    """The least losses of joints that displacement `distance` (P, nq) under acceleration and jerk limits.
-
-    They are ∫ g(|v|) dt of friction, and ∫ v² / c dt.
-    """
-
-    def __init__(self, distance: Array, arm: Arm) -> None:
-        limits = arm.active_limits
-        self.distance, self.friction, self.a = distance, arm.friction_law, limits.a_max
-        self.jerk_ramp = limits.a_max / limits.j_max
-        self.ramp_speed = limits.a_max * self.jerk_ramp / 2
-        self.slowness = 2 / limits.a_max
-        self.copper = 1 / np.maximum(copper_loss(arm), _TINY)
-
-    def __getitem__(self, k: NDArray[np.intp]) -> Self:
-        some = copy(self)
-        some.distance = self.distance[k]
-        return some
-
-    def speed(self, T: Array) -> tuple[Array, Array]:
-        """c (P, nq) for durations T (P,), and the jerk ramp's time that it is subject to."""
-        T = T[:, None]
-        moving, spread = T - self.jerk_ramp, self.distance * (4 / self.a)
-        ramps = 4 * self.jerk_ramp * self.ramp_speed / self.a
-        with_jerk = self.a / 2 * (moving - np.sqrt(np.maximum(moving * moving + ramps - spread, 0.0)))
-        without = self.a / 2 * (T - np.sqrt(np.maximum(T * T - spread, 0.0)))
-        ramped = with_jerk > self.ramp_speed
-        return np.where(ramped, with_jerk, without), np.where(ramped, self.jerk_ramp, 0.0)
-
-    def losses(self, T: Array) -> tuple[Array, Array, Array, Array]:
-        """Friction's loss (P,) [J] for durations T (P,) and its derivative [W]; ∫ v² / c dt (P,) and its derivative.
-
-        The losses are by parts: T g(c) - 2 ∫ g' t dh.
-        """
-        (v, ramp), law = self.speed(T), self.friction
-        rise, square = np.arcsinh(v / law.speed), v * v
-        bent = np.sqrt(square + law.speed**2)
-        torque = law.curved * rise + law.viscous * v
-        # ∫_0^v of g
-        below = law.curved * ((square / 2 + law.speed**2 / 4) * rise - v * bent / 4) + law.viscous * v * square / 3
-        friction = T[:, None] * v * torque - self.slowness * (square * torque - below)
-        friction -= ramp * (v * torque - self._ramp_loss)
-        squares = T[:, None] * square - self.slowness * (2 / 3) * v * square - ramp * (square - self.ramp_speed**2)
-        slope = -(law.curved * square / bent + law.viscous * square)
-        return friction.sum(axis=1), slope.sum(axis=1), squares @ self.copper, -square @ self.copper
-
-    @cached_property
-    def _ramp_loss(self) -> Array:
-        """g (nq,) [W] at the speed at which a jerk ramp ends."""
-        v, law = self.ramp_speed, self.friction
-        return np.asarray(v * (law.curved * np.arcsinh(v / law.speed) + law.viscous * v))
-
-
-class _Even(_Cruise):
-    """The least losses without acceleration limits: every joint moves at an even speed."""
-
-    def __init__(self, distance: Array, arm: Arm) -> None:
-        super().__init__(distance, arm)
-        self.slowness = np.zeros_like(self.slowness)
-
-    def speed(self, T: Array) -> tuple[Array, Array]:
-        """The even speeds (P, nq) for durations T (P,); no jerk ramps."""
-        even = self.distance / T[:, None]
-        return even, np.zeros_like(even)

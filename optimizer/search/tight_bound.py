@@ -8,7 +8,7 @@ friction law that is not concave, more durations than its cells can cover) the p
 
 The dual bound is tried around the pair's own motion, or a straight one if it has none, with a few multipliers: those
 nearest to the motor torque that are linear in time, of the joints that carry no gravity, and of these and the joint
-that loses most by it.
+that loses most by it. With them goes a share of the plain bound's own multiplier of speed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from optimizer.energy.dwell import LinearDwell, linear_dwells
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.search.candidates import Candidate
-from optimizer.search.lower_bound import copper_loss, electrical
+from optimizer.search.cruise import copper_loss
+from optimizer.search.lower_bound import copper_multiplier, electrical
 from optimizer.trajectories.spline import sample
 from optimizer.trajectories.time_scalings import quintic_spline
 
@@ -39,8 +40,8 @@ from optimizer.trajectories.time_scalings import quintic_spline
 STEPS, CELL, GROUP, WINDOW = 64, 1.02, 2, 4.0
 # durations at which the plain bound is compared with the best energy
 PROBES = 400
-# multipliers' factors, and κ + μ in units of the friction's stiffness, of which μ is a share
-SCALES, STIFFNESSES, MIXING = (0.25, 0.5, 0.8), (0.7, 1.0, 1.4), 0.2
+# multipliers' factors, and κ + μ in units of the friction's stiffness, of which μ is a share; the share of the plain η
+SCALES, STIFFNESSES, MIXING, WORK = (0.25, 0.5, 0.8), (0.7, 1.0, 1.4), 0.2, 0.7
 # the terms along a path take less than this [s], and so does a bound from them: none is begun with less left
 TERMS_TIME, BOUND_TIME = 1.5, 0.2
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
@@ -169,7 +170,7 @@ class _Piece:
         """
         shortest, longest = edges[:-1], edges[1:]
         cells, left = self._plain(shortest, longest), np.ones(len(shortest), dtype=bool)
-        choices: Sequence[_Choice] = self._choices()
+        choices: Sequence[_Choice] = self._choices(self._work(self._duration or float(np.sqrt(edges[0] * edges[-1]))))
         while (open_ := np.flatnonzero(left & (cells <= cells[~left].min(initial=np.inf)))).size:
             group = open_[:GROUP]
             group = group[longest[group] <= longest[group[0]] * CELL**GROUP]
@@ -201,7 +202,15 @@ class _Piece:
             terms = path_terms(pairs.chain, reference, pairs.loss, half, self._grid)
             rates = multiplier_rates(reference.multipliers, pairs.loss, pairs.friction.load)
             dual = DualBound(
-                terms, rates, pairs.friction, arm.active_limits, base, self._gain, float(longest[-1]), pairs.chain.rotor
+                terms,
+                pairs.loss,
+                rates,
+                pairs.friction,
+                arm.active_limits,
+                base,
+                self._gain,
+                float(longest[-1]),
+                pairs.chain.rotor,
             )
             for choice in choices:
                 if choice.kept == kept and deadline.left >= BOUND_TIME:
@@ -223,7 +232,14 @@ class _Piece:
         """The joints with a grid: those that lose most by holding."""
         return tuple(sorted(np.argsort(-self._hold, kind="stable")[:GRID_JOINTS].tolist()))
 
-    def _choices(self) -> list[_Choice]:
+    def _work(self, duration: float) -> float:
+        """η of the dual bound; see its text."""
+        if self.pairs.friction.load is not None:
+            return 0.0
+        displacement = self.candidate.q_goal - self.candidate.q_start
+        return WORK * copper_multiplier(self.pairs.prepared, displacement, self._gain, duration)
+
+    def _choices(self, work: float) -> list[_Choice]:
         """What is tried: multipliers of the joints that carry no gravity, also with the one that loses most by it."""
         heavy = self.pairs.chain.potential_bound(2).max(axis=1) > WEIGHTLESS
         most = np.arange(len(heavy)) == int(np.argmax(self._hold))
@@ -235,6 +251,7 @@ class _Piece:
                     scale,
                     np.where(heavy, (1 - MIXING) * factor * stiffness, 0.0),
                     np.where(heavy, MIXING, 1.0) * factor * stiffness,
+                    work,
                 ),
             )
             for kept in {tuple((~heavy).tolist()), tuple((~heavy | most).tolist())}
