@@ -5,6 +5,7 @@ The names below are the public ones. Robots and their parameters are in `models`
 
 from models.registry import load_robot
 from optimizer.exceptions import (
+    ContradictoryOrder,
     DeadlineExceeded,
     DurationTooShort,
     InvalidProblem,
@@ -43,6 +44,7 @@ __all__ = [
     "Arm",
     "BranchFilter",
     "ConeOrientedPose",
+    "ContradictoryOrder",
     "DeadlineExceeded",
     "DurationTooShort",
     "Front",

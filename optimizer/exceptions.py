@@ -3,6 +3,7 @@
 JoulepathError
 ├── InvalidProblem          malformed or contradictory request
 │   ├── OutsideLimits       given joints beyond a limit
+│   ├── ContradictoryOrder  stops that no order can meet
 │   └── InvalidTable        a row of a given motion, or its table as a whole
 ├── UnknownRobot
 ├── UnreachablePose         no inverse kinematics solution
@@ -63,6 +64,14 @@ class InvalidProblem(JoulepathError):
     def __init__(self, field: str, message: str) -> None:
         super().__init__(message)
         self.field = field
+
+
+class ContradictoryOrder(InvalidProblem):
+    """No order of the stops of a round meets what is asked of it; `names` are stops that contradict each other."""
+
+    def __init__(self, field: str, message: str, names: Sequence[str]) -> None:
+        super().__init__(field, message)
+        self.names = list(names)
 
 
 _LIKE_DEGREES = 20.0

@@ -65,6 +65,7 @@ TABLE: dict[type[Exception], type[problems.ProblemDetails]] = {
     InvalidRequest: problems.Validation,
     optimizer_errors.InvalidProblem: problems.Validation,
     optimizer_errors.OutsideLimits: problems.OutsideLimits,
+    optimizer_errors.ContradictoryOrder: problems.ContradictoryOrder,
     optimizer_errors.InvalidTable: problems.InvalidTable,
     LogTooLarge: problems.LogTooLarge,
     EffortNotUsable: problems.EffortNotUsable,

@@ -52,6 +52,7 @@ CYCLE_PROBLEMS: tuple[type[problems.ProblemDetails], ...] = (
     problems.StartInCollision,
     problems.StopInCollision,
     problems.TorqueInfeasible,
+    problems.ContradictoryOrder,
     problems.CycleTooShort,
     problems.NoSequence,
     problems.PathInfeasible,

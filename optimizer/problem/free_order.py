@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from optimizer.exceptions import InvalidProblem
+from optimizer.exceptions import ContradictoryOrder, InvalidProblem
 from optimizer.problem.arm import Payload
 from optimizer.problem.stops import Stop
 
@@ -90,12 +90,23 @@ def _check_before(order: FreeOrder, stops: Sequence[Stop]) -> None:
         for group in groups:
             names = [stop.name for stop in group]
             if first in names and second in names and names.index(first) > names.index(second):
-                raise InvalidProblem(f"before.{k}", f"By together {second} comes before {first}.")
+                raise ContradictoryOrder(
+                    f"before.{k}",
+                    f"before asks for {first!r} before {second!r}, but together lists {second!r} first: leave out one "
+                    "of them.",
+                    [first, second],
+                )
     try:
         TopologicalSorter(dict(enumerate(earlier_groups(order, groups)))).prepare()
     except CycleError as error:
-        circle = " before ".join(groups[k][0].name for k in error.args[1][::-1])
-        raise InvalidProblem("before", f"No order is possible: {circle}.") from None
+        circle = [groups[k] for k in error.args[1]]
+        needed = " before ".join(" and ".join(repr(stop.name) for stop in group) for group in circle)
+        raise ContradictoryOrder(
+            "before",
+            f"No order is possible: it would have {needed}. Leave out one of these pairs of before, or a list of "
+            "together.",
+            [stop.name for group in circle[:-1] for stop in group],
+        ) from None
 
 
 def _same(one: Payload, other: Payload) -> bool:

@@ -13,6 +13,7 @@ from app.schemas.errors.identifications import (
 from app.schemas.errors.logs import EffortNotUsable, ExcitationInfeasible, LogTooLarge, TooManyLogs, UnknownLog
 from app.schemas.errors.motion import (
     CollidingBranch,
+    ContradictoryOrder,
     CycleTooShort,
     DeadlineExceeded,
     DurationTooShort,
@@ -85,6 +86,7 @@ PROBLEMS: tuple[type[ProblemDetails], ...] = (
     StopInCollision,
     DurationTooShort,
     CycleTooShort,
+    ContradictoryOrder,
     TorqueInfeasible,
     PathInfeasible,
     NoSequence,
@@ -147,6 +149,7 @@ __all__ = [
     "Busy",
     "ClusterUnavailable",
     "CollidingBranch",
+    "ContradictoryOrder",
     "CrossSite",
     "CycleTooShort",
     "DeadlineExceeded",

@@ -90,6 +90,20 @@ class OutsideLimits(ProblemDetails):
     upper: float = described("Largest allowed joint position.", "rad", 3.1416)
 
 
+class ContradictoryOrder(ProblemDetails):
+    """No order of the stops meets `before` and `together`. Leave out a pair of `before`, or a list of `together`, that
+    has the stops `names`."""
+
+    type: Literal["/problems/contradictory-order"] = fixed("type", "/problems/contradictory-order")
+    title: Literal["Contradictory order"] = fixed("title", "Contradictory order")
+    status: Literal[422] = fixed("status", 422)
+    names: list[str] = described(
+        "Stops that contradict each other: each would have to come before the next one, and the last before the first.",
+        None,
+        ["pick", "place"],
+    )
+
+
 class InvalidTable(ProblemDetails):
     """The samples of a given motion or of a log cannot be read. Possible causes: a value is no finite number, or looks
     like degrees; the times do not increase; a line has too few or too many columns; the header is missing or unknown;

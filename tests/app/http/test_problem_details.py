@@ -51,6 +51,7 @@ ERRORS: list[JoulepathError] = [
     exceptions.StopInCollision("stops/pick", [COLLIDING]),
     exceptions.NoSequence("stops/place", ["left/up/flip"], ["left/up/no_flip"]),
     exceptions.RoundTooShort(5.5, 0.9),
+    exceptions.ContradictoryOrder("before", "No order is possible.", ["pick", "place"]),
     exceptions.NotCertified(2, "its velocity is at 1.2 of the limit", {"velocity": 1.2, "torque": np.nan}),
     exceptions.FormatUnsuitable("urscript", "This robot has 7 joints: use ros2."),
     SimulatorMissing(),

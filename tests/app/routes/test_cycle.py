@@ -256,6 +256,13 @@ def test_an_order_that_cannot_be_names_its_field(client: TestClient, fields: dic
     assert reply.status_code == 422 and reply.json()["errors"][0]["loc"] == loc
 
 
+def test_an_order_that_contradicts_itself_says_which_stops_do(client: TestClient) -> None:
+    reply = client.post("/cycle", json=a_round(order="free", before=[["place", "pick"]], together=[["pick", "place"]]))
+    problem = reply.json()
+    assert (reply.status_code, problem["type"]) == (422, "/problems/contradictory-order")
+    assert problem["names"] == ["place", "pick"] and "leave out" in problem["detail"]
+
+
 def test_the_round_as_a_table(client: TestClient, answer: dict[str, Any]) -> None:
     reply = client.post("/cycle", json=a_round(), headers={"Accept": "text/csv"})
     assert reply.status_code == 200 and reply.headers["content-type"].startswith("text/csv")

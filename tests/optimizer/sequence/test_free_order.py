@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from models.robot import Array
-from optimizer.exceptions import DeadlineExceeded, InvalidProblem
+from optimizer.exceptions import ContradictoryOrder, DeadlineExceeded, InvalidProblem
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.work_round import WorkRound
@@ -136,6 +136,15 @@ def test_a_contradictory_order_names_its_field(order: dict[str, Any], field: str
     with pytest.raises(InvalidProblem) as refusal:
         inspection(0, 3, order=FreeOrder(**order))
     assert refusal.value.field == field and word in str(refusal.value)
+
+
+def test_stops_that_come_before_each_other_are_all_named() -> None:
+    before = [("stop 0", "stop 1"), ("stop 1", "stop 2"), ("stop 2", "stop 0"), ("stop 0", "stop 3")]
+    with pytest.raises(ContradictoryOrder) as refusal:
+        inspection(0, 4, order=FreeOrder(before=before))
+    names = refusal.value.names
+    assert sorted(names) == ["stop 0", "stop 1", "stop 2"]
+    assert all((a, b) in before for a, b in zip(names, [*names[1:], names[0]], strict=True))
 
 
 def test_a_part_that_is_not_put_down_is_no_free_order() -> None:
