@@ -231,11 +231,12 @@ class _Solver:
         else:
             pull = (g + self.multipliers.limits)[: self.qp.count].reshape(at.free.shape)
             kept = at.held.null_space(n)
-            bends, within = _convex(kept.T @ (H + at.held.curvature(pull, n)) @ kept)
+            back = kept.T
+            bends, within = _convex(back @ (back @ (H + at.held.curvature(pull, n))).T)
             whitening = kept @ within
 
             def hessian(x: Array) -> Array:
-                return np.asarray(kept @ bends(kept.T @ x))
+                return np.asarray(kept @ bends(back @ x))
 
         ratio = at.kinematics / self.qp.rates(at.T)[:, :, None]
         return QPInputs(hessian, whitening, g, at.free, at.T, self.line, at.path_values, ratio)

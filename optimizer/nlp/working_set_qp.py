@@ -53,9 +53,9 @@ _INFINITE = 1e30
 class QPInputs:
     """What the QP is made of at one iterate.
 
-    `hessian` times a step (n,), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n,
-    k) makes it the identity, Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their limits on
-    the grid.
+    `hessian` times a step (n,), positive definite, and `gradient` (n,) are in the scaled variables. `whitening` W
+    (n, k) makes it the identity, Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their
+    limits on the grid.
     """
 
     hessian: Callable[[Array], Array]
