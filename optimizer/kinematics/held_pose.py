@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
 from models.robot import Array
-from optimizer.kinematics.chain import Chain, pose_error
-from optimizer.kinematics.forward import joint_placements
-from optimizer.kinematics.tcp import T_last_tcp
+from optimizer.kinematics.chain import pose_error
+from optimizer.kinematics.tcp import T_last_tcp, tcp_pose
 from optimizer.problem.arm import Arm
 
 # the pose is held to this error [m, rad]; Newton steps, of which a few suffice near the curve
@@ -27,10 +27,13 @@ STEP = 1e-4
 class HeldPose:
     """What holds the TCP at T (4, 4), base frame, within joint limits (nq,) [rad].
 
-    `chain` ends at the TCP. It has one joint more than a pose fixes.
+    The TCP is at `T_last` (4, 4) in the frame of the last link. The arm has one joint more than a pose fixes. `data` is
+    Pinocchio's memory for its `model`: for one thread.
     """
 
-    chain: Chain
+    model: pin.Model
+    data: pin.Data
+    T_last: Array
     T: Array
     q_min: Array
     q_max: Array
@@ -38,8 +41,8 @@ class HeldPose:
     @staticmethod
     def of(arm: Arm, q: Array) -> HeldPose:
         """The curve of an arm through q (nq,) [rad], within the limits in force."""
-        chain = Chain(joint_placements(arm.robot.model), T_last_tcp(arm))
-        return HeldPose(chain, chain.flange(q[None])[0], arm.active_limits.q_min, arm.active_limits.q_max)
+        model, limits = arm.robot.model, arm.active_limits
+        return HeldPose(model, model.createData(), T_last_tcp(arm), tcp_pose(arm, q), limits.q_min, limits.q_max)
 
     def put(self, q: Array) -> Array | None:
         """The configuration (nq,) on the curve that Newton's method finds from q (nq,); None if it finds none within
@@ -58,12 +61,11 @@ class HeldPose:
 
     def tangent(self, q: Array) -> Array:
         """The direction (nq,) of the curve at q (nq,), of length 1."""
-        return np.asarray(np.linalg.svd(self.chain.flange_and_jacobian(q[None])[1][0])[2][-1])
+        return np.asarray(np.linalg.svd(self._tcp_and_jacobian(q)[1])[2][-1])
 
     def bend(self, q: Array, tangent: Array) -> Array:
         """The change (nq,) of the tangent per length of the curve [1/rad]."""
-        near = q + np.outer([-STEP, STEP], tangent)
-        before, after = np.linalg.svd(self.chain.flange_and_jacobian(near)[1])[2][:, -1]
+        before, after = (self.tangent(q + step * tangent) for step in (-STEP, STEP))
         return np.asarray((after * np.sign(after @ tangent) - before * np.sign(before @ tangent)) / (2 * STEP))
 
     def _solved(self, q: Array, fixed: int | None) -> Array | None:
@@ -71,9 +73,17 @@ class HeldPose:
         moving = np.arange(len(q)) != fixed
         q = q.copy()
         for _ in range(STEPS):
-            T, jacobian = self.chain.flange_and_jacobian(q[None])
-            error = pose_error(T, self.T)[0]
+            T, jacobian = self._tcp_and_jacobian(q)
+            error = pose_error(T[None], self.T)[0]
             if np.abs(error).max() < HELD:
                 return q
-            q[moving] += np.linalg.lstsq(jacobian[0][:, moving], error, rcond=None)[0]
+            q[moving] += np.linalg.lstsq(jacobian[:, moving], error, rcond=None)[0]
         return None
+
+    def _tcp_and_jacobian(self, q: Array) -> tuple[Array, Array]:
+        """Pose (4, 4) of the TCP at q (nq,), and its geometric Jacobian (6, nq) in base axes."""
+        about_base = pin.computeJointJacobians(self.model, self.data, q)
+        T = self.data.oMi[self.model.njoints - 1].homogeneous @ self.T_last
+        jacobian = about_base.copy()
+        jacobian[:3] -= pin.skew(T[:3, 3]) @ about_base[3:]
+        return T, jacobian

@@ -24,7 +24,7 @@ from optimizer.solution import BaselineName
 from optimizer.trajectories import bspline, seven_segment
 from optimizer.trajectories.bspline import Basis
 from optimizer.trajectories.ruckig_motion import time_optimal, time_optimal_positions
-from optimizer.trajectories.spline import Spline, spline_of
+from optimizer.trajectories.spline import Spline, sampled, spline_of
 
 # control points of the first attempt, with evenly spaced knots
 COARSE = 13
@@ -120,6 +120,23 @@ class FreeSpline(SqpMethod):
         """From samples q (k, nq) at times t (k,), with knots REFINED, or EXACT if `fine`."""
         return self._solve_in(self.graded(float(t[-1]), EXACT if fine else REFINED), q, t)
 
+    def solve_tightly(self, q: Array, t: Array, progress: float) -> SolveResult:
+        """From samples q (k, nq) at times t (k,), with knots EXACT."""
+        return self._solve_in(self.graded(float(t[-1]), EXACT), q, t, progress)
+
+    def solve_regraded(self, spline: Spline) -> SolveResult:
+        """From a motion with knots EXACT at the switches of jerk between ends that have moved since.
+
+        The knots move to where the switches are now. The control points stay: so the motion hardly changes, and jerk
+        still jumps at its knots. If there are fewer switches now, or more, another spline is fitted to the motion.
+        """
+        duration, line = spline.duration, self.coordinates
+        knots = bspline.moved(spline.knots / duration, self._switches(duration), EXACT)
+        if knots is None:
+            return self.solve_from(*sampled(spline), fine=True)
+        points = line.from_joints(spline.control_points)
+        return self._refined(Guess(Basis.of(knots), points, duration, nearly_feasible=True), sampled(spline)[0])
+
     def solve_evenly(self, q: Array, t: Array, count: int, progress: float) -> SolveResult:
         """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots."""
         return self._solve_in(bspline.uniform(count), q, t, progress)
@@ -128,9 +145,13 @@ class FreeSpline(SqpMethod):
         """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])
         points = bspline.smooth_fit(self.coordinates.from_joints(q), t / duration, space.knots)
+        return self._refined(Guess(space, points, duration, progress=progress), q)
+
+    def _refined(self, guess: Guess, q: Array) -> SolveResult:
+        """From a guess near samples q (k, nq) of a motion."""
         # without clearance constraints, a motion from a planned path would return to the obstacle
         near = self.prepared.surroundings.is_near_contact(q)
-        result = self.improve(Guess(space, points, duration, collision_free=near, progress=progress))
+        result = self.improve(replace(guess, collision_free=near))
         planned = result.spline is not None and self.prepared.surroundings.has_planned_paths(self.q_start, self.q_goal)
         return replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}") if planned else result
 
@@ -144,8 +165,12 @@ class FreeSpline(SqpMethod):
 
     def graded(self, duration: float, repeat: int) -> Basis:
         """A space with knots at the switches of the leading coordinate's jerk in a motion of `duration` [s]."""
+        return bspline.graded(self._switches(duration), repeat)
+
+    def _switches(self, duration: float) -> Array:
+        """The switches of the leading coordinate's jerk in a motion of `duration` [s], as fractions of it."""
         line = self.coordinates
-        return bspline.graded(seven_segment.switches(line.goal - line.start, duration, line.limits), repeat)
+        return seven_segment.switches(line.goal - line.start, duration, line.limits)
 
     def _smoothed(self, space: Basis) -> Array:
         """Control points (n, r) of the smoothed time-optimal motion: its positions at the Greville points.

@@ -59,7 +59,8 @@ class Guess:
 
     `collision_free`: the NLP has clearance constraints from the start. Other guesses get them after a collision.
     `rough`: with clearance constraints, the solve ends at ROUGH_PROGRESS, since another one refines its motion.
-    `progress` is the relative decrease of the cost that a further step of the SQP must promise.
+    `progress` is the relative decrease of the cost that a further step of the SQP must promise. `nearly_feasible`: the
+    solve begins with this duration, although jerk may exceed its limit next to knots that have moved.
     """
 
     space: Basis
@@ -68,6 +69,7 @@ class Guess:
     collision_free: bool = False
     rough: bool = False
     progress: float = PROGRESS
+    nearly_feasible: bool = False
 
 
 @dataclass(frozen=True)
@@ -225,7 +227,8 @@ class SqpMethod(Method):
         )
         free = program.free_points(guess.points)
         limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
-        return _Stage(program, limits, pairs, free, self._first_duration(program, free, guess.duration))
+        duration = guess.duration if guess.nearly_feasible else self._first_duration(program, free, guess.duration)
+        return _Stage(program, limits, pairs, free, duration)
 
     def _first_duration(self, program: NonlinearProgram, free: Array, least: float) -> float:
         """The duration [s] of least cost among a few at which the guess is within the limits on its rates."""

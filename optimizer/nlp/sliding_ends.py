@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from models.robot import Array
 from optimizer.nlp.nonlinear_program import NonlinearProgram
@@ -27,15 +28,18 @@ class Slide:
     tangents: tuple[Array, ...]
     bends: tuple[Callable[[], Array], ...]
 
-    def null_space(self, n: int) -> Array:
-        """Orthonormal steps (n, count) of the n decision variables that keep the poses to first order."""
-        kept, r = np.eye(n), len(self.tangents[0])
-        dropped: list[int] = []
+    def null_space(self, n: int) -> csr_array:
+        """Orthonormal steps (n, count) of the n decision variables that keep the poses to first order.
+
+        Each variable has a share in one of the steps: its own, or that along the tangent of its curve.
+        """
+        share, fresh = np.ones(n), np.ones(n, dtype=np.intp)
         for row, tangent in zip(self.rows, self.tangents, strict=True):
-            first = row * r
-            kept[first : first + r, first] = tangent
-            dropped += range(first + 1, first + r)
-        return np.delete(kept, dropped, axis=1)
+            first, r = row * len(tangent), len(tangent)
+            share[first : first + r] = tangent
+            fresh[first + 1 : first + r] = 0
+        step = np.cumsum(fresh) - 1
+        return csr_array((share, step, np.arange(n + 1)), shape=(n, int(step[-1]) + 1))
 
     def curvature(self, pull: Array, n: int) -> Array:
         """Second derivatives (n, n) of the poses, weighed by their multipliers: the forces that balance the gradient

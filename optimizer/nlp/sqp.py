@@ -6,6 +6,7 @@ L1 merit function and backtracking make it converge from any initial guess.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -175,7 +176,7 @@ class _Solver:
                     status = SqpStatus.INFEASIBLE
                     break
             self.multipliers.update(step, self.p, self.at.T, self.cost_scale)
-            Hdx, slope = qp.hessian @ step.x, float(qp.gradient @ step.x)
+            Hdx, slope = qp.hessian(step.x), float(qp.gradient @ step.x)
             stationarity = float(np.abs(Hdx).max())
             promised = -slope - 0.5 * float(step.x @ Hdx)
             feasible = float(self.at.violation.max()) < FEASIBILITY
@@ -226,14 +227,19 @@ class _Solver:
         H[-1, -1] += self.multipliers.curvature
         H = H[:n, :n] * np.outer(self.scale, self.scale)
         if at.held is None:
-            H, whitening = _convex(H)
+            hessian, whitening = _convex(H)
         else:
             pull = (g + self.multipliers.limits)[: self.qp.count].reshape(at.free.shape)
             kept = at.held.null_space(n)
-            H, whitening = _convex(kept.T @ (H + at.held.curvature(pull, n)) @ kept)
-            H, whitening = kept @ H @ kept.T, kept @ whitening
+            back = kept.T
+            bends, within = _convex(back @ (back @ (H + at.held.curvature(pull, n))).T)
+            whitening = kept @ within
+
+            def hessian(x: Array) -> Array:
+                return np.asarray(kept @ bends(back @ x))
+
         ratio = at.kinematics / self.qp.rates(at.T)[:, :, None]
-        return QPInputs(H, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
+        return QPInputs(hessian, whitening, g, at.free, at.T, self.line, at.path_values, ratio)
 
     def _line_search(self, dx: Array, slope: float) -> _Point | None:
         """The first point along dx (n,), halving the step, that lowers the merit function enough; None if none does.
@@ -278,15 +284,16 @@ def _holding(program: NonlinearProgram) -> Passes | SlidingEnds | None:
     return SlidingEnds(program) if program.passes is None else Passes(program, program.passes)
 
 
-def _convex(H: Array) -> tuple[Array, Array]:
-    """H (n, n) if it is positive definite, else H with its eigenvalues clamped from below; and W with Wᵀ H W = 1."""
+def _convex(H: Array) -> tuple[Callable[[Array], Array], Array]:
+    """What multiplies by H (n, n) if it is positive definite, else by H with its eigenvalues clamped from below; and W
+    with Wᵀ H W = 1."""
     H = 0.5 * (H + H.T)
     L, failed = dpotrf(H, lower=1)
     if not failed:
-        return H, np.ascontiguousarray(dtrtri(L, lower=1)[0].T)
+        return H.dot, np.ascontiguousarray(dtrtri(L, lower=1)[0].T)
     values, vectors = np.linalg.eigh(H)
     clamped = np.maximum(np.abs(values), EIGENVALUE_FLOOR * max(1.0, np.abs(values).max()))
-    return (vectors * clamped) @ vectors.T, vectors / np.sqrt(clamped)
+    return lambda x: vectors @ (clamped * (vectors.T @ x)), vectors / np.sqrt(clamped)
 
 
 def solve(

@@ -10,6 +10,7 @@ QP again, and transform all rows with it, at a tenth of the speed of BLAS.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,11 +53,12 @@ _INFINITE = 1e30
 class QPInputs:
     """What the QP is made of at one iterate.
 
-    `hessian` (n, n), positive definite, and `gradient` (n,) are in the scaled variables; `whitening` W (n, k) makes it
-    the identity, Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their limits on the grid.
+    `hessian` times a step (n,), positive definite, and `gradient` (n,) are in the scaled variables. `whitening` W
+    (n, k) makes it the identity, Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their
+    limits on the grid.
     """
 
-    hessian: Array
+    hessian: Callable[[Array], Array]
     whitening: Array
     gradient: Array
     free: Array

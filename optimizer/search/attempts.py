@@ -127,9 +127,23 @@ def solve_from(
     with energy storage. `duration` [s] fixes the duration.
     """
     q, t = samples
+    improve(incumbent, candidate, lambda solver: solver.solve_from(q, t, fine), surplus_value, duration)
+
+
+def improve(
+    incumbent: Incumbent,
+    candidate: Candidate,
+    attempt: Callable[[Method], SolveResult],
+    surplus_value: float | None = None,
+    duration: float | None = None,
+) -> None:
+    """Optimise the candidate by an attempt in each of its duration intervals; accept what needs less energy.
+
+    `surplus_value` and `duration` as of `solve_from`.
+    """
     for interval in duration_intervals(incumbent.prepared, candidate.q_goal, surplus_value):
         if duration is not None:
             interval = replace(interval, t_min=duration, t_max=duration)
-        result, moved = _attempted(incumbent, candidate, interval, lambda solver: solver.solve_from(q, t, fine))
+        result, moved = _attempted(incumbent, candidate, interval, attempt)
         if result.spline is not None:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline), moved)

@@ -17,7 +17,7 @@ from optimizer.methods.method import SolveResult
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.targets import AnyOf
 from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from optimizer.search.ends import EndConfiguration
+from optimizer.search.ends import SIDES, EndConfiguration, Side
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.search.mechanical_bound import mechanical_bounds
 from optimizer.search.passing import bound_through
@@ -165,17 +165,19 @@ def _joint_options(starts: list[float], goals: list[float], fixed: bool, winding
     return kept
 
 
-def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
+def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES) -> None:
     """Mark the candidates with an infeasible start or goal, and give each its lower bound and least duration.
+
+    Ends that are not to be `checked` are known to be feasible.
 
     Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is left.
     """
     sides = {
         name: list({id(end): end for end in (getattr(candidate, name) for candidate in candidates)}.values())
-        for name in ("start", "goal")
+        for name in SIDES
     }
-    ruled = {name: check_configurations(prepared, np.array([end.q for end in ends])) for name, ends in sides.items()}
-    ruled_out = {id(end): ruling for name in sides for end, ruling in zip(sides[name], ruled[name], strict=True)}
+    ruled = {name: check_configurations(prepared, np.array([end.q for end in sides[name]])) for name in checked}
+    ruled_out = {id(end): ruling for name in checked for end, ruling in zip(sides[name], ruled[name], strict=True)}
     potential = {id(end): prepared.potential(end.q) for ends in sides.values() for end in ends}
     displacement = np.array([candidate.q_goal - candidate.q_start for candidate in candidates])
     potential_gain = np.array(
@@ -195,7 +197,7 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
         bounds = np.maximum(bounds, bound_through(prepared, candidates[0].q_start, candidates[0].q_goal))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
-        for name in ("start", "goal"):
+        for name in checked:
             ruling = ruled_out[id(getattr(candidate, name))]
             if ruling is not None:
                 message = f"at the {name}, {ruling.reason}"
@@ -204,5 +206,5 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> None:
                 break
         if candidate.holdable and not np.isfinite(value):
             candidate.settle(CandidateStatus.INFEASIBLE, Reason.TOO_SLOW, f"takes at least {least:.4f} s")
-    for name, ends in sides.items():
-        raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in ends], ruled[name])
+    for name in checked:
+        raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in sides[name]], ruled[name])

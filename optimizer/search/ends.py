@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.targets import AnyOf, Single, Target
 from optimizer.solution import UnreachableTarget
 
+Side = Literal["start", "goal"]
+SIDES: tuple[Side, ...] = ("start", "goal")
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least
 SAMPLES, LEAST_SAMPLES = 96, 12
 # members of the self-motion of a pose, and of each sample of a pose of free orientation

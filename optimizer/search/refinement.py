@@ -14,6 +14,7 @@ from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import SLACK, Incumbent
 from optimizer.search.passing import stopping_baselines
 from optimizer.search.path_baselines import path_baselines
+from optimizer.search.regrading import grade
 from optimizer.search.sharpening import sharpen
 from optimizer.search.sliding import slides
 from optimizer.solution import Baseline, BaselineName
@@ -26,9 +27,6 @@ from optimizer.trajectories.time_scalings import quintic_spline
 # pays for it to what the storage gives back
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
 
-# further solves of a motion whose posture has moved, while each saves this share of the energy
-REGRADED, SAVED = 2, 3e-4
-
 
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     """Improve the motion of a solved candidate, as far as the method and the deadline allow."""
@@ -36,11 +34,12 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
     sharpen(incumbent, candidate)
     if method.may_refine(candidate.spline) and not deadline.passed:
         coarse, tight = candidate.spline, is_tight(incumbent, candidate)
-        solve_from(incumbent, candidate, sampled(coarse), fine=tight)
+        if tight and slides(incumbent.prepared, candidate):
+            grade(incumbent, candidate)
+        else:
+            solve_from(incumbent, candidate, sampled(coarse), fine=tight)
         if tight and candidate.spline is coarse and not incumbent.deadline.passed:
             solve_from(incumbent, candidate, sampled(coarse), fine=False)
-        elif tight and slides(incumbent.prepared, candidate):
-            _regrade(incumbent, candidate)
     if not method.guess_baselines:
         return
     if incumbent.uses_storage:
@@ -56,17 +55,6 @@ def refine(incumbent: Incumbent, candidate: Candidate) -> None:
         # not `lasting`: its other rounding leads the mechanical objective to other local optima
         slower = retimed(spline, longest / spline.duration)
         solve_from(incumbent, candidate, sampled(slower), fine=False, duration=longest)
-
-
-def _regrade(incumbent: Incumbent, candidate: Candidate) -> None:
-    """Solve again with knots at the switches of jerk of the motion to the posture found, while that saves energy."""
-    for _ in range(REGRADED):
-        before = candidate.energy or 0.0
-        if incumbent.deadline.passed:
-            return
-        solve_from(incumbent, candidate, sampled(candidate.spline), fine=True)
-        if before - (candidate.energy or 0.0) < SAVED * abs(before):
-            return
 
 
 def is_tight(incumbent: Incumbent, candidate: Candidate) -> bool:

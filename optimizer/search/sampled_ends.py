@@ -21,7 +21,7 @@ from optimizer.kinematics.tcp import flange_pose, tcp_pose
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import Candidate, Reason, bound
-from optimizer.search.ends import EndConfiguration, label_of
+from optimizer.search.ends import SIDES, EndConfiguration, label_of
 from optimizer.solution import CandidateStatus
 
 # samples solved before any is refined: in all, and of one pair of branches
@@ -94,11 +94,15 @@ def refine_best(
 
 
 def with_ends(prepared: PreparedProblem, candidate: Candidate, q_start: Array, q_goal: Array) -> Candidate | None:
-    """The candidate between other configurations (nq,) of its targets, with its bounds; None if that is infeasible."""
+    """The candidate between other configurations (nq,) of its targets, with its bounds; None if that is infeasible.
+
+    An end that is no sample stays where it is.
+    """
     start, goal = _moved(prepared, candidate.start, q_start), _moved(prepared, candidate.goal, q_goal)
     fresh = Candidate(start, goal, q_start, q_goal)
     try:
-        bound(prepared, [fresh])
+        sampled = [name for name in SIDES if getattr(candidate, name).sampled]
+        bound(prepared, [fresh], sampled if candidate.holdable else SIDES)
     except JoulepathError:
         return None
     return fresh

@@ -211,6 +211,13 @@ class _CellSearch:
         (q_start, start_half), (q_goal, goal_half) = self.start.boxes(starts), self.goal.boxes(goals)
         # a full turn of a joint changes neither the pose nor the potential energy
         away, possible = least_displacement(self.limits, q_start, start_half, q_goal, goal_half, self.start.given)
-        potentials = [np.array([self.prepared.potential(q) for q in each]) for each in (q_start, q_goal)]
+        potentials = self._potentials(self.start, starts, q_start), self._potentials(self.goal, goals, q_goal)
         gain = potentials[1] - potentials[0] - (start_half + goal_half) @ self.rates
         return np.where(possible, self.bound.of(away, gain), np.inf)
+
+    def _potentials(self, end: EndCurves, cells: Cells, q: Array) -> Array:
+        """Potential energies (n,) [J] at the middles q (n, nq) of the boxes of cells."""
+        isolated = [each for each in end.curves if isinstance(each, np.ndarray)]
+        if len(isolated) == len(end.curves):
+            return np.array([self.prepared.potential(each) for each in isolated])[cells.curve]
+        return np.array([self.prepared.potential(each) for each in q])

@@ -15,11 +15,11 @@ from optimizer.kinematics.angles import nearest_turn
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.search.attempts import settled, solve
 from optimizer.search.candidates import Candidate
-from optimizer.search.ends import MEMBERS
+from optimizer.search.ends import MEMBERS, Side
 from optimizer.search.free_goal import REFINED, refine_goal
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends
-from optimizer.search.sliding import Side, slides
+from optimizer.search.sliding import slides
 
 # first step of a parameter, half the way between two samples on a whole circle, and the least one [rad]
 FIRST_STEP, LEAST_STEP = np.pi / MEMBERS, 2e-3

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from operator import itemgetter
-from typing import Literal
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import Method
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate
-from optimizer.search.ends import EndConfiguration
+from optimizer.search.ends import EndConfiguration, Side
 from optimizer.search.sampled_ends import with_ends
 from optimizer.trajectories.spline import Spline
 
@@ -26,8 +25,6 @@ FIXED = 6
 # a posture farther from a curve is not on it [rad]
 ON_CURVE = 1e-6
 SLID = "; refined along the self-motion that holds the pose"
-
-Side = Literal["start", "goal"]
 
 
 def slides(prepared: PreparedProblem, candidate: Candidate) -> bool:

@@ -25,6 +25,8 @@ GRID_POINTS = 512
 PATH_POINTS = 96
 # weight of the third derivative by τ beside the positions in a smooth fit
 THIRD = 3e-3
+# a switch nearer to an end of [0, 1] is none
+NEXT_TO_END = 1e-3
 # parts into which the anchors of speed, acceleration and jerk divide a span, where these have degree 4, 3 and 2
 ANCHORS = (2, 4, 4)
 
@@ -178,9 +180,27 @@ def graded(switches: Array, repeat: int, widest: float = 0.13) -> Basis:
     At a knot of multiplicity two the slope of the third derivative may jump, at multiplicity three the third derivative
     itself, as jerk does between its limits.
     """
-    edges = np.concatenate([[0.0], switches[(switches > 1e-3) & (switches < 1 - 1e-3)], [1.0]])
+    edges = np.concatenate([[0.0], _inner(switches), [1.0]])
     breaks = [0.0]
     for a, b in pairwise(edges):
         breaks += np.linspace(a, b, math.ceil((b - a) / widest) + 1)[1:-1].tolist()
         breaks += [b] * (repeat if b < 1.0 else 1)
     return Basis.of(clamped(np.array(breaks)))
+
+
+def moved(knots: Array, switches: Array, repeat: int) -> Array | None:
+    """Knots of a `graded` space, moved so that those of multiplicity `repeat` are at other switches (k,).
+
+    The others keep their places between them. None if there are not as many switches.
+    """
+    breaks, counts = np.unique(knots, return_counts=True)
+    old, new = breaks[1:-1][counts[1:-1] == repeat], _inner(switches)
+    if len(old) != len(new):
+        return None
+    old, new = (np.concatenate([[0.0], at, [1.0]]) for at in (old, new))
+    return np.repeat(np.interp(breaks, old, new), counts)
+
+
+def _inner(switches: Array) -> Array:
+    """The switches that are not at either end."""
+    return switches[(switches > NEXT_TO_END) & (switches < 1 - NEXT_TO_END)]

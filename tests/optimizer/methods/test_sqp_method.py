@@ -14,11 +14,12 @@ from optimizer.deadline import Deadline
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.methods import METHODS, solver_for
 from optimizer.methods import duration_intervals as duration_intervals
+from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import Method, SolveResult, SolveStatus
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.trajectories.seven_segment import shortest_duration
-from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.spline import Spline, sampled
 from tests.optimizer.moves import (
     GOAL,
     PAYLOAD,
@@ -149,3 +150,19 @@ def test_going_nowhere_is_a_motion(method: str) -> None:
     assert motion.duration > 0
     assert np.abs(motion.control_points - START).max() < 0.1
     assert_held(mine.prepared.problem, motion)
+
+
+def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
+    """Its goal has moved since: in fewer steps than from a fit, to no more energy, within every limit."""
+    near = GOAL + 0.02
+    own = solver(START, near)
+    assert isinstance(own, FreeSpline)
+    q, t = sampled(spline(own.solve()))
+    tight = spline(own.solve_tightly(q, t, 1e-3))
+    moved = solver(START, GOAL)
+    assert isinstance(moved, FreeSpline)
+    again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
+    assert again.iterations < fitted.iterations
+    cost = moved.prepared.cost_of
+    assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
+    assert_held(problem(START, GOAL), spline(again))
