@@ -35,8 +35,7 @@ QP_ROUNDS, MOST_ROUNDS = 3, 10
 RELAXED_ROUNDS = 2
 # least time [s] that a QP gets: most take a millisecond
 LEAST_TIME = 0.05
-# iterations of DAQP after which a QP counts as infeasible. Most take some tens; a relaxed one that collides everywhere
-# has thousands of active rows, and each of its last iterations takes milliseconds
+# iterations of DAQP after which a QP counts as infeasible: most take some tens, one that collides everywhere thousands
 MOST_QP_ITERATIONS = 1200
 
 Places = tuple[Index, Index, Index]  # derivative, coordinate, grid point
@@ -53,9 +52,8 @@ _INFINITE = 1e30
 class QPInputs:
     """What the QP is made of at one iterate.
 
-    `hessian` times a step (n,), positive definite, and `gradient` (n,) are in the scaled variables. `whitening` W
-    (n, k) makes it the identity, Wᵀ H W = 1, for steps that keep what is held. `ratio` (3, r, M): rates over their
-    limits on the grid.
+    `hessian` H times a step (n,) and `gradient` (n,) are in the scaled variables. `whitening` W (n, k): Wᵀ H W = 1, for
+    steps that keep what is held. `ratio` (3, r, M): rates over their limits on the grid.
     """
 
     hessian: Callable[[Array], Array]
