@@ -15,6 +15,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
 from optimizer.sequence.against_stopping import SHARE, Rested, Wait, as_passed, start_from, stopping_baselines
 from optimizer.sequence.divided_paths import with_divided_paths
+from optimizer.sequence.layers import Layer
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.passing_leg import passes_of
 from optimizer.sequence.proven_bound import proven_bound
@@ -31,7 +32,7 @@ from optimizer.sequence.round_search import LEAST_TIME, RoundSearch
 from optimizer.sequence.round_solution import Move, Needed, RoundBaseline, RoundSolution, needed_by
 from optimizer.sequence.stored_round import with_storage
 from optimizer.sequence.timed_round import TimedSearch
-from optimizer.solution import Solution
+from optimizer.solution import Branch, Solution
 
 
 def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tell = nobody) -> RoundSolution:
@@ -226,6 +227,12 @@ def _is_done(search: RoundSearch, found: _Found) -> bool:
     return converged and found.shared and not open_
 
 
+def _reached(layer: Layer, node: int) -> Branch:
+    """A configuration of a stop, with the one of its targets that it reaches."""
+    end = layer.ends[layer.end[node]]
+    return Branch(end.label, layer.q[node], end.target)
+
+
 def _moves(
     search: RoundSearch,
     nodes: list[int],
@@ -245,7 +252,8 @@ def _moves(
         moves.append(
             Move(
                 planned=asked.moves[k],
-                solution=solution,
+                # between joint positions, the motion knows of no target
+                solution=replace(solution, start=_reached(leg.start, s), goal=_reached(leg.goal, g)),
                 t0=t0,
                 dwell_energy=float(dwell_energies(asked, asked.moves[k], leg.goal)[g]),
                 wait=wait,
