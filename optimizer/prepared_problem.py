@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from models.robot import Array
+from optimizer.collision.model import ClosestPair
 from optimizer.energy.dwell import dwell_energy, holding_power, waits
 from optimizer.energy.interval import arm_spread
 from optimizer.energy.plant import Plant
@@ -123,8 +125,12 @@ class PreparedProblem(Plant):
         if trace is not None:
             self.traces[key], self._joint_paths[key] = trace, path
 
-    def broken_on_the_way(self, q: Array, v: Array) -> list[str]:
-        """What samples q [rad], v [rad/s] (k, nq) of a motion break, in words: path constraints, a margin."""
+    def broken_on_the_way(self, q: Sequence[Array], v: Sequence[Array]) -> list[list[str]]:
+        """What samples q [rad], v [rad/s] (k, nq) of each motion break, in words: path constraints, a margin."""
+        collisions = self.surroundings.worst_collisions(q)
+        return [self._broken(*each) for each in zip(q, v, collisions, strict=True)]
+
+    def _broken(self, q: Array, v: Array, collision: ClosestPair | None) -> list[str]:
         broken = []
         if self.path is not None:
             worst = self.path.ratios(q, v).max(axis=0)
@@ -133,7 +139,6 @@ class PreparedProblem(Plant):
         slowest = np.inf if self.least_speed is None else self.least_speed.reached(q, v)
         if slowest < 1 - RATIO_ROUNDING:
             broken.append(f"path speed {(1 - slowest) * 100:.3g} % below its least one")
-        collision = self.surroundings.worst_collision(q)
         if collision is not None:
             first, second = collision.pair
             broken.append(f"{first} and {second} are {-collision.distance * 1e3:.3g} mm closer than allowed")

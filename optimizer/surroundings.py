@@ -68,19 +68,25 @@ class Surroundings:
             return True
         return self.model.least_distance(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0) >= 0
 
-    def worst_collision(self, q: Array) -> ClosestPair | None:
-        """The pair that violates its margin most over samples q (k, nq) [rad] of a motion; None if none does.
+    def worst_collisions(self, motions: Sequence[Array]) -> list[ClosestPair | None]:
+        """The pair that violates its margin most over the samples q (k, nq) [rad] of each motion; None if none does.
 
-        About CONTACT_SAMPLES of the samples are checked.
+        About CONTACT_SAMPLES of the samples are checked, those of motions along the same path once.
         """
-        if not self.arm.collisions:
-            return None
-        frames = self.model.frames(q[:: max(len(q) // CONTACT_SAMPLES, 1)])
+        if not self.arm.collisions or not len(self.model.pairs):
+            return [None] * len(motions)
+        paths = {id(q): q[:: max(len(q) // CONTACT_SAMPLES, 1)] for q in motions}
+        frames = self.model.frames(np.concatenate(list(paths.values())))
         distance = self.model.pair_distances(frames, within=0.0).distance
-        if distance.min(initial=np.inf) >= 0:
-            return None
+        parts = np.split(distance, np.cumsum([len(q) for q in paths.values()])[:-1])
+        found = {key: self._worst(part) for key, part in zip(paths, parts, strict=True)}
+        return [found[id(q)] for q in motions]
+
+    def _worst(self, distance: Array) -> ClosestPair | None:
+        """The pair of the least of the distances (k, pairs) [m]; None if none is negative."""
         sample, pair = np.unravel_index(int(distance.argmin()), distance.shape)
-        return ClosestPair(self.model.names(int(pair)), float(distance[sample, pair]))
+        least = float(distance[sample, pair])
+        return ClosestPair(self.model.names(int(pair)), least) if least < 0 else None
 
     def is_near_contact(self, q: Array) -> bool:
         """Whether any of q (k, nq) [rad] has a clearance below NEAR_CONTACT.

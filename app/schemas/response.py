@@ -259,8 +259,8 @@ class Solver(Response):
     )
     nlp_solves: int = described("Nonlinear programs solved, over all candidates.", "1", 4)
     stationarity: float | None = described(
-        "Largest component of the gradient of the Lagrangian, relative to the cost. Null if the answer is a "
-        "baseline's motion or the method has none.",
+        "Largest component of the gradient of the Lagrangian before the last step, relative to the cost. Null if the "
+        "answer is a baseline's motion or the method has none.",
         "1/rad",
         2e-4,
     )

@@ -26,31 +26,31 @@ def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
     nearest of them is exact, also for parallel segments. If the segments cross, the distance is 0 and the normal is
     the common perpendicular.
     """
-    u, v, w = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0], a[:, 0] - b[:, 0]
-    uu, vv, uv, uw, vw = (_dot(x, y) for x, y in ((u, u), (v, v), (u, v), (u, w), (v, w)))
-    uu_, vv_ = np.maximum(uu, NONE), np.maximum(vv, NONE)
+    # (3, k): numpy runs along k
+    a0, a1, b0, b1 = (np.ascontiguousarray(x.T) for x in (a[:, 0], a[:, 1], b[:, 0], b[:, 1]))
+    u, v, w = a1 - a0, b1 - b0, a0 - b0
+    uu, vv, uv, uw, vw = ((x * y).sum(axis=0) for x, y in ((u, u), (v, v), (u, v), (u, w), (v, w)))
     denominator = uu * vv - uv * uv
     inside = denominator > 1e-12 * uu * vv
-    s = np.empty((5, len(a)))
-    t = np.empty((5, len(a)))
-    s[0] = np.clip((uv * vw - vv * uw) / np.where(inside, denominator, 1.0), 0, 1) * inside
-    t[0] = np.clip((uv * s[0] + vw) / vv_, 0, 1)
-    s[1], t[1] = 0, np.clip(vw / vv_, 0, 1)
-    s[2], t[2] = 1, np.clip((vw + uv) / vv_, 0, 1)
-    s[3], t[3] = np.clip(-uw / uu_, 0, 1), 0
-    s[4], t[4] = np.clip((uv - uw) / uu_, 0, 1), 1
+    s, t, rows = np.empty((5, len(a))), np.empty((5, len(a))), np.arange(len(a))
+    s[0] = (uv * vw - vv * uw) / np.where(inside, denominator, 1.0) * inside
+    s[1], s[2], s[3], s[4] = 0, 1, -uw, uv - uw
+    s[3:] /= np.maximum(uu, NONE)
+    np.clip(s, 0, 1, out=s)
+    t[0], t[1], t[2], t[3], t[4] = uv * s[0] + vw, vw, vw + uv, 0, 1
+    t[:3] /= np.maximum(vv, NONE)
+    np.clip(t, 0, 1, out=t)
     # |w + s u - t v|²
-    square = uu * s * s - 2 * uv * s * t + vv * t * t + 2 * uw * s - 2 * vw * t
-    best = square.argmin(axis=0)[None]
-    s_best, t_best = (np.take_along_axis(x, best, axis=0)[0][:, None] for x in (s, t))
-    p, r = a[:, 0] + s_best * u, b[:, 0] + t_best * v
+    square = s * (uu * s - 2 * uv * t + 2 * uw) + t * (vv * t - 2 * vw)
+    best = square.argmin(axis=0)
+    p, r = a0 + s[best, rows] * u, b0 + t[best, rows] * v
     across = r - p
-    distance = np.sqrt(_dot(across, across))
+    distance = np.sqrt((across * across).sum(axis=0))
     touching = distance < TOUCHING
-    normal = across / np.where(touching, 1.0, distance)[:, None]
+    normal = across / np.where(touching, 1.0, distance)
     if touching.any():
-        normal[touching] = _perpendicular(u[touching], v[touching])
-    return distance, normal, p, r
+        normal[:, touching] = _perpendicular(u.T[touching], v.T[touching]).T
+    return distance, normal.T, p.T, r.T
 
 
 def box_segment(half_size: Array, b: Array) -> tuple[Array, Array, Array]:

@@ -133,15 +133,31 @@ class Plant:
 
     def energy(self, spline: Spline) -> Energy:
         """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
-        weights, q, v, a = fine_samples(spline, REPORT_NODES)
+        weights, _, v, a, tau = self._report_samples(spline)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
-        return breakdown(weights, v, a, self.torques(q, v, a), change, self.arm)
+        return breakdown(weights, v, a, tau, change, self.arm)
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a spline motion hangs on the arm's figures."""
+        return energy_sensitivity(*self._report_samples(spline), self.arm, arm_spread(self.arm))
+
+    def _report_samples(self, spline: Spline) -> tuple[Array, Array, Array, Array, Array]:
+        """Quadrature weights (k,) [s] and q, v, a, torques (k, nq) of a motion for reported figures.
+
+        Those of the last motion are kept: what is found is valued, and later reported.
+        """
+        for known, samples in self._last_report:
+            if known is spline:
+                return samples
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        return energy_sensitivity(weights, q, v, a, self.torques(q, v, a), self.arm, arm_spread(self.arm))
+        found = weights, q, v, a, self.torques(q, v, a)
+        self._last_report[:] = [(spline, found)]
+        return found
+
+    @cached_property
+    def _last_report(self) -> list[tuple[Spline, tuple[Array, Array, Array, Array, Array]]]:
+        return []
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples of a spline motion every `period` [s]; the last one lies on the end."""

@@ -18,14 +18,14 @@ def link_frames(placements: Array, q: Array) -> Array:
 
     Frame 0 is that of the base, the identity. Frame k, of link k, lies on joint k with z along the joint's axis.
     """
-    frames = np.zeros((len(q), q.shape[1] + 1, 4, 4))
+    c, s = np.cos(q)[..., None], np.sin(q)[..., None]
+    x, y = placements[..., 0], placements[..., 1]
+    frames = np.empty((len(q), q.shape[1] + 1, 4, 4))
     frames[:, 0] = np.eye(4)
-    rotations = np.zeros((*q.shape, 4, 4))
-    rotations[..., 0, 0] = rotations[..., 1, 1] = np.cos(q)
-    rotations[..., 1, 0] = np.sin(q)
-    rotations[..., 0, 1] = -rotations[..., 1, 0]
-    rotations[..., 2, 2] = rotations[..., 3, 3] = 1
-    steps = placements @ rotations
+    # each joint's placement, turned about its z axis
+    steps = np.empty((*q.shape, 4, 4))
+    steps[..., 0], steps[..., 1] = c * x + s * y, c * y - s * x
+    steps[..., 2:] = placements[..., 2:]
     for j in range(q.shape[1]):
         np.matmul(frames[:, j], steps[:, j], out=frames[:, j + 1])
     return frames

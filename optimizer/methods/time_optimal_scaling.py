@@ -10,14 +10,10 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from models.robot import Array
-from optimizer.energy.limited_torque import greatest_smooth_part, limited_parts
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories.bspline import greville
 
@@ -51,38 +47,15 @@ def time_optimal_on_line(prepared: PreparedProblem, q_start: Array, q_goal: Arra
 
     The limit of a motor's torque is relaxed by the greatest help of friction, so that the duration stays a lower bound.
     """
-    limits, model = prepared.problem.arm.active_limits, prepared.model
-    from toppra import SimplePath, algorithm, constraint  # see the top of this file
+    from toppra.algorithm import TOPPRA  # see the top of this file
 
-    displacement = q_goal - q_start
-    if not np.abs(displacement).max() > 0:
+    from optimizer.methods.line_in_toppra import LineLimits, StraightLine
+
+    if not np.abs(q_goal - q_start).max() > 0:
         return TimeOptimalScaling(np.linspace(0.0, 1e-9, len(GRID)))
-    data = model.createData()
-
-    def torque(q: Array, v: Array, a: Array) -> Array:
-        return limited_parts(prepared.arm, pin.rnea(model, data, q, v, a), v, a)[0]
-
-    tau = greatest_smooth_part(prepared.arm)
-    none = np.zeros(len(displacement))
-    path = SimplePath(np.array([0.0, 1.0]), np.array([q_start, q_goal]), np.array([displacement, displacement]))
-    constraints = [
-        *_rate_constraints(tuple(limits.v_max.tolist()), tuple(limits.a_max.tolist())),
-        constraint.JointTorqueConstraint(torque, np.stack([-tau, tau], axis=1), none),
-    ]
-    _, speed, _ = algorithm.TOPPRA(constraints, path, gridpoints=GRID).compute_parameterization(0.0, 0.0)
+    scaling = TOPPRA([LineLimits(prepared)], StraightLine(q_start, q_goal), GRID, solver_wrapper="seidel")
+    _, speed, _ = scaling.compute_parameterization(0.0, 0.0)
     if speed is None or not np.isfinite(speed).all():
         return None
     steps = 2 * np.diff(GRID) / (speed[1:] + speed[:-1])
     return TimeOptimalScaling(np.concatenate([[0.0], np.cumsum(steps)]))
-
-
-@lru_cache(maxsize=32)
-def _rate_constraints(v_max: tuple[float, ...], a_max: tuple[float, ...]) -> tuple[Any, Any]:
-    """toppra's constraints on speed and acceleration; cached, since toppra prints the limits of every new one."""
-    from toppra import constraint
-
-    v, a = np.array(v_max), np.array(a_max)
-    return (
-        constraint.JointVelocityConstraint(np.stack([-v, v], axis=1)),
-        constraint.JointAccelerationConstraint(np.stack([-a, a], axis=1)),
-    )

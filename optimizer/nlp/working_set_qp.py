@@ -1,26 +1,22 @@
 """The QP of one SQP step, over the constraints near their limits.
 
 Speed, acceleration and jerk are limited at every point of a fine grid. Only their peaks, and the anchors of the basis,
-enter the QP when they come near a limit. The QP is solved by DAQP (dual active set; Arnström, Bemporad, Axehill 2022).
-If its step breaks a limit at another point, or a bound of a variable, this is added and the QP is solved again.
-
-DAQP gets the QP in variables y with x = W y that make the Hessian the identity. It would factorise the Hessian for each
-QP again, and transform all rows with it, at a tenth of the speed of BLAS.
+enter the QP when they come near a limit. If its step breaks a limit at another point, or a bound of a variable, this is
+added and the QP is solved again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
-import daqp
 import numpy as np
 
 from models.robot import Array, Mask
-from optimizer.deadline import checkpoint, watched_time_left
+from optimizer.deadline import checkpoint
 from optimizer.nlp.active_path_constraints import ActivePathConstraints, Index, PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
+from optimizer.nlp.qp_rows import Places, QPRows
 
 # constraints enter the QP when they use more than this ratio of their limit
 NEAR = 0.6
@@ -33,19 +29,8 @@ STEP = 1.5
 QP_ROUNDS, MOST_ROUNDS = 3, 10
 # the same for a relaxed QP with clearance constraints: it has many rows, and none of them was active before
 RELAXED_ROUNDS = 2
-# least time [s] that a QP gets: most take a millisecond
-LEAST_TIME = 0.05
-# iterations of DAQP after which a QP counts as infeasible: most take some tens, one that collides everywhere thousands
-MOST_QP_ITERATIONS = 1200
-
-Places = tuple[Index, Index, Index]  # derivative, coordinate, grid point
-
 # excess over the bound of a variable [rad, or share of the duration] at which it enters the QP
 BOUND_TOLERANCE = 1e-9
-
-_DAQP_OPTIMAL = 1
-_ACTIVE, _EQUAL, _SOFT = 1, 5, 8
-_INFINITE = 1e30
 
 
 @dataclass(frozen=True)
@@ -106,73 +91,6 @@ class _GoalRows:
     most: Array
 
 
-class _Rows:
-    """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
-
-    `hard` rows are never relaxed. `chosen` (3, r, M) marks the grid points with a kinematic row, `places` lists them,
-    and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the lower and upper bounds with a row.
-    """
-
-    def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
-        self.whitening, n = whitening, len(whitening)
-        self.gradients, self.A = list[Array](), np.zeros((0, whitening.shape[1]))
-        self.least, self.most = np.zeros(0), np.zeros(0)
-        self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-        self.chosen, self.bounded = np.zeros(grid, dtype=bool), np.zeros((2, n), dtype=bool)
-        none = np.zeros(0, dtype=int)
-        self.places: Places = (none, none, none)
-        self.sides: tuple[Index, Index] = (none, none)
-        self.kinematic, self.bounds = none, none
-
-    def add(self, gradients: Array, most: Array, least: Array | None = None, hard: bool = False) -> Index:
-        """Add rows with gradients (rows, n) by the scaled variables, and return their numbers."""
-        self.gradients.append(gradients)
-        if not (count := len(most)):
-            return np.zeros(0, dtype=int)
-        self.A = np.concatenate([self.A, gradients @ self.whitening])
-        self.least = np.concatenate([self.least, np.full(count, -_INFINITE) if least is None else least])
-        self.most = np.concatenate([self.most, most])
-        self.hard = np.concatenate([self.hard, np.full(count, hard)])
-        self.active = np.concatenate([self.active, np.zeros(count, dtype=bool)])
-        return len(self.most) - count + np.arange(count)
-
-    def add_kinematic(self, gradients: Array, most: Array, places: Places) -> None:
-        """Add the rows of places that have none yet."""
-        self.kinematic = np.concatenate([self.kinematic, self.add(gradients, most)])
-        self.places = _joined(self.places, places)
-        self.chosen[places] = True
-
-    def add_bounds(self, bounds: Array, wanted: Mask) -> None:
-        """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""
-        sides = np.nonzero(wanted & ~self.bounded)
-        side, variable = sides
-        gradients = np.zeros((len(side), len(self.whitening)))
-        sign = np.where(side, 1.0, -1.0)
-        gradients[np.arange(len(side)), variable] = sign
-        self.bounds = np.concatenate([self.bounds, self.add(gradients, sign * bounds[sides], hard=True)])
-        self.sides = _joined(self.sides, sides)
-        self.bounded[sides] = True
-
-    def solve(self, gradient: Array, relax: bool) -> tuple[Array, Array, bool]:
-        """DAQP's y, the multipliers of the rows, and whether it found them. `active` is its guess, then its result."""
-        sense = np.zeros(len(self.most), dtype=np.int32)
-        if relax:
-            sense[~self.hard] = _SOFT
-        else:
-            sense[self.active] = _ACTIVE
-        sense[self.least == self.most] = _EQUAL
-        left = watched_time_left()
-        y, _, flag, info = daqp.solve(
-            np.eye(len(gradient)), gradient, self.A, self.most, self.least, sense,
-            primal_tol=1e-9, eps_prox=0.0, rho_soft=1e-6, iter_limit=MOST_QP_ITERATIONS,
-            time_limit=max(left, LEAST_TIME) if np.isfinite(left) else 0.0,  # 0: no limit
-        )  # fmt: skip
-        found = bool(flag >= _DAQP_OPTIMAL)
-        if found:
-            self.active = info["lam"] > 0
-        return y, info["lam"], found
-
-
 class WorkingSetQP:
     """The QPs of one run of the SQP; it keeps the constraints that were active, for the next one.
 
@@ -186,7 +104,7 @@ class WorkingSetQP:
         self.n = self.count + int(self.free_time)
         basis = program.basis
         self._grid_free = program.free_columns(basis.at_grid)
-        self._anchors = basis.anchors[:, None, :]
+        self._anchors = basis.anchors
         self._orders = np.arange(1, 4)
         self._active = np.zeros((3, program.r, basis.at_grid.shape[1]), dtype=bool)
         self._bounded = np.zeros((2, self.n), dtype=bool)
@@ -228,7 +146,7 @@ class WorkingSetQP:
             torque.nodes, torque.signs, mu_torque, (path.points, path.columns), mu_path, pull,
         )  # fmt: skip
 
-    def _keep(self, rows: _Rows, mu: Array) -> None:
+    def _keep(self, rows: QPRows, mu: Array) -> None:
         """Keep what was active for the next QP."""
         for marks, places, numbers in (
             (self._active, rows.places, rows.kinematic),
@@ -237,40 +155,53 @@ class WorkingSetQP:
             marks[...] = False
             marks[places] = mu[numbers] > 0
 
-    def _rows(self, at: QPInputs, goal: _GoalRows, torque: _TorqueRows, path: ActivePathConstraints) -> _Rows:
+    def _rows(self, at: QPInputs, goal: _GoalRows, torque: _TorqueRows, path: ActivePathConstraints) -> QPRows:
         """The rows that the QP is first solved with, but for bounds: goal, path, torque, kinematic."""
-        size = np.abs(at.ratio)
-        chosen = (size > NEAR) & (self._anchors | _peaks(size)) | self._active
+        chosen = self._active.copy()
+        chosen[self._worst(at.ratio, np.full(3, NEAR))] = True
         places = _places(chosen)
-        rows = _Rows(at.whitening, size.shape)
+        value = at.ratio[places]
+        rows = QPRows(at.whitening, at.ratio.shape)
         rows.add(goal.gradients, goal.most, goal.least, hard=True)
         rows.add(self._scaled(path.gradients), path.slack)
         rows.add(torque.gradients, torque.slack)
-        rows.add_kinematic(self._kinematic_rows(places, np.sign(at.ratio[places]), at.T), 1 - size[places], places)
-        rows.active[rows.kinematic] = self._active[places]
+        gradients = self._kinematic_rows(places, np.sign(value), at.T)
+        rows.add_kinematic(gradients, 1 - np.abs(value), places, active=self._active[places])
         return rows
 
-    def _add_broken(self, rows: _Rows, at: QPInputs, bounds: Array, x: Array) -> bool:
+    def _worst(self, ratio: Array, above: Array) -> Places:
+        """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of its derivative (3,).
+
+        Most coordinates stay below it everywhere: only the others are searched.
+        """
+        largest = np.maximum(ratio.max(axis=2), -ratio.min(axis=2))
+        d, j = np.nonzero(largest > above[:, None])
+        size = np.abs(ratio[d, j])
+        k, grid = np.nonzero((size > above[d, None]) & (self._anchors[d] | _peaks(size)))
+        return d[k], j[k], grid
+
+    def _add_broken(self, rows: QPRows, at: QPInputs, bounds: Array, x: Array) -> bool:
         """Add all bounds if the step x breaks one, else the peaks above a limit after it; whether any were added."""
         if not rows.bounded.all() and ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any():
             # all of them, and no peaks yet: a step without bounds may be so long that it breaks every limit
             rows.add_bounds(bounds, np.ones_like(rows.bounded))
             return True
-        before = len(rows.most)
-        moved = x[: self.count].reshape(at.free.shape).T @ self._grid_free.swapaxes(1, 2)
-        predicted = at.ratio + moved / self.rates(at.T)[:, :, None]
+        change = x[: self.count].reshape(at.free.shape).T / self.rates(at.T)[:, :, None]
+        predicted = change @ self._grid_free.swapaxes(1, 2)
+        predicted += at.ratio
+        # the limits of the rates by τ after the step, as ratios of those before it
+        limits = np.ones(3)
         if self.free_time:
-            growth = 1 + self._orders * x[-1] * self.time_scale / at.T
-            predicted /= np.maximum(growth, 1e-3)[:, None, None]
-        size = np.abs(predicted)
-        broken = size > 1 + FEASIBILITY / 4
-        if broken.any():
-            broken &= (self._anchors | _peaks(size)) & ~rows.chosen
-            fresh = _places(broken)
-            # the row's sign is that of the value after the step, not before it
-            signs = np.sign(predicted[fresh])
-            rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh)
-        return len(rows.most) > before
+            limits = np.maximum(1 + self._orders * x[-1] * self.time_scale / at.T, 1e-3)
+        places = self._worst(predicted, limits * (1 + FEASIBILITY / 4))
+        unknown = ~rows.chosen[places]
+        fresh: Places = (places[0][unknown], places[1][unknown], places[2][unknown])
+        if not len(fresh[0]):
+            return False
+        # the row's sign is that of the value after the step, not before it
+        signs = np.sign(predicted[fresh])
+        rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh)
+        return True
 
     def _kinematic_rows(self, places: Places, signs: Array, T: float) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""
@@ -324,11 +255,6 @@ class WorkingSetQP:
         return _GoalRows(A, constraints.lower - moved, constraints.upper - moved)
 
 
-def _joined(first: tuple[Index, ...], second: tuple[Index, ...]) -> Any:
-    """Indices of the first places, then of the second."""
-    return tuple(np.concatenate(both) for both in zip(first, second, strict=True))
-
-
 def _shortened(x: Array, bounds: Array) -> Array:
     """The step, as far as the bounds (2, n) let it go: rounds may end before every bound has its row."""
     most = np.where(x > 0, bounds[1], bounds[0])
@@ -337,11 +263,11 @@ def _shortened(x: Array, bounds: Array) -> Array:
 
 
 def _peaks(size: Array) -> Mask:
-    """Marks the local maxima of size (3, r, M) ≥ 0 along the grid."""
+    """Marks the local maxima of size (k, M) ≥ 0 along the grid."""
     high = np.ones(size.shape, dtype=bool)
-    rising = size[:, :, 1:] >= size[:, :, :-1]
-    high[:, :, 1:] = rising
-    high[:, :, :-1] &= ~rising
+    rising = size[:, 1:] >= size[:, :-1]
+    high[:, 1:] = rising
+    high[:, :-1] &= ~rising
     return high
 
 

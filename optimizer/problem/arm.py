@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -147,12 +148,12 @@ class Arm:
         assert self.limits is not None
         return self.limits
 
-    @property
+    @cached_property
     def friction_law(self) -> FrictionLaw:
         """The friction law in force."""
         return self.robot.friction if self.friction is None else self.robot.friction_laws[self.friction]
 
-    @property
+    @cached_property
     def drives(self) -> Drives:
         """The drives in force."""
         names = [name for name in INVERTER_PARTS if getattr(self.inverter, name) is not None]

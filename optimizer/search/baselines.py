@@ -13,7 +13,7 @@ of a trapezoid jumps: its jerk is unbounded, so it is never within a jerk limit.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +31,7 @@ from optimizer.trajectories.ruckig_motion import time_optimal
 from optimizer.trajectories.time_scalings import SampledMotion, controller_default, quintic, trapezoid
 
 Torques = Callable[[Array, Array, Array], Array]
-Broken = Callable[[Array, Array], list[str]]
+Broken = Callable[[Sequence[Array], Sequence[Array]], list[list[str]]]
 
 
 def baselines(
@@ -48,7 +48,8 @@ def baselines(
 
     `duration` > 0 [s] and `ours` [J, of the objective] are of the motion they are compared with. `torques` maps q, v, a
     (k, nq) to rigid-body-and-rotor torques (k, nq), `potential` joint positions (nq,) to the potential energy [J];
-    `broken_on_the_way` says of samples q, v (k, nq) which limits along the path they break, and what collides.
+    `broken_on_the_way` says of motions' samples q, v (k, nq) each which limits along the path they break, and what
+    collides.
     """
     motions = guesses(problem, q_start, nearest(problem, q_start, q_goals), duration)
     # one call for all: a compiled kernel works through samples in blocks
@@ -58,8 +59,9 @@ def baselines(
     if problem.cycle is not None:
         goal, still = nearest(problem, q_start, q_goals)[None], np.zeros((1, len(q_start)))
         held = torques(goal, still, still)[0]
-    for (name, motion), tau in zip(motions.items(), np.split(torques(q, v, a), ends), strict=True):
-        result.append(compared(problem, name, motion, tau, held, ours, potential, broken_on_the_way))
+    broken = broken_on_the_way([motion.q for motion in motions.values()], [motion.v for motion in motions.values()])
+    for (name, motion), tau, words in zip(motions.items(), np.split(torques(q, v, a), ends), broken, strict=True):
+        result.append(compared(problem, name, motion, tau, held, ours, potential, words))
     return result
 
 
@@ -71,9 +73,12 @@ def compared(
     held: Array,
     ours: float,
     potential: Callable[[Array], float],
-    broken_on_the_way: Broken,
+    broken: Sequence[str],
 ) -> Baseline:
-    """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,). See `baselines`."""
+    """A motion with torques tau (k, nq) as a baseline; after it, motors hold torques `held` (nq,). See `baselines`.
+
+    `broken` are the limits along the path that it breaks, and what collides, in words.
+    """
     energy = motion_energy(problem, motion, tau, potential)
     spread = arm_spread(problem.arm)
     sensitivity = energy_sensitivity(motion.weights, motion.q, motion.v, motion.a, tau, problem.arm, spread)
@@ -88,7 +93,7 @@ def compared(
         electrical=energy.electrical.total,
         mechanical=energy.mechanical.total,
         saving=saving(ours, energy.of(problem.objective)),
-        reason="; ".join([*broken_limits(problem, motion, tau), *broken_on_the_way(motion.q, motion.v)]) or None,
+        reason="; ".join([*broken_limits(problem, motion, tau), *broken]) or None,
         sensitivity=sensitivity,
     )
 

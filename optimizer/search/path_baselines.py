@@ -22,8 +22,8 @@ def path_baselines(incumbent: Incumbent, best: Candidate) -> list[Baseline]:
     tau = prepared.torques(motion.q, motion.v, motion.a)
     still = np.zeros_like(best.q_goal)[None]
     held = prepared.torques(best.q_goal[None], still, still)[0]
-    oracle = prepared.potential, prepared.broken_on_the_way
-    return [compared(problem, "trapezoid", motion, tau, held, best.energy, *oracle)]
+    (broken,) = prepared.broken_on_the_way([motion.q], [motion.v])
+    return [compared(problem, "trapezoid", motion, tau, held, best.energy, prepared.potential, broken)]
 
 
 def along(path: Spline, law: SampledMotion) -> SampledMotion:

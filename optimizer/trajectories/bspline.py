@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import BSpline, make_interp_spline
 
 from models.robot import Array, Mask
@@ -39,13 +40,13 @@ def clamped(breaks: Array) -> Array:
 def basis_matrix(knots: Array, points: Array, derivative: int = 0) -> Array:
     """Values (k, n) of the basis functions' derivative at `points` (k,) in [0, 1]."""
     n = len(knots) - DEGREE - 1
-    return np.ascontiguousarray(BSpline(knots, np.eye(n), DEGREE)(points, derivative))
+    # its checks take longer than the values
+    return np.ascontiguousarray(BSpline.construct_fast(knots, np.eye(n), DEGREE)(points, derivative))
 
 
 def greville(knots: Array) -> Array:
     """Greville points (n,): the abscissae of the control values, at which interpolation by a spline is unique."""
-    n = len(knots) - DEGREE - 1
-    return np.array([knots[i + 1 : i + DEGREE + 1].mean() for i in range(n)])
+    return np.asarray(sliding_window_view(knots[1:-1], DEGREE).mean(axis=1))
 
 
 def fit(samples: Array, at: Array, knots: Array, resting: int = REST_POINTS) -> Array:

@@ -36,7 +36,8 @@ class Spline:
     @property
     def curve(self) -> BSpline:
         """SciPy's spline: curve(t, d) is the d-th derivative of q, (k, nq), at times t (k,) [s]."""
-        return BSpline(self.knots, self.control_points, self.degree)
+        # without its checks, which take longer than most evaluations
+        return BSpline.construct_fast(self.knots, self.control_points, self.degree)
 
 
 def spline_of(basis: bspline.Basis, points: Array, duration: float) -> Spline:

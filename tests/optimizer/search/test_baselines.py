@@ -16,7 +16,7 @@ from models.registry import load_robot
 from models.robot import Array, Limits
 from optimizer.problem.arm import Payload
 from optimizer.problem.problem import Problem
-from optimizer.search.baselines import baselines, broken_limits, guesses, motion_energy, nearest, saving
+from optimizer.search.baselines import Broken, baselines, broken_limits, guesses, motion_energy, nearest, saving
 from optimizer.solution import Baseline
 from optimizer.trajectories import quadrature
 from optimizer.trajectories.ruckig_motion import time_optimal
@@ -47,7 +47,7 @@ def limits(**given: float | list[float] | Array) -> Limits:
     return replace(ROBOT.limits, **{name: np.broadcast_to(value, 6).astype(float) for name, value in given.items()})
 
 
-def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Callable[[Array, Array], list[str]]]:
+def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float], Broken]:
     """Torques and potential energy by Pinocchio, and a path without limits."""
     load = task.arm.payload
     model = task.arm.robot.loaded_model(load.mass, load.com, load.inertia, task.arm.gravity)
@@ -55,7 +55,7 @@ def oracle(task: Problem) -> tuple[Callable[..., Array], Callable[[Array], float
     return (
         lambda q, v, a: np.array([pin.rnea(model, data, *state) for state in zip(q, v, a, strict=True)]),
         lambda q: float(pin.computePotentialEnergy(model, data, q)),
-        lambda q, v: [],
+        lambda q, v: [[] for _ in q],
     )
 
 
