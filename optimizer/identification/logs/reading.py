@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from models.robot import Array, Robot
-from optimizer.exceptions import InvalidProblem, InvalidTable
+from optimizer.exceptions import InvalidProblem
 from optimizer.identification.logs.channels import channels_of
 from optimizer.identification.logs.columns import Columns, Group, mapped, other_positions, recognised
 from optimizer.identification.logs.effort import EffortReport, effort_report
@@ -27,25 +27,23 @@ from optimizer.identification.logs.log_report import LogReport
 from optimizer.identification.logs.log_warnings import held_warning, log_warnings, numbers_of_joints
 from optimizer.identification.logs.motion import Motion
 from optimizer.identification.logs.moves import cut, still_by_command, still_by_speed
-from optimizer.identification.logs.positions import check_coarse, check_leaps, joined_turns
+from optimizer.identification.logs.possible import check_coarse, check_leaps, check_radians, check_sizes, joined_turns
 from optimizer.identification.logs.rows import MOST_BYTES, Rows, Source
 from optimizer.identification.logs.speeds import speeds_of
 from optimizer.identification.logs.units import check_units, is_line_of_units, parted
 from optimizer.identification.logs.usable_effort import check_measured, usable
 from optimizer.problem.arm import Payload
 from optimizer.problem.arrays import frozen
-from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
 
 _OF_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
-_MOST_ANGLE = 20 * pi  # rad, ten turns
-_MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
-_MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
 _COMPARED = 20_000  # rows
 _ROUGHER = 4.0  # times as much noise of positions at their times as row by row: the times are wrong
 # channels that are differentiated twice, or compared, are kept in double precision; any other has fewer digits than
 # single precision, which takes half of the memory
 _PRECISE: tuple[Group, ...] = ("q", "payload")
+_OF_ONE: tuple[Group, ...] = ("commanded", "power")
+"""Groups of which one value of a row is kept."""
 
 
 @dataclass(frozen=True)
@@ -167,10 +165,9 @@ def _efforts(
 
 def _power(channels: _Channels, motion: Motion, remarks: list[str]) -> Array | None:
     """The power (n,), in time with the motion."""
-    factors = channels.take("power")
-    if factors is None:
+    power = channels.take("power")
+    if power is None:
         return None
-    power = factors.prod(axis=1)[:, None]
     remarks += held_warning("power", power, motion.v, motion.rate)
     return _in_time("power comes", power, power_lag_of(motion, power[:, 0]), channels.grid.time, remarks)[:, 0]
 
@@ -225,14 +222,15 @@ def _channels(source: Path | bytes, robot: Robot, options: LogOptions, remarks: 
         for lines, block in rows.blocks():
             times.frombytes(_seconds(block[:, [used.index(k) for k in columns.time]]).tobytes())
             numbers.frombytes(lines.astype(np.int32).tobytes())
-            _check_sizes(block, lines, names, used, where, scales)
+            check_sizes(block, lines, names, used, where, scales)
             for group, part in parts.items():
-                values = block[:, where[group]] * scales.get(group, 1.0)
+                values = _packed(group, block[:, where[group]] * scales.get(group, 1.0), part)
                 part.frombytes(values.astype(part.typecode).tobytes())
-            _check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
+            check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
     grid = grid_of(np.frombuffer(times), np.frombuffer(numbers, np.int32), names[columns.time[0]])
     channels = {
-        group: np.frombuffer(part, part.typecode).reshape(-1, len(where[group])) for group, part in parts.items()
+        group: np.frombuffer(part, part.typecode).reshape(-1, 1 if group in _OF_ONE else len(where[group]))
+        for group, part in parts.items()
     }
     _set_right(channels, grid, np.frombuffer(numbers, np.int32), robot, columns, remarks)
     return _Channels(grid, columns, channels), rows.dropped
@@ -254,41 +252,22 @@ def _set_right(
     check_leaps(q, grid, lines, robot, [columns.names[k] for k in columns.groups["q"]])
 
 
+def _packed(group: Group, values: Array, before: array[float]) -> Array:
+    """What is kept of the values (n, k) of a group behind those that are kept already: a log can fill half of the
+    memory. Of commanded speeds the greatest one, of voltage and current their product, of the payload its changes."""
+    if group == "commanded":
+        return np.asarray(np.abs(values).max(axis=1))
+    if group == "power":
+        return np.asarray(values.prod(axis=1))
+    if group == "payload":
+        first = np.array(before[: values.shape[1]]) if before else values[0]
+        return np.vstack([values[: not before], values[(values != first).any(axis=1)]])
+    return values
+
+
 def _seconds(stamps: Array) -> Array:
     """Times (n,) of one column (n, 1), or of seconds and nanoseconds (n, 2)."""
     return np.ascontiguousarray(stamps[:, 0]) if stamps.shape[1] == 1 else stamps @ [1.0, 1e-9]
-
-
-def _check_sizes(
-    block: Array,
-    lines: Array,
-    names: Sequence[str],
-    used: Sequence[int],
-    where: Mapping[Group, Sequence[int]],
-    scales: Mapping[Group, float],
-) -> None:
-    """Raises InvalidTable for a number that no arm has: it would spoil everything that is computed."""
-    for group, indices in where.items():
-        wrong = np.argwhere(np.abs(block[:, indices]) * scales.get(group, 1.0) > _MOST.get(group, _MOST_OF_OTHERS))
-        if len(wrong):
-            at, column = wrong[0].tolist()
-            row, name = int(lines[at]), names[used[indices[column]]]
-            raise InvalidTable(f"{name} in line {row} is too large to be a robot's: correct or delete it.", row, name)
-
-
-def _check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> None:
-    """Raises InvalidTable if q (n, joints), in lines `rows` (n,), is rather in degrees: far beyond the range of two
-    joints, or by many turns beyond that of one, as the last joint of some arms turns without end."""
-    ratios = np.abs(q) / np.maximum(np.abs(robot.limits.q_min), np.abs(robot.limits.q_max))
-    wrong = ((ratios > FAR_OUT).sum(axis=1) > 1) | (np.abs(q) > _MOST_ANGLE).any(axis=1)
-    if wrong.any():
-        at = int(np.argmax(wrong))
-        row, name = int(rows[at]), names[int(ratios[at].argmax())]
-        raise InvalidTable(
-            f"{name} in line {row} is far beyond the joint's range and looks like degrees: give radians, or units=deg.",
-            row,
-            name,
-        )
 
 
 def _trust_rows(channels: _Channels, remarks: list[str]) -> None:

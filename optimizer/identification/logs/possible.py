@@ -1,20 +1,59 @@
-"""Positions that no arm has: leaps, which are refused, and whole turns, which are taken out."""
+"""What no arm has: too large numbers, degrees, leaps and coarse times, which are refused; whole turns, which are taken
+out."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import pi
 
 import numpy as np
 
 from models.robot import Array, Robot
 from optimizer.exceptions import InvalidTable
+from optimizer.identification.logs.columns import Group
 from optimizer.identification.logs.grid import LEAST_RATE, Grid
+from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
 
+_MOST_ANGLE = 20 * pi  # rad, ten turns
+_MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
+_MOST_OF_OTHERS = 1e6  # any unit
 _FASTER, _FAST, _SPAN = 3.0, 1.5, 0.1
 """Times the greatest speed of a joint that no two rows are apart, and no rows that are so far apart [s]."""
 _SLACK = 0.01  # rad, of coarse sensors
 _TURN = 2 * np.pi
 _MOST_COARSE = 0.01  # fraction of rows with the time of the row before, but other positions
+
+
+def check_sizes(
+    block: Array,
+    lines: Array,
+    names: Sequence[str],
+    used: Sequence[int],
+    where: Mapping[Group, Sequence[int]],
+    scales: Mapping[Group, float],
+) -> None:
+    """Raises InvalidTable for a number that no arm has: it would spoil everything that is computed."""
+    for group, indices in where.items():
+        wrong = np.argwhere(np.abs(block[:, indices]) * scales.get(group, 1.0) > _MOST.get(group, _MOST_OF_OTHERS))
+        if len(wrong):
+            at, column = wrong[0].tolist()
+            row, name = int(lines[at]), names[used[indices[column]]]
+            raise InvalidTable(f"{name} in line {row} is too large to be a robot's: correct or delete it.", row, name)
+
+
+def check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> None:
+    """Raises InvalidTable if q (n, joints), in lines `rows` (n,), is rather in degrees: far beyond the range of two
+    joints, or by many turns beyond that of one, as the last joint of some arms turns without end."""
+    ratios = np.abs(q) / np.maximum(np.abs(robot.limits.q_min), np.abs(robot.limits.q_max))
+    wrong = ((ratios > FAR_OUT).sum(axis=1) > 1) | (np.abs(q) > _MOST_ANGLE).any(axis=1)
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        row, name = int(rows[at]), names[int(ratios[at].argmax())]
+        raise InvalidTable(
+            f"{name} in line {row} is far beyond the joint's range and looks like degrees: give radians, or units=deg.",
+            row,
+            name,
+        )
 
 
 def joined_turns(q: Array, robot: Robot) -> tuple[Array, list[int]]:
