@@ -99,7 +99,18 @@ class Columns:
     time: tuple[int, ...]
     groups: Mapping[Group, tuple[int, ...]]
 
-    MAPPED: ClassVar[tuple[str, ...]] = ("time", "q", "v", "a", "current", "torque", "effort", "temperature", "power")
+    MAPPED: ClassVar[tuple[str, ...]] = (
+        "time",
+        "q",
+        "nanoseconds",
+        "v",
+        "a",
+        "current",
+        "torque",
+        "effort",
+        "temperature",
+        "power",
+    )
     """What a map of columns may name."""
 
     def without(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
@@ -198,7 +209,7 @@ def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """The columns that a caller's map names: `time` and `power` by one name, others by one name per joint.
+    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name, others by one name per joint.
 
     Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
     """
@@ -210,11 +221,10 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
     found: dict[str, tuple[int, ...]] = {}
     for group, given in columns.items():
         wanted = [given] if isinstance(given, str) else [*given]
-        if group in ("time", "power") and len(wanted) != 1 and not (group == "time" and len(wanted) == 2):
-            or_two = ", or of those of seconds and nanoseconds" if group == "time" else ""
-            raise InvalidProblem(f"columns.{group}", f"columns.{group} must be the name of one column{or_two}.")
+        if group in ("time", "nanoseconds", "power") and len(wanted) != 1:
+            raise InvalidProblem(f"columns.{group}", f"columns.{group} must be the name of one column.")
         found[group] = tuple(_index(names, each) for each in wanted)
-    time = found.pop("time")
+    time = (*found.pop("time"), *found.pop("nanoseconds", ()))
     groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
     _check_counts({group: indices for group, indices in groups.items() if group != "power"}, names, nq)
     return Columns("mapped", names, time, groups)

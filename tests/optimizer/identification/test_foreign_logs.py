@@ -206,7 +206,7 @@ def test_a_log_of_the_sunrise_controller(seven: Recording) -> None:
     np.testing.assert_allclose(reading.log.effort, seven.torque, atol=1e-4)
     assert reading.log.effort_meaning == "torque"
     # the same with names of the caller's
-    named = {"time": ["ZeitInSec", "ZeitInNanoSec"], "q": [f"{words[0]}[{k}]" for k in range(7)]}
+    named = {"time": "ZeitInSec", "nanoseconds": "ZeitInNanoSec", "q": [f"{words[0]}[{k}]" for k in range(7)]}
     np.testing.assert_allclose(
         read_log(table(header, *columns, separator=" "), SEVEN, columns=named).q, seven.q, atol=1e-8
     )
