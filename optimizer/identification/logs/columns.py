@@ -209,7 +209,7 @@ def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name, others by one name per joint.
+    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name, others by one per joint.
 
     Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
     """
