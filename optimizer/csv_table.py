@@ -46,14 +46,19 @@ def line_of(file: Lines, row: int, longest: int) -> str:
 
 
 def header_of(file: Lines, longest: int, separators: str = SEPARATORS) -> tuple[list[str], str]:
-    """Names of the columns, in lower case, and what separates them: the most frequent of `separators`, where a space
-    counts only if there is none of the others. Raises InvalidTable."""
+    """Names of the columns in the first line, and what separates them, as `names_of` says. Raises InvalidTable."""
     first = line_of(file, 1, longest)
     if not first:
         raise InvalidTable("The file is empty: send a header and two or more rows.")
-    header = first.removeprefix("\ufeff").strip()
+    return names_of(first.removeprefix("\ufeff").strip(), separators)
+
+
+def names_of(header: str, separators: str = SEPARATORS) -> tuple[list[str], str]:
+    """Names of the columns of a header, in lower case, and what separates them: the most frequent of `separators`,
+    where a space counts only if there is none of the others."""
     separator = max(separators, key=lambda each: header.count(each) * (0.01 if each == " " else 1.0))
-    return [name.strip().strip('"').strip().lower() for name in header.split(separator)], separator
+    cells = header.split() if separator == " " else header.split(separator)
+    return [name.strip().strip("\"'").strip().lower() for name in cells], separator
 
 
 def with_points(lines: Sequence[str], first: int) -> Iterator[str]:

@@ -117,12 +117,19 @@ class Recording:
 
 
 def recorded(
-    robot: Robot, truth: Truth, moves: int = 10, rate: float = 125.0, seed: int = 0, noise: Noise | None = None
+    robot: Robot,
+    truth: Truth,
+    moves: int = 10,
+    rate: float = 125.0,
+    seed: int = 0,
+    noise: Noise | None = None,
+    closed: bool = False,
 ) -> Recording:
     """Random motions from rest to rest, half a second of rest before, between and after them. The first two lead from
-    one end to another and back: the same motion twice, in both directions."""
+    one end to another and back: the same motion twice, in both directions. If `closed`, the last one ends where the
+    first one began."""
     random = np.random.default_rng(seed)
-    q, v, a, ranges = _motions(robot, moves, rate, random)
+    q, v, a, ranges = _motions(robot, moves, rate, random, closed)
     tau_rigid = rigid_torques(robot, truth, q, v, a)
     sign = v / np.sqrt(v * v + truth.knee**2)
     friction = (truth.coulomb + truth.load * np.abs(tau_rigid)) * sign + truth.viscous * v + truth.offset
@@ -163,7 +170,7 @@ def rigid_torques(robot: Robot, truth: Truth, q: Array, v: Array, a: Array) -> A
 
 
 def _motions(
-    robot: Robot, count: int, rate: float, random: np.random.Generator
+    robot: Robot, count: int, rate: float, random: np.random.Generator, closed: bool
 ) -> tuple[Array, Array, Array, tuple[Move, ...]]:
     """q, v, a (n, nq) of quintic moves, and the rows of moves and rests."""
     limits, nq = robot.limits, robot.nq
@@ -171,6 +178,8 @@ def _motions(
     ends = [random.uniform(low, high) for _ in range(count + 1)]
     if count > 1:
         ends[2] = ends[0]
+    if closed:
+        ends[-1] = ends[0]
     rest = round(0.5 * rate)
     parts: list[tuple[Array, Array, Array]] = [_still(ends[0], rest)]
     ranges, row = [Move(0, rest, True)], rest

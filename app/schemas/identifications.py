@@ -184,9 +184,9 @@ class Temperatures(Response):
 class Advice(Response):
     """What would help most."""
 
-    figure: str = described("The figure whose error has the largest share of the energy's variance.", None, "copper")
+    figure: str = described("The figure that, if known, would take most of the energy's variance away.", None, "copper")
     joint: int | None = described("Its joint, from 0; null: of the whole arm.", "1", 1)
-    share: float = described("This share.", "1", 0.4)
+    share: float = described("The share of the variance that it would take away, at most 1.", "1", 0.4)
     do: str = described("What to log. Four times as many such moves halve its standard deviation.", None, "Log rests.")
 
 

@@ -24,6 +24,7 @@ class LogColumns(Request):
     """Names of the columns of a log, as in its header; of joints one each, from base to flange. Null: none."""
 
     time: _Column = described("Times [s].", None, "time_s")
+    nanoseconds: _Column | None = described("Nanoseconds beside times in whole seconds.", None, "nsecs", default=None)
     q: _Columns = described("Joint positions.", None, ["axis_1", "axis_2"])
     v: _Columns | None = described("Joint velocities.", None, ["speed_1", "speed_2"], default=None)
     a: _Columns | None = described("Joint accelerations.", None, ["acc_1", "acc_2"], default=None)
@@ -133,7 +134,7 @@ class LogDetail(LogSummary):
         "them left out."
     )
     warnings: list[str] = described(
-        "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown payload.",
+        "What is odd: gaps, constant or saturated channels, velocities that do not fit, an unknown payload, …",
         None,
         ["No payload is given or logged: the arm is taken to have carried nothing."],
     )

@@ -140,7 +140,8 @@ class Temperatures:
 
 @dataclass(frozen=True)
 class Advice:
-    """What would help most: the figure whose error is the largest `share` of the energy's variance, and what to log."""
+    """What would help most: the figure that takes the largest `share` of the energy's variance away if it is known, and
+    what to log."""
 
     figure: str
     joint: int | None

@@ -26,8 +26,10 @@ class Form:
     payload: tuple[str, ...] = ()
 
 
-AT = r"[._\[]?([0-9]{1,3})\]?"
-"""Brackets, underscores or points before the number of a joint."""
+AT = r"[._\[ ]?([0-9]{1,3})\]?"
+"""Brackets, underscores, points or spaces before the number of a joint."""
+_BEFORE = r"(?:.*[./])?(?:joint_?|measured_?|msr_?|actual_?|motor_?)*"
+"""Of names of a topic or a structure, as `/joint_states/position[0]` or `state.q[0]`, and words for a measurement."""
 FORMS = (
     Form(
         "rtde",
@@ -59,12 +61,28 @@ FORMS = (
         "ros",
         "%?time",
         {
-            "q": rf"(?:field\.)?position{AT}",
-            "v": rf"(?:field\.)?velocity{AT}",
-            "effort": rf"(?:field\.)?effort{AT}",
+            "q": rf"(?:.*[./])?position{AT}",
+            "v": rf"(?:.*[./])?velocity{AT}",
+            "effort": rf"(?:.*[./])?effort{AT}",
         },
     ),
+    Form(
+        "numbered",
+        "time",
+        {
+            "q": rf"{_BEFORE}(?:q|pos|positions?|angles?|mp|axisqmsr_\w*?){AT}",
+            "v": rf"{_BEFORE}(?:dq|qd|v|vel|velocity|velocities|speeds?){AT}",
+            "current": rf"{_BEFORE}(?:i|currents?){AT}",
+            "torque": rf"{_BEFORE}(?:tau|tau_j|torques?|mt|axistaumsr_\w*?){AT}",
+            "effort": rf"{_BEFORE}(?:efforts?){AT}",
+            "temperature": rf"{_BEFORE}(?:temperatures?|temp){AT}",
+        },
+        ("power",),
+    ),
 )
+_TIME = r"(?:.*[./])?(?:__|%)?(?:time|timestamp|t|stamp|rosbagtimestamp|duration)(?:[_ ]?(?:n|u|µ|m)?s(?:ec)?)?"
+_STAMPS = (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs"), ("secs", "nanosecs"))
+"""Ends of the names of the two columns of a stamp of time."""
 _KNOWN = (
     "timestamp, actual_q_0, … (RTDE), t, q1, … (this service's own) or time, position1, … (ROS JointState as CSV). "
     "Otherwise say in `columns` which columns hold what"
@@ -73,14 +91,26 @@ _KNOWN = (
 
 @dataclass(frozen=True)
 class Columns:
-    """Indices of the columns of a log: its `form`, `time`, and `groups`, those of joints with one index per joint."""
+    """Indices of the columns of a log: its `form`, `time`, or seconds and nanoseconds of it, and `groups`, those of
+    joints with one index per joint."""
 
     form: str
     names: Sequence[str]
-    time: int
+    time: tuple[int, ...]
     groups: Mapping[Group, tuple[int, ...]]
 
-    MAPPED: ClassVar[tuple[str, ...]] = ("time", "q", "v", "a", "current", "torque", "effort", "temperature", "power")
+    MAPPED: ClassVar[tuple[str, ...]] = (
+        "time",
+        "q",
+        "nanoseconds",
+        "v",
+        "a",
+        "current",
+        "torque",
+        "effort",
+        "temperature",
+        "power",
+    )
     """What a map of columns may name."""
 
     def without(self, first: Sequence[str]) -> tuple[Columns, list[Group]]:
@@ -94,7 +124,7 @@ class Columns:
     @property
     def used(self) -> list[int]:
         """All indices, each once, in the order of the file."""
-        return sorted({self.time, *(k for group in self.groups.values() for k in group)})
+        return sorted({*self.time, *(k for group in self.groups.values() for k in group)})
 
 
 def _empty(cell: str) -> bool:
@@ -104,11 +134,11 @@ def _empty(cell: str) -> bool:
 def recognised(names: Sequence[str], nq: int) -> Columns:
     """The columns of a header for an arm with nq joints, of one of the FORMS. Raises InvalidTable."""
     for form in FORMS:
-        time = next((k for k, name in enumerate(names) if re.fullmatch(form.time, name)), None)
         found = {group: indices for group, pattern in form.joints.items() if (indices := _numbered(names, pattern))}
         if "q" not in found:
             continue
-        if time is None:
+        time = time_of(names, form.time)
+        if not time:
             raise InvalidTable(
                 f"The header has joint positions, as {names[found['q'][0]]}, but no column `{form.time.strip('%?')}`: "
                 "a log needs the time [s] of every row.",
@@ -118,6 +148,34 @@ def recognised(names: Sequence[str], nq: int) -> Columns:
         _check_counts(found, names, nq)
         return Columns(form.name, names, time, found | dict(_single(form, names)))
     raise InvalidTable(f"The header names no joint positions that are known: begin it with {_KNOWN}.", 1)
+
+
+def other_positions(names: Sequence[str], columns: Columns) -> str | None:
+    """A column with positions that is not read, as those of another form are; None if there is none."""
+    for form in FORMS:
+        for name in names:
+            if re.fullmatch(form.joints["q"], name) and names.index(name) not in columns.groups["q"]:
+                return name
+    return None
+
+
+def time_of(names: Sequence[str], first: str = "time") -> tuple[int, ...]:
+    """The index of the column of time, best one whose name is like `first`; or those of seconds and nanoseconds, which
+    are together more exact; empty if there is none."""
+    return _first(names, first) or _stamp(names) or _first(names, _TIME)
+
+
+def _first(names: Sequence[str], pattern: str) -> tuple[int, ...]:
+    return next(((k,) for k, name in enumerate(names) if re.fullmatch(pattern, name)), ())
+
+
+def _stamp(names: Sequence[str]) -> tuple[int, ...]:
+    for seconds, nano in _STAMPS:
+        for k, name in enumerate(names):
+            other = name.removesuffix(seconds) + nano
+            if name.endswith(seconds) and not name.endswith(nano) and other in names:
+                return (k, names.index(other))
+    return ()
 
 
 def _numbered(names: Sequence[str], pattern: str) -> tuple[int, ...]:
@@ -151,7 +209,7 @@ def _single(form: Form, names: Sequence[str]) -> Iterator[tuple[Group, tuple[int
 
 
 def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq: int) -> Columns:
-    """The columns that a caller's map names: `time` and `power` by one name, others by one name per joint.
+    """The columns that a caller's map names: `time`, `nanoseconds` and `power` by one name, others by one per joint.
 
     Raises InvalidProblem for a wrong map, InvalidTable where the header does not have a column.
     """
@@ -163,10 +221,10 @@ def mapped(names: Sequence[str], columns: Mapping[str, str | Sequence[str]], nq:
     found: dict[str, tuple[int, ...]] = {}
     for group, given in columns.items():
         wanted = [given] if isinstance(given, str) else [*given]
-        if group in ("time", "power") and len(wanted) != 1:
+        if group in ("time", "nanoseconds", "power") and len(wanted) != 1:
             raise InvalidProblem(f"columns.{group}", f"columns.{group} must be the name of one column.")
         found[group] = tuple(_index(names, each) for each in wanted)
-    (time,) = found.pop("time")
+    time = (*found.pop("time"), *found.pop("nanoseconds", ()))
     groups: dict[Group, tuple[int, ...]] = found  # type: ignore[assignment]
     _check_counts({group: indices for group, indices in groups.items() if group != "power"}, names, nq)
     return Columns("mapped", names, time, groups)

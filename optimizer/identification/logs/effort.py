@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from models.robot import Array, Robot
+from models.robot import Array
 from optimizer.identification.logs.log import EffortMeaning
-from optimizer.problem.arm import Payload
+from optimizer.identification.logs.motion import Motion
 
 _MOST_ROWS = 4000  # that the slope is taken from
 _KNEE = 0.02  # rad/s over which the sign of the speed is smoothed
@@ -33,13 +33,12 @@ class EffortReport:
     slope: dict[str, float | None]
 
 
-def effort_report(
-    robot: Robot, payload: Payload, gravity: Array, q: Array, v: Array, a: Array, effort: Array
-) -> EffortReport:
-    """What efforts (n, joints) at q, v, a (n, joints) [rad, s] are."""
-    rows = slice(None, None, max(1, -(-len(q) // _MOST_ROWS)))
-    q, v, a, effort = (each[rows].astype(float) for each in (q, v, a, effort))
-    model = robot.loaded_model(payload.mass, payload.com, payload.inertia, gravity)
+def effort_report(motion: Motion, effort: Array) -> EffortReport:
+    """What efforts (n, joints) of a motion are."""
+    rows = np.arange(0, len(effort), max(1, -(-len(effort) // _MOST_ROWS)))
+    part, effort, robot = motion.at(rows), effort[rows].astype(float), motion.robot
+    q, v, a, payload = part.q, part.v, part.a, motion.payload
+    model = robot.loaded_model(payload.mass, payload.com, payload.inertia, motion.gravity)
     data = model.createData()
     weights = np.array([pin.computeGeneralizedGravity(model, data, each) for each in q])
     # of those next to the base: at a wrist, cables and friction outweigh what it carries

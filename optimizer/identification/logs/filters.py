@@ -26,11 +26,11 @@ def low_passed(values: Array, rate: float) -> Array:
     smooth = np.empty_like(values)
     # one channel at a time: the filter copies what it is given
     for k, channel in enumerate(values.T):
-        smooth[:, k] = _filtered(channel, rate, cutoff(rate))
+        smooth[:, k] = filtered(channel, rate, cutoff(rate))
     return smooth
 
 
-def _filtered(channel: Array, rate: float, highest: float) -> Array:
+def filtered(channel: Array, rate: float, highest: float) -> Array:
     """A channel (n,) without what is above a frequency [Hz]."""
     # every process that serves requests would hold 25 MB of it, and only logs are filtered
     from scipy.signal import butter, sosfiltfilt
@@ -46,7 +46,7 @@ def derivative(values: Array, rate: float) -> Array:
     """
     rates = np.empty_like(values)
     for k, channel in enumerate(values.T):
-        smooth = _filtered(channel, rate, _clean_cutoff(channel, rate))
+        smooth = filtered(channel, rate, _clean_cutoff(channel, rate))
         rates[:, k] = np.gradient(smooth, 1 / rate)
     return rates
 
@@ -56,7 +56,7 @@ def _clean_cutoff(channel: Array, rate: float) -> float:
     lowest = cutoff(rate)
     for highest in CUTOFFS:
         if lowest < highest <= rate / _LEAST_RATIO:
-            smooth = _filtered(channel, rate, highest)
+            smooth = filtered(channel, rate, highest)
             above = float(_ROBUST * np.median(np.abs(channel - smooth)))
             second = np.gradient(np.gradient(smooth, 1 / rate), 1 / rate)
             # of noise that is the same at all frequencies, what is below the cut-off, differentiated twice

@@ -23,6 +23,8 @@ _REGULAR = 1.8  # steps [median steps] up to which a step counts in the mean: no
 _UNIFORM = 1e-3  # deviation [steps] from the grid up to which rows are taken as they are
 _MOST_GROWTH = 2.0  # rows of the grid for each row of the log
 _LATEST = 1e12  # |time| [s]
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
+"""Units that times may have, in s."""
 _PIECE = 16384  # rows of the grid that a spline is evaluated at
 _BESIDE = 32  # rows of the log beside them: what is farther away changes a cubic spline by less than rounding
 
@@ -33,7 +35,7 @@ class Grid:
 
     `kept` are the indices of these rows in the log; `gaps` (k, 2) are rows of the grid: the last one before a gap and
     the first one behind it. `jitter` [s]: P5 and P95 of the steps' deviation from 1 / rate. `repeated` counts dropped
-    rows with the time of the row before. `uniform`: the rows are the grid's.
+    rows with the time of the row before. `uniform`: the rows are the grid's. `unit` is that of the times in the file.
     """
 
     time: Array
@@ -44,6 +46,7 @@ class Grid:
     jitter: tuple[float, float]
     repeated: int
     uniform: bool
+    unit: str = "s"
 
     def resampled(self, values: Array, smooth: bool = False) -> Array:
         """Channels (m, k) of the rows on the grid (n, k), linear in between, or if `smooth` by cubic splines."""
@@ -64,12 +67,11 @@ class Grid:
 
 
 def grid_of(t: Array, rows: Array, column: str) -> Grid:
-    """The grid for times t (m,) [s] in lines `rows` (m,) of a file, from its column `column`. Raises InvalidTable."""
-    if np.abs(t).max() > _LATEST:
-        at = int(np.abs(t).argmax())
-        raise InvalidTable(
-            f"{column} in line {rows[at]:.0f} is too large: give times in seconds.", int(rows[at]), column
-        )
+    """The grid for times t (m,) in lines `rows` (m,) of a file, from its column `column`. Raises InvalidTable.
+
+    They are in seconds, or in the unit that makes a rate of them that is read: no two units do.
+    """
+    t, unit = _seconds(t, rows, column)
     steps = np.diff(t)
     if (steps < 0).any():
         row = int(rows[int(np.argmax(steps < 0)) + 1])
@@ -118,4 +120,22 @@ def grid_of(t: Array, rows: Array, column: str) -> Grid:
         jitter=(float(low), float(high)),
         repeated=repeated,
         uniform=uniform,
+        unit=unit,
     )
+
+
+def _seconds(t: Array, rows: Array, column: str) -> tuple[Array, str]:
+    """Times t (m,) in seconds, and the unit that they are in by their median step. Raises InvalidTable."""
+    steps, unit = np.diff(t), "s"
+    steps = steps[steps > 0]
+    if steps.size:
+        rate = 1 / float(np.median(steps))
+        read = [name for name, size in TIME_UNITS.items() if LEAST_RATE * 0.99 <= rate / size <= MOST_RATE * 1.01]
+        unit = read[0] if read else "s"
+    t = t if unit == "s" else t * TIME_UNITS[unit]
+    if np.abs(t).max() > _LATEST:
+        at = int(np.abs(t).argmax())
+        raise InvalidTable(
+            f"{column} in line {rows[at]:.0f} is too large: give times in seconds.", int(rows[at]), column
+        )
+    return t, unit

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from optimizer.exceptions import InvalidTable
-from optimizer.identification.logs.columns import AT, Columns, Group
+from optimizer.identification.logs.columns import AT, Columns, Group, time_of
 
 _WORDS: Mapping[Group, str] = {
     "q": "position|pos|q",
@@ -16,7 +16,6 @@ _WORDS: Mapping[Group, str] = {
     "torque": "torque|tau",
     "current": "current|cur",
 }
-_TIMES = r"(?:.*/)?(?:__|%)?(?:time|timestamp|t|header[./]stamp)"
 _BETWEEN = "[^a-z0-9]+"
 
 
@@ -24,8 +23,8 @@ def by_joint_name(names: Sequence[str], joints: Sequence[str]) -> Columns | None
     """The columns of a header whose names hold those of the robot's `joints`, as `/joint_states/elbow_joint/position`
     or `elbow_joint_velocity`; None if they do not. Raises InvalidTable for a joint that is missing, or there twice."""
     found = {group: columns for group, word in _WORDS.items() if (columns := _of_word(names, word, joints))}
-    time = next((k for k, name in enumerate(names) if re.fullmatch(_TIMES, name)), None)
-    if "q" not in found or time is None:
+    time = time_of(names)
+    if "q" not in found or not time:
         return None
     return Columns("named", names, time, found)
 
@@ -56,7 +55,7 @@ def in_order_of_joints(columns: Columns, first: Sequence[str], joints: Sequence[
     """The columns in the order of the robot's `joints`, where the `first` row has their names, as a JointState does."""
     named: dict[int, str] = {}
     for k, name in enumerate(columns.names):
-        match = re.fullmatch(rf"(?:field\.)?name{AT}", name)
+        match = re.fullmatch(rf"(?:.*[./])?name{AT}", name)
         if match is not None and k < len(first):
             named[int(match[1])] = first[k].strip().strip('"').lower()
     logged = [named[number] for number in sorted(named)]

@@ -12,36 +12,38 @@ from typing import Any, Literal
 import numpy as np
 
 from models.robot import Array, Robot
-from optimizer.csv_table import SEPARATORS, header_of
-from optimizer.exceptions import InvalidProblem, InvalidTable
+from optimizer.exceptions import InvalidProblem
 from optimizer.identification.logs.channels import channels_of
-from optimizer.identification.logs.columns import Columns, Group, mapped, recognised
-from optimizer.identification.logs.effort import effort_report
-from optimizer.identification.logs.filters import derivative, noise
+from optimizer.identification.logs.columns import Columns, Group, mapped, other_positions, recognised
+from optimizer.identification.logs.effort import EffortReport, effort_report
+from optimizer.identification.logs.effort_checks import check_signs, effort_warnings, joint_efforts
+from optimizer.identification.logs.filters import noise
 from optimizer.identification.logs.grid import Grid, grid_of
+from optimizer.identification.logs.head import head_of
 from optimizer.identification.logs.joint_names import by_joint_name, in_order_of_joints
-from optimizer.identification.logs.lag import lag_of
+from optimizer.identification.logs.lag import lag_of, power_lag_of
 from optimizer.identification.logs.log import EffortMeaning, Log
 from optimizer.identification.logs.log_report import LogReport
-from optimizer.identification.logs.log_warnings import log_warnings
+from optimizer.identification.logs.log_warnings import held_warning, log_warnings, numbers_of_joints
+from optimizer.identification.logs.motion import Motion
 from optimizer.identification.logs.moves import cut, still_by_command, still_by_speed
-from optimizer.identification.logs.rows import LONGEST_LINE, MOST_BYTES, Rows, Source
-from optimizer.identification.logs.speeds import misfitting
+from optimizer.identification.logs.possible import check_coarse, check_leaps, check_radians, check_sizes, joined_turns
+from optimizer.identification.logs.rows import MOST_BYTES, Rows, Source
+from optimizer.identification.logs.speeds import speeds_of
+from optimizer.identification.logs.units import check_units, is_line_of_units, parted
 from optimizer.identification.logs.usable_effort import check_measured, usable
 from optimizer.problem.arm import Payload
 from optimizer.problem.arrays import frozen
-from optimizer.replay.recording import FAR_OUT, MOST_ACCELERATION, MOST_SPEED
 
 _OF_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
-_MOST_ANGLE = 20 * pi  # rad, ten turns
-_MOST: Mapping[Group, float] = {"v": MOST_SPEED, "commanded": MOST_SPEED, "a": MOST_ACCELERATION}
-_MOST_OF_OTHERS = 1e6  # any unit
 _EFFORTS: tuple[Group, ...] = ("current", "torque", "effort")
 _COMPARED = 20_000  # rows
 _ROUGHER = 4.0  # times as much noise of positions at their times as row by row: the times are wrong
 # channels that are differentiated twice, or compared, are kept in double precision; any other has fewer digits than
 # single precision, which takes half of the memory
 _PRECISE: tuple[Group, ...] = ("q", "payload")
+_OF_ONE: tuple[Group, ...] = ("commanded", "power")
+"""Groups of which one value of a row is kept."""
 
 
 @dataclass(frozen=True)
@@ -112,18 +114,13 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
     q = channels.take("q")
     assert q is not None
     logged = {group: channels.take(group) for group in ("v", "a", "commanded", "temperature")}
-    misfits = _misfits(q, logged["v"], columns, grid.rate)
-    v = logged["v"] if logged["v"] is not None else derivative(q, grid.rate)
-    a = logged["a"] if logged["a"] is not None else derivative(v, grid.rate)
+    v, a = speeds_of(q, logged["v"], logged["a"], columns, grid.rate, remarks)
+    motion = Motion(robot, payload, gravity, q, v, a, grid.rate)
     named = next((group for group in _EFFORTS if group in channels.values), None)
     effort, found = None, None
     if named is not None:
-        effort = channels.take(named)
-        assert effort is not None
-        check_measured(effort)
-        effort = _in_time(effort, lag_of(robot, payload, gravity, q, v, a, effort, grid.rate), grid.time, remarks)
-        found = usable(effort_report(robot, payload, gravity, q, v, a, effort), named, options.effort, remarks)
-    power = channels.take("power")
+        effort, found = _efforts(channels, named, motion, options, remarks)
+    power = _power(channels, motion, remarks)
     still = still_by_speed(v, grid.rate) if logged["commanded"] is None else still_by_command(logged["commanded"])
     log = Log(
         robot=robot.name,
@@ -133,7 +130,7 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
         a=a,
         effort=effort,
         effort_meaning=None if found is None else found.meaning,
-        power=None if power is None else power.prod(axis=1),
+        power=power,
         temperature=logged["temperature"],
         payload=payload,
         payload_known=payload_known,
@@ -143,19 +140,65 @@ def read(source: Path | bytes, robot: Robot, options: LogOptions) -> Reading:
         name=options.name,
         tags=tuple(options.tags),
     )
-    remarks += log_warnings(log, grid, columns, misfits)
+    remarks += log_warnings(log, grid, columns)
     return Reading(log, LogReport(rows, dropped, grid.jitter, channels_of(log, columns, named), found, tuple(remarks)))
 
 
-def _columns(
-    names: Sequence[str], first: Sequence[str], robot: Robot, options: LogOptions, remarks: list[str]
-) -> Columns:
+def _efforts(
+    channels: _Channels, named: Group, motion: Motion, options: LogOptions, remarks: list[str]
+) -> tuple[Array, EffortReport]:
+    """The efforts (n, joints) in the columns `named`, in time with the motion, and what they are.
+
+    Raises EffortNotUsable."""
+    effort = channels.take(named)
+    assert effort is not None
+    check_measured(effort)
+    remarks += held_warning("effort", effort, motion.v, motion.rate)
+    effort = _in_time("effort comes", effort, lag_of(motion, effort), channels.grid.time, remarks)
+    said, judged = effort_report(motion, effort), joint_efforts(motion, effort)
+    if said.meaning != "external" and options.effort != "external":
+        check_signs(judged, [channels.columns.names[k] for k in channels.columns.groups[named]])
+    found = usable(said, named, options.effort, remarks)
+    remarks += effort_warnings(motion.robot, judged, effort, found.meaning)
+    return effort, found
+
+
+def _power(channels: _Channels, motion: Motion, remarks: list[str]) -> Array | None:
+    """The power (n,), in time with the motion."""
+    power = channels.take("power")
+    if power is None:
+        return None
+    remarks += held_warning("power", power, motion.v, motion.rate)
+    return _in_time("power comes", power, power_lag_of(motion, power[:, 0]), channels.grid.time, remarks)[:, 0]
+
+
+def _columns(names: Sequence[str], first: Sequence[str], robot: Robot, options: LogOptions) -> Columns:
     """The columns that are read, by the header and the cells of the `first` row."""
     if options.columns is not None:
-        columns = mapped(names, options.columns, robot.nq)
-    else:
-        columns = by_joint_name(names, robot.joint_names) or recognised(names, robot.nq)
-        columns = in_order_of_joints(columns, first, robot.joint_names)
+        return mapped(names, options.columns, robot.nq)
+    bare, _ = parted(names)
+    columns = by_joint_name(bare, robot.joint_names) or recognised(bare, robot.nq)
+    return in_order_of_joints(columns, first, robot.joint_names)
+
+
+def _begun(rows: Rows, robot: Robot, options: LogOptions, scales: Mapping[Group, float], remarks: list[str]) -> Columns:
+    """The columns that are read; `rows` are then those of numbers, with a line of units below the header left out."""
+    names = rows.head.names
+    first, row = rows.first()
+    units = first if is_line_of_units(first) else []
+    if units:
+        rows.skip()
+        remarks.append(f"Line {row} has no number, and is taken for units.")
+        first, _ = rows.first()
+    columns = _columns(names, first, robot, options)
+    check_units(columns, parted(names)[1], row - 1, scales)
+    check_units(columns, units, row, scales)
+    other = None if options.columns is not None else other_positions(parted(names)[0], columns)
+    if other is not None:
+        remarks.append(
+            f"The header has positions of two kinds: those like {columns.names[columns.groups['q'][0]]} are read, and "
+            f"those like {other} are not. Name the columns in `columns` if that is wrong."
+        )
     if len(first) < len(names):
         return columns
     columns, gone = columns.without(first)
@@ -165,57 +208,66 @@ def _columns(
 
 def _channels(source: Path | bytes, robot: Robot, options: LogOptions, remarks: list[str]) -> tuple[_Channels, int]:
     """The channels of the file, in SI units, and the number of dropped lines."""
+    scales: dict[Group, float] = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
+    scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
     with Source(source, options.most_bytes) as file:
-        names, separator = header_of(file, LONGEST_LINE, SEPARATORS + " ")
-        rows = Rows(file, names, separator, ())
-        columns = _columns(names, rows.first(), robot, options, remarks)
+        rows = Rows(file, head_of(file, robot.joint_names), ())
+        columns = _begun(rows, robot, options, scales, remarks)
+        names = columns.names
         used = rows.used = columns.used
         where = {group: [used.index(k) for k in indices] for group, indices in columns.groups.items()}
-        scales: dict[Group, float] = dict.fromkeys(_OF_ANGLES, pi / 180 if options.units == "deg" else 1.0)
-        scales["current"] = 1e-3 if options.current_units == "mA" else 1.0
         # arrays that grow in place: a log can fill half of the memory
         parts = {group: array("d" if group in _PRECISE else "f") for group in where}
         times, numbers = array("d"), array("i")
         for lines, block in rows.blocks():
-            times.frombytes(block[:, used.index(columns.time)].tobytes())
+            times.frombytes(_seconds(block[:, [used.index(k) for k in columns.time]]).tobytes())
             numbers.frombytes(lines.astype(np.int32).tobytes())
-            _check_sizes(block, lines, rows, where, scales)
+            check_sizes(block, lines, names, used, where, scales)
             for group, part in parts.items():
-                values = block[:, where[group]] * scales.get(group, 1.0)
+                values = _packed(group, block[:, where[group]] * scales.get(group, 1.0), part)
                 part.frombytes(values.astype(part.typecode).tobytes())
-            _check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
-    grid = grid_of(np.frombuffer(times), np.frombuffer(numbers, np.int32), names[columns.time])
+            check_radians(block[:, where["q"]] * scales["q"], lines, robot, [names[k] for k in columns.groups["q"]])
+    grid = grid_of(np.frombuffer(times), np.frombuffer(numbers, np.int32), names[columns.time[0]])
     channels = {
-        group: np.frombuffer(part, part.typecode).reshape(-1, len(where[group])) for group, part in parts.items()
+        group: np.frombuffer(part, part.typecode).reshape(-1, 1 if group in _OF_ONE else len(where[group]))
+        for group, part in parts.items()
     }
+    _set_right(channels, grid, np.frombuffer(numbers, np.int32), robot, columns, remarks)
     return _Channels(grid, columns, channels), rows.dropped
 
 
-def _check_sizes(
-    block: Array, lines: Array, rows: Rows, where: Mapping[Group, Sequence[int]], scales: Mapping[Group, float]
+def _set_right(
+    channels: dict[Group, Array], grid: Grid, lines: Array, robot: Robot, columns: Columns, remarks: list[str]
 ) -> None:
-    """Raises InvalidTable for a number that no arm has: it would spoil everything that is computed."""
-    for group, indices in where.items():
-        wrong = np.argwhere(np.abs(block[:, indices]) * scales.get(group, 1.0) > _MOST.get(group, _MOST_OF_OTHERS))
-        if len(wrong):
-            at, column = wrong[0].tolist()
-            row, name = int(lines[at]), rows.columns[rows.used[indices[column]]]
-            raise InvalidTable(f"{name} in line {row} is too large to be a robot's: correct or delete it.", row, name)
-
-
-def _check_radians(q: Array, rows: Array, robot: Robot, names: Sequence[str]) -> None:
-    """Raises InvalidTable if q (n, joints), in lines `rows` (n,), is rather in degrees: far beyond the range of two
-    joints, or by many turns beyond that of one, as the last joint of some arms turns without end."""
-    ratios = np.abs(q) / np.maximum(np.abs(robot.limits.q_min), np.abs(robot.limits.q_max))
-    wrong = ((ratios > FAR_OUT).sum(axis=1) > 1) | (np.abs(q) > _MOST_ANGLE).any(axis=1)
-    if wrong.any():
-        at = int(np.argmax(wrong))
-        row, name = int(rows[at]), names[int(ratios[at].argmax())]
-        raise InvalidTable(
-            f"{name} in line {row} is far beyond the joint's range and looks like degrees: give radians, or units=deg.",
-            row,
-            name,
+    """Takes whole turns out of the positions. Raises InvalidTable for those that no arm has."""
+    q, lines = channels["q"], lines[grid.kept] if grid.repeated else lines
+    if grid.repeated:
+        check_coarse(q, grid, columns.names[columns.time[0]])
+    channels["q"], turned = joined_turns(q, robot)
+    if turned:
+        remarks.append(
+            f"The positions of joints {numbers_of_joints(turned)} leap by whole turns, and are taken without the leaps."
         )
+    q = channels["q"][grid.kept] if grid.repeated else channels["q"]
+    check_leaps(q, grid, lines, robot, [columns.names[k] for k in columns.groups["q"]])
+
+
+def _packed(group: Group, values: Array, before: array[float]) -> Array:
+    """What is kept of the values (n, k) of a group behind those that are kept already: a log can fill half of the
+    memory. Of commanded speeds the greatest one, of voltage and current their product, of the payload its changes."""
+    if group == "commanded":
+        return np.asarray(np.abs(values).max(axis=1))
+    if group == "power":
+        return np.asarray(values.prod(axis=1))
+    if group == "payload":
+        first = np.array(before[: values.shape[1]]) if before else values[0]
+        return np.vstack([values[: not before], values[(values != first).any(axis=1)]])
+    return values
+
+
+def _seconds(stamps: Array) -> Array:
+    """Times (n,) of one column (n, 1), or of seconds and nanoseconds (n, 2)."""
+    return np.ascontiguousarray(stamps[:, 0]) if stamps.shape[1] == 1 else stamps @ [1.0, 1e-9]
 
 
 def _trust_rows(channels: _Channels, remarks: list[str]) -> None:
@@ -234,23 +286,18 @@ def _trust_rows(channels: _Channels, remarks: list[str]) -> None:
         )
 
 
-def _misfits(q: Array, v: Array | None, columns: Columns, rate: float) -> list[int]:
-    """The joints whose logged speeds are not those of their positions."""
-    return [] if v is None else misfitting(q, v, rate, [columns.names[k] for k in columns.groups["v"]])
-
-
-def _in_time(effort: Array, lag: float, time: Array, remarks: list[str]) -> Array:
-    """Efforts (n, joints) without their lag [s]."""
+def _in_time(what: str, values: Array, lag: float, time: Array, remarks: list[str]) -> Array:
+    """Channels (n, k) without their lag [s]; `what` says which."""
     if lag == 0:
-        return effort
+        return values
     late = "later" if lag > 0 else "earlier"
     remarks.append(
-        f"The efforts come {1e3 * abs(lag):.0f} ms {late} than the motion that makes them, and are taken as so much "
+        f"The {what} {1e3 * abs(lag):.0f} ms {late} than the motion that makes it, and is taken as so much "
         f"{'earlier' if lag > 0 else 'later'}: log both with the clock of the controller."
     )
-    shifted = np.empty_like(effort)
-    for joint, channel in enumerate(effort.T):
-        shifted[:, joint] = np.interp(time + lag, time, channel)
+    shifted = np.empty_like(values)
+    for k, channel in enumerate(values.T):
+        shifted[:, k] = np.interp(time + lag, time, channel)
     return shifted
 
 

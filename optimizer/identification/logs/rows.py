@@ -14,13 +14,12 @@ from zlib import error as ZlibError
 import numpy as np
 
 from models.robot import Array
-from optimizer.csv_table import FIRST_ROW, line_of, numbers_of, with_points, wrong_length
+from optimizer.csv_table import line_of, names_of, numbers_of, with_points, wrong_length
 from optimizer.exceptions import InvalidTable
+from optimizer.identification.logs.head import LONGEST_LINE, Head, is_comment
 from optimizer.identification.logs.log_errors import LogTooLarge
 from optimizer.replay.recording import BLOCK, MOST_ROWS
 
-LONGEST_LINE = 16384
-"""Most bytes of a line: a full RTDE record has nearly 200 columns."""
 MOST_BYTES = 1 << 30
 """Most bytes of a log after unpacking, if the caller does not allow fewer."""
 MOST_DROPPED = 0.1
@@ -59,62 +58,90 @@ class Source:
 
 @dataclass
 class Rows:
-    """The rows of a file after its header: `blocks` yields (line numbers, values (k, used)).
+    """The rows of a file below its head: `blocks` yields (line numbers, values (k, used)).
 
-    `dropped` counts, while the blocks are read, lines with too few or too many cells.
+    `dropped` counts, while the blocks are read, lines with too few or too many cells. Comments and repetitions of the
+    header are no rows.
     """
 
     file: Source
-    columns: list[str]
-    separator: str
+    head: Head
     used: Sequence[int]
     dropped: int = 0
     _first_dropped: InvalidTable | None = None
-    _first: str | None = None
 
-    def first(self) -> list[str]:
-        """The cells of the first row; fewer if the line is short."""
-        self._first = line_of(self.file, FIRST_ROW, LONGEST_LINE)
-        stripped = self._first.strip() if self.separator == " " else self._first.rstrip("\r\n")
-        return stripped.split(self.separator)
+    def __post_init__(self) -> None:
+        self._row, self._pushed = self.head.row, self.head.first
+
+    def first(self) -> tuple[list[str], int]:
+        """The cells of the next row, which is read again by whatever comes next, and its line."""
+        row, line = next(self._lines(), (self._row, ""))
+        self._push(row, line)
+        return self._stripped(line).split(self.head.separator), row
+
+    def skip(self) -> None:
+        """Leaves out the row that `first` has shown."""
+        self._pushed = None
+        self._row += 1
 
     def blocks(self) -> Iterator[tuple[Array, Array]]:
         """Blocks of rows. Raises InvalidTable or LogTooLarge."""
-        row, kept = FIRST_ROW, 0
-        while lines := [*islice(self._lines(row), BLOCK)]:
-            rows = range(row, row + len(lines))
-            row += len(lines)
-            if row - FIRST_ROW > MOST_ROWS:
+        kept = 0
+        while found := [*islice(self._lines(), BLOCK)]:
+            good, numbers = self._of_right_length(found)
+            kept += len(good)
+            if kept + self.dropped > MOST_ROWS:
                 raise LogTooLarge(MOST_ROWS, "rows")
-            good, numbers = self._of_right_length(lines, rows)
             if good:
-                kept += len(good)
-                points = good if self.separator == "," else [*with_points(good, numbers[0])]
-                yield np.array(numbers), numbers_of(points, numbers, self.columns, self.separator, self.used)
+                points = good if self.head.separator == "," else [*with_points(good, numbers[0])]
+                values = numbers_of(points, numbers, self.head.names, self.head.separator, self.used)
+                yield np.array(numbers), values
         if self.dropped > MOST_DROPPED * (kept + self.dropped) and self._first_dropped is not None:
             raise self._first_dropped
         if kept < 2:
             raise InvalidTable("The file has fewer than two rows of numbers: a log needs more.")
 
-    def _lines(self, row: int) -> Iterator[str]:
-        if self._first:
-            first, self._first = self._first, None
-            yield first
-            row += 1
-        while line := line_of(self.file, row, LONGEST_LINE):
-            yield line
-            row += 1
+    def _push(self, row: int, line: str) -> None:
+        self._row, self._pushed = row, line or None
 
-    def _of_right_length(self, lines: list[str], rows: range) -> tuple[list[str], list[int]]:
-        good, numbers = [], []
-        for row, line in zip(rows, lines, strict=True):
-            stripped = line.strip() if self.separator == " " else line.rstrip("\r\n")
-            cells = stripped.count(self.separator) + 1
-            if cells == len(self.columns):
-                good.append(line)
+    def _lines(self) -> Iterator[tuple[int, str]]:
+        """The lines that are rows, with their numbers."""
+        while line := self._next_line():
+            self._row += 1
+            if line.strip() and not is_comment(line):
+                yield self._row - 1, line
+
+    def _next_line(self) -> str:
+        if self._pushed is None:
+            return line_of(self.file, self._row, LONGEST_LINE)
+        line, self._pushed = self._pushed, None
+        return line
+
+    def _stripped(self, line: str) -> str:
+        return " ".join(line.split()) if self.head.separator == " " else line.rstrip("\r\n")
+
+    def _of_right_length(self, found: list[tuple[int, str]]) -> tuple[list[str], list[int]]:
+        good, numbers, separator, width = [], [], self.head.separator, len(self.head.names)
+        for row, line in found:
+            stripped = self._stripped(line)
+            cells = stripped.count(separator) + 1
+            while cells > width and stripped.endswith(separator):
+                stripped, cells = stripped.removesuffix(separator), cells - 1
+            if cells == width:
+                if self._is_header(stripped):
+                    continue
+                good.append(stripped)
                 numbers.append(row)
-            elif stripped.strip():  # an empty line is no row
+            else:
                 self.dropped += 1
                 if self._first_dropped is None:
-                    self._first_dropped = wrong_length(line, row, cells, len(self.columns), self.separator)
+                    self._first_dropped = wrong_length(line, row, cells, width, separator)
         return good, numbers
+
+    def _is_header(self, line: str) -> bool:
+        """Whether a line is the header again, as where files were joined."""
+        begin = line[:1].strip("\"'")
+        return bool(begin) and not begin.isdigit() and begin not in "+-. " and self._same_names(line)
+
+    def _same_names(self, line: str) -> bool:
+        return names_of(line, self.head.separator)[0] == self.head.names

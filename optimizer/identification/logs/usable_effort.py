@@ -13,8 +13,9 @@ from optimizer.identification.logs.log import EffortMeaning
 from optimizer.identification.logs.log_errors import EffortNotUsable
 
 OTHERWISE = (
-    "Otherwise the joints are in another order than the robot's, from base to flange (name the columns in `columns`), "
-    "or `units`, `current_units`, `payload` or `gravity` are not as given."
+    "Otherwise the log is of another robot, a column never changes, the joints are in another order than the robot's, "
+    "from base to flange (name the columns in `columns`), or `units`, `current_units`, `payload` or `gravity` are not "
+    "as given."
 )
 """What else makes efforts that do not fit the arm."""
 _NAMED: dict[Group, EffortMeaning] = {"current": "current", "torque": "torque"}

@@ -1,4 +1,8 @@
-"""Which figure to measure better: the one whose error has the largest share of the energy's variance.
+"""Which figure to measure better: the one that would take the largest share of the energy's variance away.
+
+If a figure were known, the variance would fall by the square of its correlation with the energy. Errors of figures make
+up for each other: a figure's own term of the variance can be larger than the whole, and tells less.
+
 
 The standard deviation of a figure falls with the square root of the time in motion (Verdonck 2004, Radkhah 2007: what a
 log tells of a figure depends on how it excites it). To halve it takes four times the moves.
@@ -35,18 +39,19 @@ def advice_of(fitted: Fitted, rows: Rows) -> Advice | None:
     """The figure to measure, for motions like those of the logs; None without power figures to weigh them by."""
     names, covariance = fitted.estimate.names, fitted.estimate.covariance
     known = [k for k, (name, _) in enumerate(names) if name in _DO]
-    gradient = np.array([_slope(fitted.arm, rows, *names[k]) for k in known])
+    gradient = np.array([slope(fitted.arm, rows, *names[k]) for k in known])
     part = covariance[np.ix_(known, known)]
-    total = float(gradient @ part @ gradient)
+    together, total = part @ gradient, float(gradient @ part @ gradient)
     if not np.isfinite(total) or total <= 0:
         return None
-    shares = gradient * (part @ gradient) / total
+    own = np.diag(part)
+    shares = np.where(own > 0, together**2 / np.where(own > 0, own * total, 1.0), 0.0)
     worst = int(np.argmax(shares))
     name, joint = names[known[worst]]
     return Advice(name, joint, float(shares[worst]), _DO[name])
 
 
-def _slope(arm: FittedArm, rows: Rows, name: str, joint: int | None) -> float:
+def slope(arm: FittedArm, rows: Rows, name: str, joint: int | None) -> float:
     """Derivative of the energy [J] of the rows by a figure."""
     return (_energy(_changed(arm, name, joint, STEP), rows) - _energy(arm, rows)) / STEP
 

@@ -259,12 +259,6 @@ def broken(recording: Recording) -> dict[str, Case]:
         "no time": (b"\n".join(line.partition(b",")[2] for line in lines), "no column `t`", 1, "t"),
         "back": (b"\n".join([*lines[:50], *lines[20:]]), "goes back in line 51", 51, "t"),
         "all at once": (b"\n".join([lines[0], *[lines[1]] * 200]), "repeats itself", None, "t"),
-        "milliseconds": (
-            b"\n".join([lines[0], *(b"%d,%s" % (8 * k, line.partition(b",")[2]) for k, line in enumerate(lines[1:]))]),
-            "rows per second",
-            None,
-            "t",
-        ),
         "one row": (b"\n".join(lines[:2]), "fewer than two rows", None, None),
         "few rows": (b"\n".join(lines[:12]), "it needs 32", None, None),
         "header only": (lines[0], "fewer than two rows", None, None),

@@ -42,7 +42,7 @@ def table(names: list[str], *columns: Array) -> bytes:
 @pytest.mark.parametrize("lag", [0.05, -0.1])
 def test_efforts_of_another_clock_are_set_right(recording: Recording, lag: float) -> None:
     reading = read(csv_of(later(recording, lag)), ROBOT, LogOptions())
-    (found,) = [match for each in reading.report.warnings if (match := re.search(r"come (\d+) ms (\w+) than", each))]
+    (found,) = [match for each in reading.report.warnings if (match := re.search(r"comes (\d+) ms (\w+) than", each))]
     assert abs(int(found[1]) - 1e3 * abs(lag)) <= 3 and found[2] == ("later" if lag > 0 else "earlier")
     assert reading.log.effort is not None
     middle = slice(30, -30)

@@ -1,0 +1,34 @@
+"""The motion of a log, which its efforts and its power are compared with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+from models.robot import Array, Robot
+from optimizer.collision.bodies import Indices
+from optimizer.energy.link_regressor import rigid_torques
+from optimizer.problem.arm import Payload
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """q, v, a (n, joints) [rad, s] of an arm with a payload, under `gravity` (3,) [m/s²], at a rate [Hz]."""
+
+    robot: Robot
+    payload: Payload
+    gravity: Array
+    q: Array
+    v: Array
+    a: Array
+    rate: float
+
+    def at(self, rows: Indices) -> Self:
+        """The motion at some rows, in double precision."""
+        return replace(self, q=self.q[rows].astype(float), v=self.v[rows].astype(float), a=self.a[rows].astype(float))
+
+    def rigid_torques(self) -> Array:
+        """Torques (n, joints) [N·m] of links and payload."""
+        payload = self.payload
+        model = self.robot.loaded_model(payload.mass, payload.com, payload.inertia, self.gravity)
+        return rigid_torques(model, self.q, self.v, self.a)

@@ -1,0 +1,58 @@
+"""Units that a log names, in its header as `q1 [deg]` or in a line below it: they must be those that it is read in."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+
+from optimizer.exceptions import InvalidTable
+from optimizer.identification.logs.columns import Columns, Group
+from optimizer.identification.logs.head import number
+
+_IN_NAME = re.compile(r"(.*\S)\s*[\[(]([^\[\]()]*[^\[\]()0-9\s][^\[\]()]*)[\])]")
+_BEGINS = re.compile(r"[-+]?[.,]?[0-9]")  # of what is rather a number, or several
+_ANGLES: tuple[Group, ...] = ("q", "v", "a", "commanded")
+
+
+def _unit(pattern: str) -> re.Pattern[str]:
+    return re.compile(rf"\W*(?:{pattern})\W*", re.IGNORECASE)
+
+
+_DEGREES, _RADIANS = _unit(r"(?:deg|degrees?|°|º)(?:\W.*|s|s\^?2)?"), _unit(r"(?:rad|radians?)(?:\W.*|s|s\^?2)?")
+_OTHER_UNITS: tuple[tuple[tuple[Group, ...], re.Pattern[str], re.Pattern[str], str, str], ...] = (
+    (_ANGLES, _DEGREES, _RADIANS, "units=deg", "units=rad"),
+    (("current",), _unit(r"ma|milliamp\w*"), _unit(r"a|amps?|amperes?"), "current_units=mA", "current_units=A"),
+    (("power",), _unit("[km]w"), _unit("w"), "W", "W"),
+    (("torque", "effort"), _unit(r"[km]n\W?m|n\W?mm"), _unit(r"n\W?m"), "N·m", "N·m"),
+)
+"""Of groups: units that are not SI, the SI unit, and what to give where the one or the other is not read as it is."""
+
+
+def parted(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Names of columns without the units behind them, in brackets, and these units; empty where there are none."""
+    found = [_IN_NAME.fullmatch(name) for name in names]
+    return (
+        [name if match is None else match[1] for name, match in zip(names, found, strict=True)],
+        ["" if match is None else match[2] for match in found],
+    )
+
+
+def is_line_of_units(cells: Sequence[str]) -> bool:
+    """Whether a line below the header has words alone, which are units then."""
+    said = [cell.strip().strip("\"'").lower() for cell in cells]
+    words = any(cell not in ("", "nan", "none", "null") for cell in said)
+    return words and not any(_BEGINS.match(cell) or number(cell) for cell in said)
+
+
+def check_units(columns: Columns, said: Sequence[str], row: int, scales: Mapping[Group, float]) -> None:
+    """Raises InvalidTable where units (one per column of the file, of line `row`) are not those that the columns are
+    read in: SI units, apart from the groups that `scales` turns into them."""
+    for groups, other, si, of_other, of_si in _OTHER_UNITS:
+        for group in groups:
+            alien, remedy = (other, of_other) if scales.get(group, 1.0) == 1.0 else (si, of_si)
+            for k in columns.groups.get(group, ()):
+                if k < len(said) and alien.fullmatch(said[k].strip()):
+                    name = columns.names[k]
+                    raise InvalidTable(
+                        f"{name} is in another unit by line {row} than it is read in: give {remedy}.", row, name
+                    )
