@@ -1,4 +1,4 @@
-"""All benchmarks in one run of about a quarter of an hour on two cores; writes benchmarks/RESULTS.md with a plot.
+"""All benchmarks in one run of about twenty minutes on two cores; writes benchmarks/RESULTS.md with a plot.
 
     make bench                                all sections
     make bench BENCH_ARGS="--fraction 0.1"    a tenth of the tasks, to test the benchmarks
@@ -37,6 +37,7 @@ SECTIONS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "scenes": ("scenes", (), 300),
     "starts": ("starts", (), 0),
     "success": ("requests", ("--clients", "2", "--line-every", "20", "--seed", "3"), 1000),
+    "tight": ("requests", ("--kind", "joint to pose", "--line-every", "0", "--bound", "tight"), 100),
     "arms": ("arms", (), 10),
     "quality": ("quality", (), 100),
     "simulation": ("simulation", (), 200),

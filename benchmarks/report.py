@@ -71,13 +71,16 @@ def _spreads(results: dict[str, Results | None]) -> Iterator[list[str]]:
         for kind, wall in scenes["wall"].items():
             yield _spread(f"among obstacles, {kind}", "time [ms]", wall, MS, 0)
         yield _spread("among obstacles", "obstacles", scenes["obstacles"], 1, 0)
-    for section, clients in (("http", "one client"), ("success", "two clients")):
+    for section, how in (("http", "one client"), ("success", "two clients"), ("tight", "tight bound")):
         for kind, wall in (results.get(section) or {"wall": {}})["wall"].items():
             if wall["count"]:
-                yield _spread(f"request, {kind}, {clients}", "time [ms]", wall, MS, 0)
-    if success := results.get("success"):
-        for kind, gap in success["gaps"].items():
-            yield _spread(f"random feasible requests, {kind}", "gap, 1 - lower bound / energy [%]", gap, PERCENT)
+                yield _spread(f"request, {kind}, {how}", "time [ms]", wall, MS, 0)
+    for section, what in (("success", ""), ("tight", ", tight bound")):
+        for kind, gap in (results.get(section) or {"gaps": {}})["gaps"].items():
+            if gap["count"]:
+                yield _spread(
+                    f"random feasible requests, {kind}{what}", "gap, 1 - lower bound / energy [%]", gap, PERCENT
+                )
     if starts := results.get("starts"):
         cold = starts["cold"]
         yield _spread("requests while the kernel compiles", "time [ms]", cold["wall_meanwhile"], MS, 0)
@@ -117,7 +120,7 @@ def _notes(results: dict[str, Results | None]) -> str:
                 f"Empty cache: the kernel is compiled {compiled:.1f} s after the start. "
                 f"{cold['answered_meanwhile']} requests are answered until then."
             )
-    for section in ("http", "success"):
+    for section in ("http", "success", "tight"):
         found = results.get(section) or {"refused": [], "errors": []}
         lines += [f"Answered with a problem: {each}." for each in found["refused"]]
         lines += [f"Error: {each}." for each in found["errors"]]
