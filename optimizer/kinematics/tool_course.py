@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -15,9 +14,8 @@ from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.course_shapes import Shape, shape_of
 from optimizer.kinematics.orientation_tolerance import nearest_orientation
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.targets import Side
 from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
-
-Side = Literal["start", "goal"]
 
 # poses of the course that a motion is compared with, on each piece of its shape at least, and the way between two [m]
 # at most

@@ -22,9 +22,9 @@ from optimizer.energy.losses import power_flow
 from optimizer.kinematics import newton
 from optimizer.kinematics.course_tracing import Trace, chain_of, joint_path, traces, turned_start, within
 from optimizer.kinematics.tcp import flange_pose
-from optimizer.kinematics.tool_course import Side
 from optimizer.kinematics.turning_sheet import REACHED, TurningSheet, turning_of, turning_through, values_of
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.targets import Side
 from optimizer.trajectories.quadrature import simpson_weights
 from optimizer.trajectories.spline import Spline
 

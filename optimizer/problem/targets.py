@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
@@ -14,6 +15,7 @@ from optimizer.problem.pose import Pose
 # targets of one `AnyOf`
 MOST_TARGETS = 64
 
+Side = Literal["start", "goal"]
 Single = Array | Pose | ConeOrientedPose
 
 

@@ -15,9 +15,9 @@ from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.methods.method import SolveResult
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.targets import AnyOf
+from optimizer.problem.targets import AnyOf, Side
 from optimizer.search.end_feasibility import check_configurations, raise_if_none_is_left
-from optimizer.search.ends import SIDES, EndConfiguration, Side
+from optimizer.search.ends import SIDES, EndConfiguration
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.search.mechanical_bound import mechanical_bounds
 from optimizer.search.passing import bound_through

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -20,10 +19,9 @@ from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
-from optimizer.problem.targets import AnyOf, Single, Target
+from optimizer.problem.targets import AnyOf, Side, Single, Target
 from optimizer.solution import UnreachableTarget
 
-Side = Literal["start", "goal"]
 SIDES: tuple[Side, ...] = ("start", "goal")
 # orientations sampled of a pose that leaves it free, and of each of several such poses at least
 SAMPLES, LEAST_SAMPLES = 96, 12

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
-from optimizer.problem.targets import Target, members
+from optimizer.problem.targets import Side, Target, members
 from optimizer.search.box_search import FEW, TIGHT_ROUNDS
 from optimizer.search.candidates import Candidate
 from optimizer.search.free_goal_bound import family_bound
@@ -57,9 +56,7 @@ def bound_of_others(prepared: PreparedProblem, candidates: Sequence[Candidate], 
     return min(family_bound(prepared, pose, boxes, rounds, deadline, half, given=curves.given) for pose in poses)
 
 
-def _covered(
-    prepared: PreparedProblem, candidates: Sequence[Candidate], name: Literal["start", "goal"]
-) -> EndCurves | None:
+def _covered(prepared: PreparedProblem, candidates: Sequence[Candidate], name: Side) -> EndCurves | None:
     """Joint positions that are given at one end, and all that reaches its poses; None of an arm whose poses are not
     covered. Poses of free orientation are left to `free_goal_bound`."""
     arm, curves = prepared.arm, dict[int, Array | CoveringSheet]()

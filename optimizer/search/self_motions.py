@@ -13,9 +13,10 @@ import numpy as np
 
 from optimizer.kinematics.angles import nearest_turn
 from optimizer.methods.free_spline import FreeSpline
+from optimizer.problem.targets import Side
 from optimizer.search.attempts import settled, solve
 from optimizer.search.candidates import Candidate
-from optimizer.search.ends import MEMBERS, Side
+from optimizer.search.ends import MEMBERS
 from optimizer.search.free_goal import REFINED, refine_goal
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sampled_ends import nearest_configuration, refine_best, with_ends

@@ -15,8 +15,9 @@ from optimizer.methods import method_of
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import Method
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.targets import Side
 from optimizer.search.candidates import Candidate
-from optimizer.search.ends import EndConfiguration, Side
+from optimizer.search.ends import EndConfiguration
 from optimizer.search.sampled_ends import with_ends
 from optimizer.trajectories.spline import Spline
 
