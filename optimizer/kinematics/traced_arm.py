@@ -64,6 +64,9 @@ class TracedArm:
             curves = self.self_motions(self._chain.flange(q[None])[0])
         except SingularPose:
             return NumberedBranch(1)
+        for number, each in enumerate(curves, start=1):
+            if each.passes(q):
+                return NumberedBranch(number)
         away = [float(np.abs(wrapped(each.at(np.array([each.parameter(q)]))[0] - q)).max()) for each in curves]
         return NumberedBranch(int(np.argmin(away)) + 1 if away else 1)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,8 @@ from optimizer.kinematics.traced_curve import TracedCurve
 
 # parts of each piece between whose ends a curve is held against limits, and steps that find where it crosses them
 PARTS, CROSSINGS = 4, 16
+# steps of the curve itself from where its cubics cross, and the difference of shares for their slope
+FROM_CUBICS, STEP = 5, 1e-5
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
 
@@ -98,14 +100,32 @@ def _crossings(
 ) -> Array:
     """Shares (n,) of pieces k (n,) at which they cross limits, between those given (2, n); `inside` (n,): at the first
     of these they are in. `curve` is any one of the pose."""
+    # what is aimed at is inside, by half of what rounding is given
+
+    def nearly(share: Array) -> Array:
+        return _excess(pieces.at(k, share), q_min, q_max) + ROUNDING / 2
 
     def beyond(share: Array) -> Array:
-        # what is aimed at is inside, by half of what rounding is given
         return _excess(curve.onto(pieces.at(k, share)), q_min, q_max) + ROUNDING / 2
 
+    # the cubics cross limits next to where the curve does, at nearly the same rate
+    at = _zeros(nearly, share, inside)
+    slope = (nearly(at + STEP) - nearly(at - STEP)) / (2 * STEP)
+    for _ in range(FROM_CUBICS):
+        f = beyond(at)
+        exact = np.abs(f) < ROUNDING / 2
+        if exact.all():
+            return at
+        at = np.where(exact, at, np.clip(at - f / np.where(slope == 0, 1.0, slope), *share))
+    return np.where(exact, at, _zeros(beyond, share, inside))
+
+
+def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Array:
+    """Where a function of shares (n,) is zero, to ROUNDING, between those given (2, n); inside, if that is not found.
+    `inside` (n,): whether it is negative at the first of them."""
     low, high = share
     f_low, f_high = beyond(low), beyond(high)
-    found = np.full(len(k), np.nan)
+    found = np.full(len(low), np.nan)
     for _ in range(CROSSINGS):
         # regula falsi after Illinois: the end that stays counts half
         span = np.where(f_high == f_low, 1.0, f_high - f_low)
