@@ -15,6 +15,7 @@ from optimizer.problem.work_round import WorkRound
 from optimizer.progress import Improved, Tell, forward, nobody, only_improved
 from optimizer.sequence.against_stopping import SHARE, Rested, Wait, as_passed, start_from, stopping_baselines
 from optimizer.sequence.divided_paths import with_divided_paths
+from optimizer.sequence.free_path_ends import with_free_ends
 from optimizer.sequence.layers import Layer
 from optimizer.sequence.order_search import OrderSearch
 from optimizer.sequence.passing_leg import passes_of
@@ -50,13 +51,17 @@ def optimize_round(asked: WorkRound, clock: Clock = time.perf_counter, tell: Tel
     with one_thread():
         began, tell = clock(), forward(tell)
         asked = _divided(asked, clock)
-        if asked.arm.bus.mode == "storage":
-            # energies on the buses on which it is looked for are not those of the round
-            found = with_storage(asked, lambda other: _optimized(other, clock, nobody), clock)
-        else:
-            found = _optimized(asked, clock, tell)
+        found = with_free_ends(asked, lambda other: _valued(other, clock, tell), clock)
         _tell_found(tell, found)
         return replace(found, wall_time=clock() - began)
+
+
+def _valued(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:
+    """The round of least energy on its bus."""
+    if asked.arm.bus.mode == "storage":
+        # energies on the buses on which it is looked for are not those of the round
+        return with_storage(asked, lambda other: _optimized(other, clock, nobody), clock)
+    return _optimized(asked, clock, tell)
 
 
 def _optimized(asked: WorkRound, clock: Clock, tell: Tell) -> RoundSolution:

@@ -9,8 +9,8 @@ import numpy as np
 
 from app.convert.arm import to_arm, to_limits, to_payload
 from app.convert.fields import fields
-from app.convert.pose import to_base, to_base_pose
-from app.convert.request import to_branch, to_target, to_tool_path
+from app.convert.pose import to_base
+from app.convert.request import to_branch, to_target, to_target_pose, to_tool_path
 from app.convert.solution import energy_fields, optimality_gap
 from app.convert.warnings import DIVIDED, MISSED, NO_DEFAULT_MOTION, certified_warnings
 from app.schemas import cycle as asked
@@ -94,7 +94,7 @@ def _to_stop(k: int, stop: StopRequest, robot: Robot) -> Stop:
 def _target(stop: StopRequest, robot: Robot) -> Target:
     """The target of a stop: where its path starts, if it has one."""
     if stop.path is not None:
-        return to_base_pose(stop.path.points[0], robot)
+        return to_target_pose(stop.path.points[0], robot)
     assert stop.target is not None
     return to_target(stop.target, robot)
 
@@ -103,8 +103,8 @@ def _to_path(k: int, path: StopPathRequest | None, robot: Robot) -> StopPath | N
     if path is None:
         return None
     try:
-        way = to_tool_path(path, path.points[1:-1], robot)
-        return StopPath(goal=to_base_pose(path.points[-1], robot), path=way, speed=path.bounds.limit, split=path.split)
+        way, goal = to_tool_path(path, robot), to_target_pose(path.points[-1], robot)
+        return StopPath(goal=goal, path=way, speed=path.bounds.limit, split=path.split)
     except InvalidProblem as error:
         raise at_stop(k, error) from None
 

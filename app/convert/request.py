@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from app.convert.arm import to_arm
 from app.convert.pose import to_base, to_base_pose, to_pose
 from app.schemas import request as asked
-from app.schemas.common import BasePose
 from app.schemas.orientation import ConeOrientedPose as ConeOrientedPoseSchema
-from app.schemas.orientation import InCone
+from app.schemas.orientation import InCone, TargetPose
 from app.schemas.path import Path, StopPath
 from models.robot import Array, Robot
 from optimizer.problem.branches import BranchFilter
@@ -35,7 +32,7 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
         start=to_target(request.start, arm.robot),
         goal=to_target(request.goal, arm.robot),
         arm=arm if path is None else arm.no_faster_than(path.bounds.limit),
-        tool_path=None if path is None else to_tool_path(path, path.via, arm.robot),
+        tool_path=None if path is None else to_tool_path(path, arm.robot),
         method=request.method,
         objective=request.objective,
         duration_min=shortest,
@@ -49,11 +46,11 @@ def to_problem(request: asked.OptimizeRequest, deadline: float) -> Problem:
     )
 
 
-def to_tool_path(path: Path | StopPath, via: Sequence[BasePose], robot: Robot) -> ToolPath:
-    """The tool path of the library, over poses `via` between its ends. Raises InvalidProblem."""
+def to_tool_path(path: Path | StopPath, robot: Robot) -> ToolPath:
+    """The tool path of the library. Raises InvalidProblem."""
     return ToolPath(
         shape=path.shape,
-        via=[to_base_pose(pose, robot) for pose in via],
+        via=[to_base_pose(pose, robot) for pose in path.via],
         blend=path.blend,
         position_tolerance=path.tolerance.position,
         rotation_tolerance=path.tolerance.rotation,
@@ -86,7 +83,11 @@ def to_target(target: asked.Target, robot: Robot) -> Target:
 def _single(target: asked.JointTarget | asked.PoseTarget, robot: Robot) -> Single:
     if isinstance(target, asked.JointTarget):
         return np.array(target.q)
-    pose = target.pose
+    return to_target_pose(target.pose, robot)
+
+
+def to_target_pose(pose: TargetPose, robot: Robot) -> Pose | ConeOrientedPose:
+    """The pose of the library, its orientation in full or free in part. Raises InvalidProblem."""
     if isinstance(pose, ConeOrientedPoseSchema):
         return _cone_oriented(pose, to_base(pose.frame, robot))
     return to_base_pose(pose, robot)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from app.schemas.arm import Speed
 from app.schemas.common import BasePose, Request, described, number_or_object
-from app.schemas.orientation import Axis
+from app.schemas.orientation import Axis, ConeOrientedPose, TargetPose
 from optimizer.problem.line import LEAST_DISTANCE, MOST_DISTANCE
 from optimizer.problem.tool_path import (
     LEAST_RAMP,
@@ -90,8 +90,8 @@ class PathTolerance(Request):
     about: Axis | None = described(
         "Axis of the TCP, of any length, about which the tool may turn on the way: as the arm must to follow the path, "
         "and as needs least energy. `rotation` is for the direction of this axis then. At both ends "
-        "the tool has its full orientation, but for a `start` or `goal` of `POST /optimize` whose orientation is "
-        "`free_about` the same axis. Null: the orientation is that of the path.",
+        "the tool has its full orientation, unless that is `free_about` the same axis. Null: the orientation is that "
+        "of the path.",
         "1",
         [0.0, 0.0, 1.0],
         default=None,
@@ -154,9 +154,10 @@ class StopPath(_OnPath):
     """A path of the TCP at a stop, like that of a bead of glue: the arm rests at its first pose, follows it, and rests
     at its last. The branch is chosen for the whole round."""
 
-    points: Annotated[list[BasePose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)] = described(
+    points: Annotated[list[TargetPose], Field(min_length=2, max_length=max(MOST_POINTS.values()) + 2)] = described(
         f"Poses of the TCP: 2 to {MOST_POINTS['lines'] + 2} of lines, to {MOST_POINTS['curve'] + 2} of a curve, "
-        "exactly three of an arc.",
+        "exactly three of an arc. The first and the last may be `free_about` the axis `tolerance.about`: then the "
+        "angles of the tool there are chosen for the whole round.",
         None,
         [
             {"position": [0.4, 0.0, 0.2], "quaternion": [0.0, 1.0, 0.0, 0.0]},
@@ -171,6 +172,24 @@ class StopPath(_OnPath):
         True,
         default=False,
     )
+
+    @field_validator("points")
+    @classmethod
+    def _full_between(cls, points: list[TargetPose]) -> list[TargetPose]:
+        for k, pose in enumerate(points[1:-1], 1):
+            if isinstance(pose, ConeOrientedPose):
+                raise PydanticCustomError(
+                    "full_orientation",
+                    "Only the first and the last pose may leave the orientation free: give pose {number} a "
+                    "quaternion, rpy or rotvec",
+                    {"number": k},
+                )
+        return points
+
+    @property
+    def via(self) -> list[BasePose]:
+        """The poses between the first and the last."""
+        return [pose for pose in self.points[1:-1] if not isinstance(pose, ConeOrientedPose)]
 
 
 class Line(Request):

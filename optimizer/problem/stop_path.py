@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from optimizer.exceptions import InvalidProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
+from optimizer.problem.targets import AnyOf, Target
 from optimizer.problem.tool_path import ToolPath
 
 STRAIGHT = ToolPath()
@@ -17,13 +19,19 @@ STRAIGHT = ToolPath()
 class StopPath:
     """The TCP goes from the stop's target, which is one pose then, over `path.via` to `goal`, and rests at both ends.
 
+    Where the tool may turn about an axis on the way, either end may leave the rotation about it free, too. Of a stop
+    with several targets, a path leads from each of them to the one of `goals` in its place. `around` are poses of which
+    these targets and goals are some: the bound of a round that has them is that of all configurations of these poses.
+
     `speed` [m/s] bounds the speed of the TCP on the way. With `split`, a path that no configuration follows whole is
     divided by reconfigurations: moves between configurations of one pose.
 
     Raises InvalidProblem, with the field named.
     """
 
-    goal: Pose
+    goal: Pose | ConeOrientedPose
+    goals: tuple[Pose, ...] = ()
+    around: tuple[ConeOrientedPose, ConeOrientedPose] | None = None
     path: ToolPath = STRAIGHT
     speed: float | None = None
     split: bool = False
@@ -31,6 +39,28 @@ class StopPath:
     def __post_init__(self) -> None:
         if self.speed is not None and not (np.isfinite(self.speed) and self.speed > 0):
             raise InvalidProblem("path.speed", "path.speed must be a positive number of metres per second.")
+
+    def check_ends(self, target: Target) -> None:
+        """Raises InvalidProblem, with the field named, for poses at the ends between which there is no path.
+
+        `target` is that of the stop.
+        """
+        several = isinstance(target, AnyOf) and len(target.targets) == len(self.goals) > 0
+        if not several and not isinstance(target, Pose | ConeOrientedPose):
+            raise InvalidProblem("target", "The target of a stop with a path is one pose: its start.")
+        ends = {"start": (0, target), "goal": (len(self.path.via) + 1, self.goal)}
+        for name, (point, end) in ends.items():
+            if not isinstance(end, ConeOrientedPose):
+                continue
+            field = f"path.points.{point}.orientation"
+            if self.split:
+                raise InvalidProblem(
+                    field, "A path that is to be divided has its orientation in full at both ends: leave out split."
+                )
+            try:
+                self.path.check_free(name, end)
+            except InvalidProblem as error:
+                raise InvalidProblem(field, str(error)) from None
 
 
 def at_stop(k: int, error: InvalidProblem) -> InvalidProblem:

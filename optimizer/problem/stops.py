@@ -13,6 +13,7 @@ import numpy as np
 from models.robot import Limits
 from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.line import Line
 from optimizer.problem.scene import Scene
 from optimizer.problem.stop_path import STRAIGHT, StopPath
@@ -53,6 +54,13 @@ class Stop:
     path: StopPath | None = None
     obstacles_ignored: Sequence[str] = ()
     passed: bool = False
+
+    @property
+    def free_ends(self) -> tuple[bool, bool]:
+        """Whether the start of the stop's path and its end leave a rotation of the tool free."""
+        if self.path is None:
+            return False, False
+        return isinstance(self.target, ConeOrientedPose), isinstance(self.path.goal, ConeOrientedPose)
 
     @property
     def entry(self) -> str:

@@ -15,7 +15,6 @@ from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.cycle import Cycle, Hold
 from optimizer.problem.free_order import FreeOrder, check_order
 from optimizer.problem.names import check_name, first_repeated
-from optimizer.problem.pose import Pose
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
@@ -77,18 +76,16 @@ class WorkRound:
         self._check_names()
         object.__setattr__(self, "start", _full_target(self.arm, "start", self.start))
         checked = tuple(
-            replace(stop, target=_full_target(self.arm, f"stops.{k}.target", stop.target))
+            replace(stop, target=_full_target(self.arm, f"stops.{k}.target", stop.target, stop.path is not None))
             for k, stop in enumerate(self.stops)
         )
         object.__setattr__(self, "stops", checked)
         for k, stop in enumerate(self.stops):
             if not 0 <= stop.dwell <= LONGEST_DURATION:
                 raise InvalidProblem(f"stops.{k}.dwell", f"dwell must be from 0 to {LONGEST_DURATION:g} s.")
-            if stop.path is not None and not isinstance(stop.target, Pose):
-                raise InvalidProblem(f"stops.{k}.target", "The target of a stop with a path is one pose: its start.")
             self._check_limits(k, stop)
             if stop.path is not None:
-                self._check_speed(k, stop, stop.path)
+                self._check_path(k, stop, stop.path)
             if stop.passed:
                 self._check_passed(k, stop)
             self.arm.check_rating(f"stops.{k}.payload.mass", 0.0 if stop.payload is None else stop.payload.mass)
@@ -120,7 +117,11 @@ class WorkRound:
                 f"{RETREAT} is that of the outer end of its line, and with {ENTRY} that of the start of its path.",
             )
 
-    def _check_speed(self, k: int, stop: Stop, path: StopPath) -> None:
+    def _check_path(self, k: int, stop: Stop, path: StopPath) -> None:
+        try:
+            path.check_ends(stop.target)
+        except InvalidProblem as error:
+            raise InvalidProblem(f"stops.{k}.{error.field}", str(error)) from None
         most = self.arm.no_faster_than(stop.tcp_speed).no_faster_than(path.speed).tcp_speed
         try:
             path.path.check_speed(most)
@@ -257,8 +258,13 @@ class WorkRound:
         return min(max(duration, self.duration_min or 0.0), most)
 
 
-def _full_target(arm: Arm, field: str, target: Target) -> Target:
-    """The target, its joint positions as read-only arrays. Raises InvalidProblem or OutsideLimits."""
+def _full_target(arm: Arm, field: str, target: Target, on_path: bool = False) -> Target:
+    """The target, its joint positions as read-only arrays; with a path, a rotation may be free.
+
+    Raises InvalidProblem or OutsideLimits.
+    """
+    if on_path and isinstance(target, ConeOrientedPose):
+        return target
     if any(isinstance(member, ConeOrientedPose) for member in members(target)):
         raise InvalidProblem(field, "The orientation of a stop is given in full: give a quaternion, rpy or rotvec.")
     try:

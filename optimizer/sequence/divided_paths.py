@@ -79,7 +79,7 @@ def _parts(asked: WorkRound, k: int) -> list[Stop]:
 
 def _divided(stop: Stop, places: Sequence[float]) -> list[Stop]:
     """One stop for each part between `places`."""
-    assert stop.path is not None and isinstance(stop.target, Pose)
+    assert stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
     course = ToolCourse.of(stop.path.path, stop.target.T, stop.path.goal.T)
     poses = [stop.target, *(Pose(T) for T in course.poses(np.array(places))), stop.path.goal]
     ends, parts = [0.0, *places, 1.0], list[Stop]()
@@ -94,7 +94,7 @@ def _divided(stop: Stop, places: Sequence[float]) -> list[Stop]:
 
 def _places(asked: WorkRound, stop: Stop) -> list[float] | None:
     """The fractions at which a stop's path is divided; None if it cannot be followed so either."""
-    assert stop.path is not None and isinstance(stop.target, Pose)
+    assert stop.path is not None and isinstance(stop.target, Pose) and isinstance(stop.path.goal, Pose)
     (arm, *_) = (move.arm for move in asked.moves if move.goal == stop.name and move.kind == "path")
     course = ToolCourse.of(replace(stop.path.path, about=None), stop.target.T, stop.path.goal.T)
     strands = strands_of(arm, course, stop.branch)

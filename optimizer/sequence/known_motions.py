@@ -53,7 +53,7 @@ class KnownMotions:
 
     def recall(self, key: str) -> KnownMotion | None:
         """The motion that answers a question; None if none is known."""
-        known = self._before.get(key)
+        known = self.used.get(key) or self._before.get(key)
         if known is not None:
             self.used[key] = known
         return known

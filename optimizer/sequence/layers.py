@@ -14,6 +14,7 @@ from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target, members
 from optimizer.problem.work_round import START, WorkRound
@@ -27,7 +28,8 @@ MOST_NODES = 20_000
 @dataclass(frozen=True, eq=False)
 class Layer:
     """Configurations `q` (n, nq) [rad] of one stop. Each is one of `ends`, `end` (n,) says which, and `turns` (n, nq)
-    full turns away from this one's joint positions. `complete`: no branch of any pose may be missing."""
+    full turns away from this one's joint positions. `complete`: no branch of any pose may be missing. Where they are
+    some of those `around` an axis of the tool, all configurations of this pose count, known or not."""
 
     name: str
     ends: list[EndConfiguration]
@@ -35,6 +37,7 @@ class Layer:
     end: npt.NDArray[np.intp]
     turns: npt.NDArray[np.intp]
     complete: bool
+    around: ConeOrientedPose | None = None
 
     @property
     def sampled(self) -> bool:

@@ -31,6 +31,9 @@ MOST_PAIRS = 4_000_000
 MOST_PAIRS_OF_ROUND = 30_000_000
 # nodes of a stop with lines or a path: they make a matrix, of which the diagonal alone counts
 MOST_ON_WAY = 2000
+# share by which a line or a path weighs more than its bound while it is not solved, where its ends are some of
+# infinitely many, so that no proof is lost: the bound is that of free motions between them
+LIKELY_ON_WAY = 0.2
 # kinds between two looks at the deadline: some ten milliseconds
 KINDS_PER_CHECK = 2048
 # rad: a motion whose control points are farther from the limits is not held back by them
@@ -85,7 +88,10 @@ class Leg:
         _, first, number = np.unique(start.end, return_index=True, return_inverse=True)
         kind = np.full((len(start.q), len(goal.q)), -1)
         np.fill_diagonal(kind, number)
-        return cls._between(prepared, start, goal, kind, np.column_stack([first, first]), dwell)
+        leg = cls._between(prepared, start, goal, kind, np.column_stack([first, first]), dwell)
+        if not leg.closed:
+            leg.weigh_more(LIKELY_ON_WAY)
+        return leg
 
     @classmethod
     def _between(

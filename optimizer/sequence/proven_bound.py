@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -10,9 +11,12 @@ import numpy as np
 from models.robot import Array
 from optimizer.deadline import Deadline
 from optimizer.kinematics.wrist_geometry import potential_rates
+from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.stops import PlannedMove
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.candidates import Candidate
+from optimizer.search.free_ends_bound import backwards, bound_between
+from optimizer.search.free_goal_bound import family_bound
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.sequence.chains import LeastChain
@@ -47,7 +51,7 @@ def bounded_costs(asked: WorkRound, move: PlannedMove, leg: Leg, deadline: Deadl
     open_start, open_goal = (layer.sampled or not layer.complete for layer in (leg.start, leg.goal))
     if not open_start and not open_goal:
         return costs
-    least = _of_curves(leg, deadline) if leg.start.complete and leg.goal.complete else _of_any(leg)
+    least = _of_unknown(leg, float(leg.bound.min()), deadline)
     electrical = asked.objective == "electrical"
     dwell = rest_energy(asked, move, move.dwell, least_holding_power(move)) if electrical else 0.0
     if open_goal:
@@ -55,6 +59,30 @@ def bounded_costs(asked: WorkRound, move: PlannedMove, leg: Leg, deadline: Deadl
     if open_start:
         costs = np.vstack([costs, np.append(least + leg.dwell, [least + dwell] * open_goal)])
     return costs
+
+
+def _of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
+    """Bound [J] on the motions of a leg of which an end is not known; no more than `enough` is needed of it."""
+    if leg.start.complete and leg.goal.complete:
+        return _of_curves(leg, deadline)
+    if all(layer.around is not None or (layer.complete and not layer.sampled) for layer in leg.layers):
+        return _of_turned(leg, enough, deadline)
+    return _of_any(leg)
+
+
+def _of_turned(leg: Leg, enough: float, deadline: Deadline) -> float:
+    """Bound [J] on the motions of a leg of which an end is in any configuration of a pose that is turned about an
+    axis."""
+    problem, start, goal = replace(leg.prepared.problem, tool_path=None), leg.start, leg.goal
+    if start.around is not None and goal.around is not None:
+        return bound_between(PreparedProblem.of(problem), start.around, goal.around, deadline, enough)
+    if goal.around is not None:
+        q = np.array([end.q for end in start.ends])
+        return family_bound(PreparedProblem.of(problem), goal.around, q, deadline=deadline, enough=enough)
+    assert start.around is not None
+    back = PreparedProblem.of(backwards(problem, problem.goal, problem.start))
+    q = np.array([end.q for end in goal.ends])
+    return family_bound(back, start.around, q, deadline=deadline, enough=enough)
 
 
 def _of_curves(leg: Leg, deadline: Deadline) -> float:

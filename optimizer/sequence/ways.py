@@ -18,6 +18,7 @@ from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.line import Line
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, RETREAT, Stop
@@ -27,6 +28,7 @@ from optimizer.search.end_feasibility import check_configurations
 from optimizer.search.ends import EndConfiguration, label_of
 from optimizer.search.path_ends import attempt_of
 from optimizer.sequence.layers import Layer, arms_at, layer_of
+from optimizer.sequence.legs import MOST_ON_WAY
 
 
 @dataclass(frozen=True)
@@ -39,10 +41,15 @@ class _Way:
     line: Line | None = None
     sign: float = 1.0
 
-    def course(self, T: Array) -> ToolCourse:
-        """The course from the pose T (4, 4). Raises InvalidProblem, as `ToolCourse.of`."""
+    def course(self, T: Array, target: int) -> ToolCourse:
+        """The course from the pose T (4, 4), which is this one of the stop's targets.
+
+        Raises InvalidProblem, as `ToolCourse.of`.
+        """
         if self.path is not None:
-            return ToolCourse.of(self.path.path, T, self.path.goal.T)
+            goal = self.path.goals[target] if self.path.goals else self.path.goal
+            assert isinstance(goal, Pose)
+            return ToolCourse.of(self.path.path, T, goal.T)
         assert self.line is not None
         T_end = T.copy()
         T_end[:3, 3] += self.sign * self.line.shift(T)
@@ -81,9 +88,15 @@ def layers_of_stop(asked: WorkRound, k: int) -> list[Layer]:
             attempts = _attempts(asked, origin, found, blocked, follows)
             raise PathInfeasible(length, attempts, layers[way.end].name)
         kept &= follows
-    if windings and not asked.windings:
+    some = stop.path is not None and bool(stop.path.goals)
+    if windings and (not asked.windings or (some and kept.sum() > MOST_ON_WAY)):
         kept = _nearest_to_middle(asked, at, kept)
-    return [_only(layers[place], kept) for place in stop.places]
+    of_stop = [_only(layers[place], kept) for place in stop.places]
+    if stop.path is None or not some:
+        return of_stop
+    around = dict(zip((stop.entry, stop.name), stop.path.around or (None, None), strict=True))
+    named = zip(stop.places, of_stop, strict=True)
+    return [replace(layer, complete=False, around=around.get(place)) for place, layer in named]
 
 
 def _nearest_to_middle(asked: WorkRound, at: Layer, kept: Mask) -> Mask:
@@ -117,7 +130,7 @@ def _followed(asked: WorkRound, way: _Way, ends: list[EndConfiguration]) -> tupl
     for target in {end.target for end in ends}:
         own = [k for k, end in enumerate(ends) if end.target == target]
         q = np.array([ends[k].q for k in own])
-        course = way.course(tcp_pose(asked.arm, q[0]))
+        course = way.course(tcp_pose(asked.arm, q[0]), target)
         length = course.length
         found |= dict(zip(own, traces(asked.arm, course, q), strict=True))
     return [found[k] for k in range(len(ends))], length
