@@ -10,6 +10,8 @@
 - `synthetic`: simulated UR10e with known figures: how many figures lie within three standard deviations, and how many
   energies of moves that no fit has seen between P5 and P95. The same with moves each of which draws a power of its own
   beside the model's. 200 runs take some minutes.
+- `standins`: simulated logs in the place of real ones that are not public: another motion of the same day and other
+  days of a UR10e, a payload from two logs of different days, halves of a log of a Panda.
 - `time`: of a fit to 30 s of log on one core.
 """
 
@@ -25,6 +27,7 @@ import numpy as np
 
 from benchmarks.command import on_one_core, parser, write_json
 from benchmarks.identification_logs import MISSING, WRIST, folder, tx40, tx40_reference, ur3e
+from benchmarks.identification_standins import TORQUE_SENSOR, behind_the_gears, day_of, log_of
 from models.registry import load_robot
 from models.robot import Robot
 from models.uncertainty.ranges import P95
@@ -35,11 +38,15 @@ from optimizer.identification.fits.fitting import fit_rows
 from optimizer.identification.identify import fit
 from optimizer.identification.options import Options
 from optimizer.identification.quality.interval import energy_sd, spread_of
-from optimizer.identification.quality.validation import power_errors
+from optimizer.identification.quality.validation import power_errors, torque_errors
+from optimizer.identification.results import TorqueErrors
 from optimizer.identification.rows.clusters import clusters_of
 from optimizer.identification.rows.fit_rows import Rows, rows_of
+from optimizer.problem.arm import Payload
 from tests.identification_logs import Truth, off_the_model, recorded, truth_of
 
+# of simulated arms, days of each, the first that of the fit, and the standard deviation of their friction
+UNITS, DAYS, DAY_SD = 4, 8, 0.03
 DRAWS = 100
 MOVES_OF_A_DRAW = 5
 # share of the runs in which a figure is told, for its own share to count
@@ -212,11 +219,80 @@ def times(_: Path | None, __: int) -> list[Gate]:
     return found
 
 
+def standins(_: Path | None, __: int) -> list[Gate]:
+    """Logs that are not at hand, simulated with what the model does not have."""
+    return [*_days(), *_payloads(), *_halves()]
+
+
+def _days() -> list[Gate]:
+    """Figures of a UR10e from 30 s of one day, on another motion of it and on other days."""
+    robot, same, unknown = load_robot("ur10e"), list[TorqueErrors](), list[TorqueErrors]()
+    for unit in range(UNITS):
+        truth, random = truth_of(robot, unit), np.random.default_rng(unit)
+        found = fit(robot, [log_of(robot, day_of(robot, truth, 100 + unit, 1.0, 10))], Options(held_out=0.0))
+        for day in range(DAYS):
+            friction = random.normal(1.0, DAY_SD) if day else 1.0
+            other = day_of(robot, truth, 200 + 10 * unit + day, friction, 6)
+            errors = found.validate([log_of(robot, other)]).fitted.torque
+            assert errors is not None
+            (unknown if day else same).append(errors)
+    relative = np.max([each.relative for each in same], axis=0)
+    gates = [
+        Gate(f"stand-in of a UR10e, {UNITS} units, another motion: J{joint + 1} [%]", float(relative[joint]), 0.0, most)
+        for joint, most in enumerate((7.0, 1.7, 1.8, 3.3, 6.3, 6.2))
+    ]
+    shaft = float(np.median([day.shaft_energy for day in unknown]))
+    copper = float(np.median([day.copper_energy for day in unknown]))
+    title = f"stand-in of a UR10e, {DAYS - 1} other days each"
+    return [
+        *gates,
+        Gate(f"{title}: shaft energy, median [%]", shaft, 0.0, 3.0),
+        Gate(f"{title}: copper energy, median [%]", copper, 0.0, 1.5),
+    ]
+
+
+def _payloads() -> list[Gate]:
+    """A payload of 2.805 kg from a log without it and one of another day with it."""
+    robot, payload = load_robot("ur10e"), Payload(2.805, np.array([0.0, 0.0, 0.06]))
+    off, sd = list[float](), list[float]()
+    for unit in range(UNITS):
+        truth, friction = truth_of(robot, unit), np.random.default_rng(unit).normal(1.0, DAY_SD)
+        empty = log_of(robot, day_of(robot, truth, 400 + unit, 1.0, 10))
+        full = log_of(robot, day_of(robot, truth, 500 + unit, friction, 10, payload))
+        carried = fit(robot, [empty, full], Options(fit=("payload",), held_out=0.0)).payload
+        assert carried is not None
+        off.append(100 * abs(carried.mass / payload.mass - 1))
+        sd.append(float(np.sqrt(carried.covariance[0, 0])))
+    title = f"stand-in of a UR10e, {UNITS} units, payload of two days"
+    return [
+        Gate(f"{title}: error, greatest [%]", max(off), 0.0, 1.5),
+        Gate(f"{title}: standard deviation, median [kg]", float(np.median(sd)), 0.0, 0.02),
+    ]
+
+
+def _halves() -> list[Gate]:
+    """Each half of a log of a Panda from the other, with torques measured behind the gears."""
+    robot, worst = load_robot("panda"), np.zeros(7)
+    for unit in range(UNITS):
+        truth = behind_the_gears(truth_of(robot, unit))
+        recording = day_of(robot, truth, 600 + unit, 1.0, 32, noise=TORQUE_SENSOR)
+        rows = rows_of(robot, [log_of(robot, recording, torque=True)], True)
+        first = np.arange(len(rows.q)) < len(rows.q) // 2
+        for half in (first, ~first):
+            arm = fit_rows(robot, rows.take(half), Options(held_out=0.0, refit=True)).arm
+            worst = np.maximum(worst, torque_errors([(arm, rows.take(~half))], 0.02).relative)
+    return [
+        Gate(f"stand-in of a Panda, {UNITS} units, halves: J{joint} [%]", float(worst[joint - 1]), 0.0, 1.6)
+        for joint in (2, 3, 4)
+    ]
+
+
 PARTS: dict[str, Callable[[Path | None, int], list[Gate]]] = {
     "structure": structure,
     "ur3e": ur3e_power,
     "tx40": tx40_torque,
     "synthetic": synthetic,
+    "standins": standins,
     "time": times,
 }
 OF_LOGS = ("ur3e", "tx40")

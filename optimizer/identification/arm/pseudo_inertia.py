@@ -39,14 +39,23 @@ def nearness(parameters: Array) -> Array:
     """The matrix M (10 bodies, 10 bodies) of the squared distance xᵀ M x of bodies from those with these parameters.
 
     It does not depend on units or frames, and a change by the factor 1 + ε has a squared distance of 2 ε² per body
-    (Lee, Wensing, Park 2020: the pullback of the affine-invariant metric).
+    (Lee, Wensing, Park 2020: the pullback of the affine-invariant metric). Published parameters of some arms are not
+    those of real bodies: the distance is then that from the nearest ones.
     """
     matrices = pseudo_inertias(parameters)
     total = np.zeros((len(parameters),) * 2)
     for body, matrix in enumerate(matrices):
-        mass = max(float(matrix[3, 3]), 1e-6)
-        inverse = np.linalg.inv(matrix + mass * LEAST_GYRATION**2 * np.diag([1.0, 1.0, 1.0, 0.0]) + 1e-12 * np.eye(4))
+        inverse = np.linalg.inv(_real(matrix))
         turned = np.einsum("ij,kjl->kil", inverse, BASIS)
         at = slice(BODY * body, BODY * (body + 1))
         total[at, at] = np.einsum("kij,lji->kl", turned, turned) / 2
     return total
+
+
+def _real(matrix: Array) -> Array:
+    """The pseudo-inertia (4, 4) of a real body with some extent, nearest to one of any body."""
+    mass, moment = max(float(matrix[3, 3]), 1e-6), matrix[:3, 3]
+    # second moments about the centre of mass, none of which is below 0
+    sizes, axes = np.linalg.eigh(matrix[:3, :3] - np.outer(moment, moment) / mass)
+    about = (axes * (np.maximum(sizes, 0.0) + mass * LEAST_GYRATION**2)) @ axes.T
+    return np.block([[about + np.outer(moment, moment) / mass, moment[:, None]], [moment[None], np.array([[mass]])]])

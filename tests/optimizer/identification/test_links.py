@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.identification_logs import MISSING, folder, tx40
 from models.from_figures import robot_of
-from models.registry import load_robot
+from models.registry import load_robot, robot_names
 from models.robot import Array, Robot
 from models.uncertainty.document import covariance_of, with_document
 from models.uncertainty.parameters import LINKS
@@ -64,6 +64,22 @@ def test_real_bodies_have_positive_pseudo_inertias_and_no_others() -> None:
     wrong = pin.Inertia(2.0, np.zeros(3), np.diag([0.02, 0.03, 0.06]))  # a moment above the sum of the others
     assert np.linalg.eigvalsh(pseudo_inertias(body.toDynamicParameters()))[0, 0] > 0
     assert np.linalg.eigvalsh(pseudo_inertias(wrong.toDynamicParameters()))[0, 0] < 0
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_nearness_is_a_distance_for_every_robot(name: str) -> None:
+    """Also of parameters that no real body has, as the published ones of one link of the Panda."""
+    metric = nearness(body_parameters(load_robot(name).model))
+    scale = 1 / np.sqrt(np.diag(metric))
+    assert np.linalg.eigvalsh(metric * np.outer(scale, scale))[0] > 0
+
+
+def test_links_whose_published_parameters_are_no_real_bodies_are_refitted() -> None:
+    robot = load_robot("panda")
+    least = np.linalg.eigvalsh(pseudo_inertias(body_parameters(robot.model)))[:, 0]
+    assert least.min() < -1e-4
+    found = fit(robot, [recorded(robot, truth_of(robot), moves=6).log()], Options(refit=True, held_out=0.0))
+    assert found.physical is not None and found.physical.consistent
 
 
 def test_nearness_does_not_depend_on_the_frame() -> None:

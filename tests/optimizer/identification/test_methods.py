@@ -16,6 +16,9 @@ from optimizer.identification.arm.base_parameters import base_parameters
 from optimizer.identification.fits.base_wrench import base_wrench_regressor, fit_base_wrench
 from optimizer.identification.fits.periodic import mean_period, most_likely
 from optimizer.identification.fits.threshold import velocity_threshold
+from optimizer.identification.identify import fit
+from optimizer.identification.options import Options
+from tests.identification_logs import recorded, truth_of
 
 ROBOT = load_robot("ur5e")
 # of the standard deviations: what one of a thousand figures exceeds
@@ -92,6 +95,22 @@ def test_base_parameters_from_the_wrench_beneath_the_arm() -> None:
     assert np.abs(z).max() < FAR
     # the wrench tells more combinations than the torques do
     assert len(truth) > base_parameters(model, rotors=False).count
+
+
+def test_four_times_the_moves_halve_the_deviations() -> None:
+    """Verdonck, Radkhah: what a log tells of a figure goes by how it excites it; and the truth is within it."""
+    truth = truth_of(ROBOT)
+    deviations = []
+    for moves in (8, 32):
+        log = replace(recorded(ROBOT, truth, moves=moves).log("torque"), power=None)
+        found = fit(ROBOT, [log], Options(held_out=0.0)).parameters
+        told = {(each.figure, each.joint): each for each in found if each.identified}
+        away = [abs(each.value - getattr(truth, each.figure)[each.joint]) / each.sd for each in told.values()]
+        assert np.mean(np.array(away) < FAR) >= 0.95
+        deviations.append({name: each.sd for name, each in told.items()})
+    both = deviations[0].keys() & deviations[1].keys()
+    ratio = np.median([deviations[0][name] / deviations[1][name] for name in both])
+    assert len(both) >= 12 and 1.5 < ratio < 3.5
 
 
 def stribeck(v: Array, threshold: float, random: np.random.Generator) -> Array:

@@ -1,0 +1,83 @@
+"""Simulated logs in the place of real ones that are not public or not at hand, with what real logs have beside noise.
+
+Friction differs from day to day and falls while the arm warms up, the gears have ripple, the drive filters and
+quantises its currents, positions have the steps of their sensors, and times jitter. None of it is in the model that is
+fitted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from models.robot import Array, Robot
+from optimizer.identification.logs.log import Log
+from optimizer.identification.logs.reading import read_log
+from optimizer.problem.arm import Payload
+from tests.identification_logs import Noise, Recording, Truth, csv_of, recorded, rigid_torques, with_current
+
+RATE = 500.0
+# of friction: its fall over a log, and the ripple of the gears with their waves per radian
+WARMING, RIPPLE, WAVES = 0.03, 0.01, 37.0
+# s of the drive's filter, A of its steps, rad of the sensors' steps, s of the times' jitter
+FILTER, CURRENT_STEP, POSITION_STEP, JITTER = 0.004, 0.005, 1e-5, 1e-4
+# of the friction beneath the gears that a torque sensor behind them sees
+BEHIND = 0.15
+TORQUE_SENSOR = Noise(current=0.005)
+"""Of a sensor behind the gears: 0.05 N·m at 10 N·m/A."""
+
+
+def day_of(
+    robot: Robot,
+    truth: Truth,
+    seed: int,
+    friction: float,
+    moves: int,
+    payload: Payload | None = None,
+    noise: Noise | None = None,
+) -> Recording:
+    """What an arm records on a day with so many times its friction, perhaps with a payload."""
+    random = np.random.default_rng([seed, 7])
+    parts = {name: getattr(truth, name) * friction for name in ("coulomb", "viscous", "load")}
+    today = replace(truth, **parts, knee=2e-3, payload=payload or Payload())
+    exact = recorded(robot, today, moves=moves, rate=RATE, seed=seed, noise=noise)
+    # the arm goes on between the times that were meant
+    shift = np.append(0.0, random.uniform(-JITTER, JITTER, len(exact.time) - 1))
+    q = exact.q + exact.exact_v * shift[:, None]
+    rigid = rigid_torques(robot, today, exact.exact_q, exact.exact_v, exact.a)
+    drag = exact.torque - rigid - today.rotor_inertia * exact.a - today.offset
+    cooler = WARMING * np.linspace(0.5, -0.5, len(q))[:, None]
+    moving = np.abs(exact.exact_v) > 1e-3
+    ripple = RIPPLE * today.coulomb * np.sin(WAVES * exact.exact_q + random.uniform(0, 6, robot.nq)) * moving
+    current = _of_drive((exact.torque + cooler * drag + ripple) / today.torque_constant)
+    return replace(
+        with_current(exact, current),
+        time=exact.time + shift,
+        q=np.round(q / POSITION_STEP) * POSITION_STEP,
+    )
+
+
+def _of_drive(current: Array) -> Array:
+    """Currents (n, nq) [A] as the drive says them."""
+    keep = float(np.exp(-1 / (RATE * FILTER)))
+    filtered, _ = lfilter([1 - keep], [1, -keep], current, axis=0, zi=keep * current[:1])
+    return np.asarray(np.round(filtered / CURRENT_STEP) * CURRENT_STEP)
+
+
+def log_of(robot: Robot, recording: Recording, payload: Payload | None = None, torque: bool = False) -> Log:
+    """The recording as the reader reads it from its file, with torques or with currents."""
+    body = csv_of(recording, "own", without="aP", effort="torque" if torque else "current")
+    return read_log(body, robot, payload=payload or recording.payload, effort="torque" if torque else "current")
+
+
+def behind_the_gears(truth: Truth) -> Truth:
+    """The truth of an arm whose torques are measured behind the gears."""
+    return replace(
+        truth,
+        coulomb=BEHIND * truth.coulomb,
+        viscous=BEHIND * truth.viscous,
+        load=BEHIND * truth.load,
+        rotor_inertia=0.0 * truth.rotor_inertia,
+    )
