@@ -13,6 +13,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.bodies import Body, Indices
+from optimizer.collision.many_points import into, placed
 
 # beads of a body
 COUNT = 4
@@ -25,7 +26,7 @@ class Beads:
         self._links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
         self._centres = np.array([_centres(body) for body in bodies]).reshape(-1, COUNT, 3)
         self._radii = np.array([_radius(body) for body in bodies])
-        T_link_core = np.array([body.T_link_core for body in bodies]).reshape(-1, 4, 4)
+        self._T_core = np.array([body.T_link_core for body in bodies]).reshape(-1, 4, 4)
         # half sizes of boxes; cylinders have their radius for x and y
         self._half_sizes = np.array([_half_size(body) for body in bodies]).reshape(-1, 3)
         self._round = np.array([body.core.disc_radius > 0 for body in bodies], dtype=bool)
@@ -36,9 +37,6 @@ class Beads:
         self._has_bound = (has_form[first] | has_form[second]) & ~unbounded[first]
         self._formed = np.where(has_form[first], first, second)
         self._beaded = np.where(has_form[first], second, first)
-        self._R_form, self._form_origin = T_link_core[self._formed, :3, :3], T_link_core[self._formed, None, :3, 3]
-        beaded = np.unique(self._beaded[self._has_bound])
-        self._beaded_on = [(link, beaded[self._links[beaded] == link]) for link in np.unique(self._links[beaded])]
 
     def distances(self, frames: Array, configuration: Indices, pair: Indices) -> Array:
         """Lower bounds (k,) [m] on the distances of the cores of pairs (k,) at configurations (k,), but for radii.
@@ -52,12 +50,12 @@ class Beads:
             return result
         configuration, pair = configuration[chosen], pair[chosen]
         formed, beaded = self._formed[pair], self._beaded[pair]
-        points = self._placed(frames)[configuration, beaded]
+        points = placed(frames[configuration, self._links[beaded], None], self._centres[beaded])
         # obstacles are in the frame of the base, which most pairs need no step into
         moving = np.flatnonzero(self._links[formed] > 0)
         T = frames[configuration[moving], self._links[formed[moving]]]
-        points[moving] = (points[moving] - T[:, None, :3, 3]) @ T[:, :3, :3]
-        local = np.abs((points - self._form_origin[pair]) @ self._R_form[pair])
+        points[moving] = into(T[:, None], points[moving])
+        local = np.abs(into(self._T_core[formed][:, None], points))
         is_round = self._round[formed]
         if is_round.any():
             local[is_round, :, 0] = np.hypot(local[is_round, :, 0], local[is_round, :, 1])
@@ -67,15 +65,6 @@ class Beads:
         bound = distance - self._radii[beaded]
         result[chosen] = np.where(bound > 0, bound, -np.inf)
         return result
-
-    def _placed(self, frames: Array) -> Array:
-        """Centres (n, bodies, COUNT, 3) [m] in the base frame of the beads that any pair has; others are undefined."""
-        centres = np.empty((len(frames), *self._centres.shape))
-        for link, bodies in self._beaded_on:
-            local = self._centres[bodies].reshape(-1, 3)
-            placed = local @ frames[:, link, :3, :3].swapaxes(1, 2) + frames[:, link, None, :3, 3]
-            centres[:, bodies] = placed.reshape(len(frames), len(bodies), COUNT, 3)
-        return centres
 
 
 def _centres(body: Body) -> Array:

@@ -19,6 +19,7 @@ from optimizer.collision.bodies import Body, Indices
 from optimizer.collision.closed_form_distance import box_segment, segment_segment
 from optimizer.collision.cloud_pairs import CloudPairs
 from optimizer.collision.coal_distance import ConvexPairs
+from optimizer.collision.many_points import into, placed
 
 
 class PairKind(IntEnum):
@@ -66,6 +67,7 @@ class PairGeometry:
         # cores with fewer points repeat their last point
         # the box around a patch of a cloud stands for the patch: its separations are lower bounds
         self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
+        self._counts = np.array([len(body.points) for body in bodies], dtype=np.intp)
         self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
         self._disc_radii = np.array([core.disc_radius for core in cores])
         self._ball_centres = np.array([body.ball_centre for body in bodies]).reshape(-1, 3)
@@ -106,7 +108,7 @@ class PairGeometry:
         A ball cannot enclose a half-space: its pairs get -inf.
         """
         first, second = self.pairs[pairs].T
-        centres = _placed(frames[:, self.links], self._ball_centres)
+        centres = placed(frames[:, self.links], self._ball_centres)
         offset = centres[:, second] - centres[:, first]
         distance = np.sqrt(np.einsum("npi,npi->np", offset, offset))
         distance -= self._ball_radii[first] + self._ball_radii[second] + self._growth[pairs]
@@ -186,7 +188,11 @@ class PairGeometry:
         """min n·x (k,) [m] over the cores of bodies (k,)."""
         T = frames[configuration, self.links[body]]
         normal_in_link = np.einsum("kij,ki->kj", T[:, :3, :3], normal)
-        least = np.einsum("kmj,kj->km", self._points[body], normal_in_link).min(axis=1)
+        # links have two points, boxes eight
+        points = self._points[body, : self._counts[body].max(initial=1)]
+        heights = (points @ normal_in_link[:, :, None])[..., 0]
+        # (m, k): numpy runs along k
+        least = np.ascontiguousarray(heights.T).min(axis=0)
         if self._disc_radii.any():
             cosine = np.einsum("kj,kj->k", self._axes[body], normal_in_link)
             least -= self._disc_radii[body] * np.sqrt(np.maximum(1 - cosine**2, 0))
@@ -196,9 +202,9 @@ class PairGeometry:
         """Ends (k, 2, 3) [m] of segments in the base frame, of each of `bodies` (k,)."""
         if len(configuration) * len(bodies) > len(frames) * len(self.links):
             # each body is in many pairs: placed once per configuration, not once per pair
-            placed = _placed(frames[:, self.links, None], self._points[:, :2])
-            return [placed[configuration, body] for body in bodies]
-        return [_placed(frames[configuration, self.links[body], None], self._points[body, :2]) for body in bodies]
+            ends = placed(frames[:, self.links, None], self._points[:, :2])
+            return [ends[configuration, body] for body in bodies]
+        return [placed(frames[configuration, self.links[body], None], self._points[body, :2]) for body in bodies]
 
     def _segment_segment(
         self, frames: Array, configuration: Indices, first: Indices, second: Indices
@@ -211,7 +217,7 @@ class PairGeometry:
     ) -> tuple[Array, Array, Array]:
         T = frames[configuration, self.links[first]] @ self._T_link_core[first]
         R, (ends,) = T[:, :3, :3], self._segment_ends(frames, configuration, second)
-        distance, normal, point = box_segment(self._half_sizes[first], (ends - T[:, None, :3, 3]) @ R)
+        distance, normal, point = box_segment(self._half_sizes[first], into(T[:, None], ends))
         return distance, np.einsum("kij,kj->ki", R, normal), np.einsum("kij,kj->ki", R, point) + T[:, :3, 3]
 
     def _segment_box(
@@ -244,10 +250,3 @@ class PairGeometry:
         T_first = frames[configuration, self.links[first]] @ self._T_link_core[first]
         T_second = frames[configuration, self.links[second]] @ self._T_link_core[second]
         return self._convex.witness_points(first.tolist(), second.tolist(), T_first, T_second)
-
-
-def _placed(T: Array, points: Array) -> Array:
-    """Points (..., 3) [m] by poses T (..., 4, 4). Sums of products of arrays: many small products of matrices take
-    twice the time."""
-    x, y, z = (points[..., i, None] for i in range(3))
-    return np.asarray(T[..., :3, 0] * x + T[..., :3, 1] * y + T[..., :3, 2] * z + T[..., :3, 3])
