@@ -30,7 +30,7 @@ from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.tours import Tours
 
 # share of the deadline that the search for the order may take
-SHARE = 0.5
+SHARE = 0.7
 
 
 class OrderSearch:
