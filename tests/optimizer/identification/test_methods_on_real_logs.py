@@ -112,3 +112,12 @@ def test_the_condition_of_a_real_log(place: Path) -> None:
     rows = rows_of(robot, [log], True)
     part = structure_of(robot, rows.take(np.arange(len(rows.q)) < len(rows.q) // 8), REFIT)
     assert part.condition is not None and part.condition > 1.2 * excited.condition
+
+
+def test_a_real_log_that_hardly_warms_up_tells_no_rate(place: Path) -> None:
+    """Hao: over some seconds the joints stay as warm as they are."""
+    robot, log = ur3e(place)
+    found = fit(robot, [log], PLAIN).temperatures
+    if log.temperature is not None:
+        assert (found.span < 8.0).all() and np.isfinite(found.reference).all()
+    assert np.isnan(found.k).all()
