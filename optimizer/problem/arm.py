@@ -203,7 +203,9 @@ class Arm:
         # written so that NaN, which compares false with everything, is refused
         for public, name in LIMIT_NAMES.items():
             value, most = getattr(limits, name), getattr(robot, name)
-            if value.shape != most.shape or not ((value > 0) & (value < np.inf)).all():
+            # bounds divide by the others; without a limit on jerk, acceleration jumps
+            finite = name == "j_max" or (value < np.inf).all()
+            if value.shape != most.shape or not ((value > 0).all() and finite):
                 message = f"limits.{public} must be a positive number for every joint, and a finite one."
                 raise InvalidProblem(f"limits.{public}", message)
             # the factor allows the robot's own limits after rounding
