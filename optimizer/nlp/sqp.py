@@ -38,6 +38,8 @@ MOST_DECREASE = 3.0
 LAST_STEP, ERROR = 5e-3, (0.02, 0.1)
 # smallest eigenvalue that the QP's Hessian may have, relative to a bound on the largest or to 1, the scale of the cost
 EIGENVALUE_FLOOR = 1e-7
+# variables of a QP beyond which all eigenvalues are found faster than those that change
+MOST_IN_PART = 150
 # the penalty of a violation before any multiplier is known, and its least multiple of the multipliers
 FIRST_PENALTY, PENALTY_FACTOR = 0.1, 2.0
 # the first penalty of path constraints among which are clearances
@@ -310,6 +312,10 @@ def _convex(H: Array) -> tuple[Callable[[Array], Array], Array]:
     clamped from below; and W with Wᵀ H W = 1."""
     H = 0.5 * (H + H.T)
     L, failed = dpotrf(H, lower=1)
+    if failed and len(H) > MOST_IN_PART:
+        values, vectors = np.linalg.eigh(H)
+        kept = np.maximum(np.abs(values), EIGENVALUE_FLOOR * max(1.0, float(np.abs(values).max())))
+        return lambda x: vectors @ (kept * (vectors.T @ x)), vectors / np.sqrt(kept)
     if failed:
         # a bound on all eigenvalues. Those that change are few: finding them takes half the time of finding all
         most = float(np.abs(H).sum(axis=0).max())
