@@ -1,4 +1,4 @@
-"""Whether the page can be read: contrast in light and dark, and letters of twice the size."""
+"""Whether the page can be read: contrast in light and dark, letters of twice the size, names of what is seen."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.app.live import Server
-from tests.browser.pages import SHOWN, opened, show, until
+from tests.browser.pages import MESHES, SHOWN, opened, show, until
 from tests.browsers import BROWSER, MISSING
 from tests.selection import long_but
 
@@ -89,3 +89,15 @@ def test_letters_of_twice_the_size(browser: Browser, service: Server, width: int
         for control in ("#optimise", "#play", "#scrub", "#joules"):
             page.locator(control).scroll_into_view_if_needed()
             expect(page.locator(control)).to_be_in_viewport(ratio=0.9)
+
+
+def test_words_stay_in_the_picture(browser: Browser, service: Server) -> None:
+    """On a phone, the name of the nearest pair is wider than the room beside it."""
+    with opened(browser, f"{service.url}/studio", viewport={"width": 390, "height": 844}) as page:
+        until(page, SHOWN)
+        until(page, MESHES)
+        # once more drawn, after the picture was made anew
+        page.evaluate("() => studio.view.render()")
+        label, box = (page.locator(name).bounding_box() for name in (".label.near", "#labels"))
+        assert label and box
+        assert box["x"] <= label["x"] and label["x"] + label["width"] <= box["x"] + box["width"]

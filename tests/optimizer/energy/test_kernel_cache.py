@@ -22,7 +22,7 @@ import pytest
 
 from models.registry import robot_names
 from models.robot import Robot
-from optimizer.energy import kernel_cache
+from optimizer.energy import kernel, kernel_cache
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
 from optimizer.energy.kernel_expressions import build
@@ -101,6 +101,8 @@ def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Workshop:
     script.chmod(0o755)
     monkeypatch.setenv("CC", str(script))
     monkeypatch.setenv("JOULEPATH_CACHE_DIR", str(tmp_path / "cache"))
+    # no other test of the library compiles in the background
+    monkeypatch.setattr(kernel, "compiler", compiler)
     return Workshop(tmp_path, replace(ROBOT))
 
 
