@@ -7,8 +7,8 @@ the lesser of the two, and never below the plain one. Where the dual bound does 
 friction law that is not concave, more durations than its cells can cover) the plain one stays.
 
 The dual bound is tried around the pair's own motion, or a straight one if it has none, with a few multipliers: those
-nearest to the motor torque that are linear in time, of the joints that carry no gravity, and of these and the joint
-that loses most by it. With them goes a share of the plain bound's own multiplier of speed.
+nearest to the motor torque that are linear in time, of the joints that carry no gravity, and of these and the joints
+that lose most by it. With them goes a share of the plain bound's own multiplier of speed.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ SCALES, STIFFNESSES, MIXING, WORK = (0.25, 0.5, 0.8), (0.7, 1.0, 1.4), 0.2, 0.7
 TERMS_TIME, BOUND_TIME = 1.5, 0.2
 # a joint whose gravity torque changes by less than this with any joint carries none [N·m]
 WEIGHTLESS = 1e-9
-GRID_JOINTS = 2
+# joints with a grid, and at most so many with gravity that have multipliers: those that lose most by it
+GRID_JOINTS = HEAVY = 2
 
 
 def tighten(prepared: PreparedProblem, candidates: list[Candidate], energy: float, deadline: Deadline) -> None:
@@ -240,9 +241,9 @@ class _Piece:
         return WORK * copper_multiplier(self.pairs.prepared, displacement, self._gain, duration)
 
     def _choices(self, work: float) -> list[_Choice]:
-        """What is tried: multipliers of the joints that carry no gravity, also with the one that loses most by it."""
+        """What is tried: multipliers of the joints that carry no gravity, also with those that lose most by it."""
         heavy = self.pairs.chain.potential_bound(2).max(axis=1) > WEIGHTLESS
-        most = np.arange(len(heavy)) == int(np.argmax(self._hold))
+        rank = np.argsort(np.argsort(-self._hold, kind="stable"))
         stiffness = self.pairs.stiffness
         return [
             _Choice(
@@ -254,7 +255,7 @@ class _Piece:
                     work,
                 ),
             )
-            for kept in {tuple((~heavy).tolist()), tuple((~heavy | most).tolist())}
+            for kept in {tuple((~heavy | (rank < count)).tolist()) for count in range(HEAVY + 1)}
             for scale, factor in product(SCALES, STIFFNESSES)
         ]
 

@@ -7,13 +7,13 @@ import ruckig
 
 from models.robot import Array, Limits
 from optimizer.trajectories import bspline
+from optimizer.trajectories.jerk_phases import spline_of_phases
 from optimizer.trajectories.quadrature import lobatto_nodes
-from optimizer.trajectories.spline import Spline
+from optimizer.trajectories.spline import Spline, least_time_scale
 from optimizer.trajectories.time_scalings import SampledMotion, standstill
 
-# jumps of jerk closer than this, as a fraction of the duration, count as one: between two of them, rounding would make
-# jerk of its own
-CLOSEST_BREAKS = 1e-5
+# fractions of the duration within which jumps of jerk become one, as long as the motion exceeds its limits by more
+CLOSEST, WITHIN = (1e-5, 4e-5, 8e-5), 1 + 1e-6
 
 
 def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:
@@ -41,20 +41,25 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
 
 
 def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline:
-    """Ruckig's motion as an exact spline, with threefold knots where the jerk of a joint jumps.
+    """Ruckig's motion as a spline, with threefold knots where the jerk of a joint jumps.
 
+    It is exact, but where jumps are close to each other: then that of a few splines which exceeds the limits least.
     Between equal configurations Ruckig's motion takes no time: the spline stands still for one second.
     """
     found = _ruckig(limits, q_start, q_goal)
     if found.duration == 0:
         return Spline(bspline.DEGREE, bspline.clamped(np.array([0.0, 1.0])), np.tile(q_start, (bspline.DEGREE + 1, 1)))
-    breaks = _breaks(found)
-    inner = breaks[1:-1][np.diff(breaks[:-1]) > CLOSEST_BREAKS]
-    knots = bspline.clamped(np.concatenate([[0.0], np.repeat(inner, 3), [1.0]]))
-    at = bspline.greville(knots)
-    points = np.asarray(np.linalg.solve(bspline.basis_matrix(knots, at), _positions(found, at)), dtype=float)
-    points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
-    return Spline(bspline.DEGREE, knots * found.duration, points)
+    profiles = found.profiles[0]
+    ends = np.array([profile.t for profile in profiles]).cumsum(axis=1)
+    ends[:, -1] = found.duration
+    jerk = np.array([profile.j for profile in profiles])
+    found_at = dict[float, Spline]()
+    for closest in CLOSEST:
+        spline = spline_of_phases(ends, jerk, q_start, q_goal, closest)
+        found_at[least_time_scale(spline, limits.rates)] = spline
+        if min(found_at) <= WITHIN:
+            break
+    return found_at[min(found_at)]
 
 
 def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
