@@ -29,6 +29,8 @@ from optimizer.problem.branches import BranchLabel, NumberedBranch
 JOINTS = 7
 # Newton steps of a start, and its error [m, rad] from which on it is on a curve; if none is, few starts get more steps
 STEPS, SOLVED, FEW, MOST_STEPS = 12, 1e-9, 24, 60
+# error [m, rad] of starts that came near and no further; so many of them have so many around them, so far away [rad]
+NEARLY, NEAREST, AROUND, SPREAD = 1e-5, 8, 40, 0.1
 # error [m, rad] after many steps of a pose at the edge of reach
 ON_EDGE = 1e-6
 # smallest singular value below which no curve is followed: configurations may go off in several directions
@@ -90,6 +92,17 @@ class TracedArm:
         """None: not known."""
         return
 
+    def _with_near(self, q: Array, missed: Array, T: Array) -> tuple[Array, Array]:
+        """The starts, and what is found around those that came near the pose T (4, 4), and not to it.
+
+        Next to a singularity Newton's method is slow from most starts, but not from all.
+        """
+        near = q[np.argsort(np.where(missed < SOLVED, np.inf, missed))[:NEAREST]]
+        near = near[: int(((missed >= SOLVED) & (missed < NEARLY)).sum())]
+        around = near[:, None] + SPREAD * np.random.default_rng(0).normal(size=(len(near), AROUND, JOINTS))
+        found = solved(self._chain, around.reshape(-1, JOINTS), T, STEPS)
+        return np.concatenate([q, found[0]]), np.concatenate([missed, found[1]])
+
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
         checkpoint()
@@ -98,8 +111,8 @@ class TracedArm:
         if not (missed < SOLVED).any():
             starts = self._seeds.starts(T)
             q, missed = solved(self._chain, starts, T, STEPS)
+        q, missed = self._with_near(q, missed, T)
         if not (missed < SOLVED).any():
-            # next to a singularity Newton's method is slow
             q, missed = solved(self._chain, starts[:FEW], T, MOST_STEPS)
         # what Newton's method nearly reaches after many steps is on a singularity
         q = q[missed < (SOLVED if (missed < SOLVED).any() else ON_EDGE)]

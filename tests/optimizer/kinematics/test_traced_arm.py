@@ -164,6 +164,20 @@ def test_no_curve_of_a_closed_form_is_missing() -> None:
     assert members > 15 and found >= COVERED * members
 
 
+def test_nearly_straight_arms_are_found() -> None:
+    """The elbow of the first one was once missed, and its pose refused."""
+    arm, rng = TracedArm.of(GEN3.model), np.random.default_rng(3)
+    assert arm is not None
+    missed = 0
+    for k in range(12):
+        q = np.array([0.7778, 0.8477, -0.0961, -0.0048, -0.9417, -1.6715, -0.1179]) if k == 0 else inside(GEN3, rng)
+        q[3] = q[3] if k == 0 else 0.005 * (-1) ** k
+        found = [each for each in arm.self_motions(flange(GEN3, q), GEN3.limits) if away(each, q) < FOUND]
+        missed += not found
+        assert k > 0 or found
+    assert missed <= 1
+
+
 def test_out_of_reach_no_distance_is_claimed() -> None:
     T = np.eye(4)
     T[0, 3] = 3.0
