@@ -8,21 +8,23 @@ from models.robot import Array
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline
 
+# how much the jerk of a joint changes where it has none, beside where it has the greatest
+ELSEWHERE = 1e-3
+
 
 def spline_of_phases(ends: Array, jerk: Array, q_start: Array, q_goal: Array, closest: float) -> Spline:
     """The motion from q_start to q_goal (nq,) [rad] with jerk (nq, p) [rad/s³] in phases that last to `ends` (nq, p).
 
     The last end [s] is the duration. Knots are threefold where the jerk of a joint jumps. Jumps closer than `closest`,
-    as a fraction of the duration, become one, since rounding makes jerk of its own between them; then the jerk of the
-    other phases changes a little, so that the motion still ends at rest at its goal.
+    as a fraction of the duration, become one, since rounding makes jerk of its own between them; then the jerk changes
+    a little, so that the motion still ends at rest at its goal.
     """
     duration = float(ends.max())
     breaks, ends = _joined(ends / duration, closest)
     breaks, ends = breaks * duration, ends * duration
-    lengths = np.diff(ends, axis=1, prepend=0.0)
-    jerk = np.array([_ending(d, j, step) for d, j, step in zip(lengths, jerk, q_goal - q_start, strict=True)])
     middle = (breaks[1:] + breaks[:-1]) / 2
     spans = np.array([own[np.searchsorted(end, middle)] for end, own in zip(ends, jerk, strict=True)]).T
+    spans = _ending(np.diff(breaks), spans, np.abs(jerk).max(axis=1), q_goal - q_start)
     knots = bspline.clamped(np.concatenate([[0.0], np.repeat(breaks[1:-1], 3), [duration]]) / duration) * duration
     points = _control_points(knots, breaks, _states(breaks, spans, q_start), spans)
     points[: bspline.REST_POINTS], points[-bspline.REST_POINTS :] = q_start, q_goal
@@ -38,15 +40,21 @@ def _joined(ends: Array, closest: float) -> tuple[Array, Array]:
     return breaks, breaks[group[where[: ends.size]]].reshape(ends.shape)
 
 
-def _ending(lengths: Array, jerk: Array, step: float) -> Array:
-    """The jerks (p,) nearest to the given ones with which phases (p,) [s] lead from rest to rest over a step [rad]."""
+def _ending(lengths: Array, spans: Array, greatest: Array, step: Array) -> Array:
+    """The jerks (b - 1, nq) near `spans`, of these lengths (b - 1,) [s], that lead from rest to rest over a step (nq,)
+    [rad]. They change where a joint has jerk, and elsewhere only if that does not do; `greatest` (nq,) is that of each.
+    """
     left = lengths.sum() - np.cumsum(lengths)
     speed = lengths * (lengths / 2 + left)
     way = lengths * (lengths**2 / 6 + lengths * left / 2 + left**2 / 2)
     rows = np.array([lengths, speed, way])
-    scale = np.linalg.norm(rows, axis=1, keepdims=True)
-    missing = np.array([0.0, 0.0, step]) - rows @ jerk
-    return np.asarray(jerk + np.linalg.lstsq(rows / scale, missing / scale[:, 0], rcond=None)[0])
+    missing = np.outer([0.0, 0.0, 1.0], step) - rows @ spans
+    changed = spans.copy()
+    for joint, weight in enumerate((np.abs(spans) + ELSEWHERE * greatest).T):
+        own = rows * weight
+        scale = np.maximum(np.linalg.norm(own, axis=1), 1e-300)
+        changed[:, joint] += weight * np.linalg.lstsq(own / scale[:, None], missing[:, joint] / scale, rcond=None)[0]
+    return changed
 
 
 def _states(breaks: Array, spans: Array, q_start: Array) -> tuple[Array, Array, Array]:

@@ -13,7 +13,7 @@ from optimizer.trajectories.spline import Spline, least_time_scale
 from optimizer.trajectories.time_scalings import SampledMotion, standstill
 
 # fractions of the duration within which jumps of jerk become one, as long as the motion exceeds its limits by more
-CLOSEST, WITHIN = (1e-5, 4e-5, 8e-5), 1 + 1e-6
+CLOSEST, WITHIN = (1e-5, 4e-5, 2e-4, 1e-3), 1 + 1e-6
 
 
 def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion:

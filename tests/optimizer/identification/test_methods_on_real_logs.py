@@ -6,9 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from benchmarks.identification_logs import MISSING, folder, tx40, ur3e
+from benchmarks.identification_logs import tx40, ur3e
 from models.robot import Array, Robot
 from optimizer.identification.fits.fitting import fit_rows, motor_torque
 from optimizer.identification.fits.threshold import velocity_threshold
@@ -20,14 +19,6 @@ from optimizer.identification.rows.fit_rows import rows_of
 
 PLAIN = Options(held_out=0.0, terms=("coulomb", "viscous", "offset"))
 REFIT = replace(PLAIN, refit=True)
-
-
-@pytest.fixture(scope="module")
-def place() -> Path:
-    found = folder()
-    if found is None:
-        pytest.skip(MISSING)
-    return found
 
 
 def friction_of(robot: Robot, log: Log, options: Options) -> tuple[Array, Array]:

@@ -6,20 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from benchmarks.identification import tx40_torque
-from benchmarks.identification_logs import MISSING, folder, ur3e
+from benchmarks.identification_logs import ur3e
 from optimizer.identification.identify import fit
 from optimizer.identification.options import Options
-
-
-@pytest.fixture(scope="module")
-def place() -> Path:
-    found = folder()
-    if found is None:
-        pytest.skip(MISSING)
-    return found
 
 
 def test_power_of_moves_that_no_fit_has_seen(place: Path) -> None:

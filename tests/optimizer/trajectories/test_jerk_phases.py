@@ -16,6 +16,7 @@ MOVES = 40
 MOSTLY, ALWAYS = {False: 1e-4, True: 1e-3}, 0.02
 # rad: a jump that is moved by a ten thousandth of the duration, at the greatest speed
 AWAY = 1e-3
+HARDLY = 0.5  # the same as ALWAYS, of moves of which some joints move by a billionth of others
 NEARLY = 1e-5  # relative, of limits that are nearly equal
 
 
@@ -43,6 +44,20 @@ def test_it_is_ruckigs_motion(name: str, nearly_equal: bool) -> None:
         assert max(np.abs(q[0] - start).max(), np.abs(q[-1] - goal).max()) < 1e-12
     assert np.percentile(scales, 90) < 1 + MOSTLY[nearly_equal]
     assert max(scales) < 1 + ALWAYS
+
+
+@pytest.mark.parametrize("name", ["ur5e", "kr10_r1100", "panda"])
+def test_some_joints_hardly_move(name: str) -> None:
+    """Their phases of jerk are too short to be apart; each still ends where it should."""
+    limits, rng, scales = load_robot(name).limits, np.random.default_rng(1), []
+    for _ in range(MOVES):
+        goal = rng.uniform(-2, 2, len(limits.q_min)) * 10.0 ** rng.uniform(-9, 0, len(limits.q_min))
+        spline = time_optimal_spline(limits, np.zeros_like(goal), goal)
+        scales.append(least_time_scale(spline, limits.rates))
+        at = np.linspace(0, 1, 60)
+        away = sample(spline, at * spline.duration)[0] - time_optimal_positions(limits, np.zeros_like(goal), goal, at)
+        assert np.abs(away).max() < 10 * AWAY
+    assert np.percentile(scales, 80) < 1 + ALWAYS and max(scales) < 1 + HARDLY
 
 
 def test_joints_that_stay() -> None:

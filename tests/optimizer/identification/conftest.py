@@ -1,0 +1,18 @@
+"""The real logs, for the tests that need them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.identification_logs import MISSING, folder
+
+
+@pytest.fixture(scope="session")
+def place() -> Path:
+    """The folder of the real logs; where there is none, the test is skipped."""
+    found = folder()
+    if found is None:
+        pytest.skip(MISSING)
+    return found
