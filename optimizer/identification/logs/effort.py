@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 
 from models.robot import Array
 from optimizer.identification.logs.log import EffortMeaning
-from optimizer.identification.logs.motion import Motion
+from optimizer.identification.logs.motion import Motion, thinned
 
 _MOST_ROWS = 4000  # that the slope is taken from
 _KNEE = 0.02  # rad/s over which the sign of the speed is smoothed
@@ -35,16 +34,13 @@ class EffortReport:
 
 def effort_report(motion: Motion, effort: Array) -> EffortReport:
     """What efforts (n, joints) of a motion are."""
-    rows = np.arange(0, len(effort), max(1, -(-len(effort) // _MOST_ROWS)))
+    rows = thinned(len(effort), _MOST_ROWS)
     part, effort, robot = motion.at(rows), effort[rows].astype(float), motion.robot
-    q, v, a, payload = part.q, part.v, part.a, motion.payload
-    model = robot.loaded_model(payload.mass, payload.com, payload.inertia, motion.gravity)
-    data = model.createData()
-    weights = np.array([pin.computeGeneralizedGravity(model, data, each) for each in q])
+    rigid, still = part.rigid_torques(), np.zeros_like(part.q)
+    weights = replace(part, v=still, a=still).rigid_torques()
     # of those next to the base: at a wrist, cables and friction outweigh what it carries
     heaviest = np.sort(np.argsort(-weights[:, : (robot.nq + 1) // 2].std(axis=0))[:2])
-    rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
-    slopes = {int(j): _slope(rigid[:, j], v[:, j], effort[:, j], robot.limits.tau_max[j]) for j in heaviest}
+    slopes = {int(j): _slope(rigid[:, j], part.v[:, j], effort[:, j], robot.limits.tau_max[j]) for j in heaviest}
     judged = [_judged(slope, robot.drives.torque_constant[j]) for j, slope in slopes.items() if slope is not None]
     meanings = {meaning for meaning, _ in judged}
     meaning = meanings.pop() if len(meanings) == 1 else None

@@ -13,7 +13,7 @@ from optimizer.identification.logs.lag import smooth, without_spikes
 from optimizer.identification.logs.log import EffortMeaning
 from optimizer.identification.logs.log_errors import EffortNotUsable
 from optimizer.identification.logs.log_warnings import numbers_of_joints
-from optimizer.identification.logs.motion import Motion
+from optimizer.identification.logs.motion import Motion, thinned
 
 _MOST_ROWS, _LEAST_ROWS = 4000, 100  # that are compared, of all and of a joint
 _LEAST_SPEED = 0.05  # rad/s
@@ -47,7 +47,7 @@ class JointEffort:
 
 def joint_efforts(motion: Motion, effort: Array) -> list[JointEffort]:
     """Of each joint that moves enough, from efforts (n, joints)."""
-    rows = np.arange(0, len(effort), max(1, -(-len(effort) // _MOST_ROWS)))
+    rows = thinned(len(effort), _MOST_ROWS)
     part = motion.at(rows)
     rigid, found = part.rigid_torques(), list[JointEffort]()
     for joint in range(effort.shape[1]):

@@ -13,7 +13,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.bodies import Indices
-from optimizer.identification.logs.motion import Motion
+from optimizer.identification.logs.motion import Motion, thinned
 
 LEAST_LAG = 0.02
 """Shorter lags [s] are left as they are: controllers' own filters have some milliseconds."""
@@ -77,7 +77,7 @@ def power_lag_of(motion: Motion, power: Array) -> float:
 def _compared(count: int, rate: float) -> Indices:
     """The rows of a log of so many that are compared: others can be as far from them as the longest lag."""
     edge = max(2, round(_MOST_LAG * rate))
-    return np.arange(edge, count - edge, max(1, -(-count // _MOST_ROWS)))
+    return thinned(count, _MOST_ROWS, edge)
 
 
 def _lag(channels: Sequence[_Channel], rate: float) -> float:

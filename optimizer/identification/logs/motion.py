@@ -5,10 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
+import numpy as np
+
 from models.robot import Array, Robot
 from optimizer.collision.bodies import Indices
 from optimizer.energy.link_regressor import rigid_torques
 from optimizer.problem.arm import Payload
+
+
+def thinned(count: int, most: int, edge: int = 0) -> Indices:
+    """Evenly spaced rows of so many, some at either end left out; about `most` at most."""
+    return np.arange(edge, count - edge, max(1, -(-count // most)))
 
 
 @dataclass(frozen=True, eq=False)
