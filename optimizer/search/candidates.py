@@ -9,8 +9,9 @@ from enum import Enum
 from itertools import product
 
 import numpy as np
+import numpy.typing as npt
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.methods.method import SolveResult
@@ -51,7 +52,8 @@ class Candidate:
     """A start and goal configuration with the state of their search; `energy` [J] is the exact value of the objective.
 
     `shortest` [s] is a proven least duration. `holdable`: the arm can be at both ends. A candidate that is `deferred`
-    is not solved yet, because similar candidates have a smaller lower bound.
+    is not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
+    many configurations that reach its target.
     """
 
     start: EndConfiguration
@@ -67,11 +69,10 @@ class Candidate:
     attempt: SolveResult | None = field(default=None, repr=False)
     holdable: bool = True
     deferred: bool = False
+    sampled: bool = field(init=False)
 
-    @property
-    def sampled(self) -> bool:
-        """Whether an end is one of infinitely many configurations that reach its target."""
-        return self.start.sampled or self.goal.sampled
+    def __post_init__(self) -> None:
+        self.sampled = self.start.sampled or self.goal.sampled
 
     def settle(self, status: CandidateStatus, reason: Reason, message: str | None = None) -> None:
         """Set the status with its reason; the `message` is the reason's own unless given."""
@@ -91,7 +92,7 @@ class Candidate:
     def move(self, to: Candidate) -> None:
         """Take the ends and the bounds of another candidate for the same targets."""
         self.start, self.goal, self.q_start, self.q_goal = to.start, to.goal, to.q_start, to.q_goal
-        self.lower_bound, self.shortest = to.lower_bound, to.shortest
+        self.lower_bound, self.shortest, self.sampled = to.lower_bound, to.shortest, to.sampled
 
     def report(self) -> CandidateReport:
         """The candidate as the answer reports it."""
@@ -140,14 +141,21 @@ def pairs(
                     f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give fewer of them, a "
                     "`branch`, or `windings` false.",
                 )
-            for combination in product(*options):
-                both = np.array(combination)
-                candidate = Candidate(start, goal, both[:, 0], both[:, 1])
-                if candidate.sampled:
+            new = [Candidate(start, goal, *both) for both in zip(*_combined(options), strict=True)]
+            if new[0].sampled:
+                for candidate in new:
                     candidate.deferred = True
                     candidate.settle(CandidateStatus.UNVISITED, Reason.DEFERRED)
-                result.append(candidate)
+            result += new
     return result
+
+
+def _combined(options: list[list[tuple[float, float]]]) -> tuple[Array, Array]:
+    """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last joint's first."""
+    chosen = np.indices([len(each) for each in options]).reshape(len(options), -1)
+    both = [np.array(each)[rows] for each, rows in zip(options, chosen, strict=True)]
+    start, goal = np.array(both).transpose(2, 1, 0).copy()
+    return start, goal
 
 
 def _joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
@@ -173,38 +181,57 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: S
     Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is left.
     """
     sides = {
-        name: list({id(end): end for end in (getattr(candidate, name) for candidate in candidates)}.values())
-        for name in SIDES
+        "start": _Ends.of([each.start for each in candidates]),
+        "goal": _Ends.of([each.goal for each in candidates]),
     }
-    ruled = {name: check_configurations(prepared, np.array([end.q for end in sides[name]])) for name in checked}
-    ruled_out = {id(end): ruling for name in checked for end, ruling in zip(sides[name], ruled[name], strict=True)}
-    potential = {id(end): prepared.potential(end.q) for ends in sides.values() for end in ends}
-    displacement = np.array([candidate.q_goal - candidate.q_start for candidate in candidates])
-    potential_gain = np.array(
-        [potential[id(candidate.goal)] - potential[id(candidate.start)] for candidate in candidates]
-    )
-    hold = (
-        prepared.holding_power(np.array([candidate.q_goal for candidate in candidates]))
-        if prepared.problem.cycle
-        else None
-    )
-    bounds, shortest = lower_bounds(prepared, displacement, potential_gain, hold)
+    levels = np.array([sides[name].potential(prepared) for name in SIDES]).T
+    q_start, q_goal = (np.array([getattr(each, name) for each in candidates]) for name in ("q_start", "q_goal"))
+    hold = prepared.holding_power(q_goal) if prepared.problem.cycle else None
+    bounds, shortest = lower_bounds(prepared, q_goal - q_start, levels[:, 1] - levels[:, 0], hold)
     if prepared.problem.objective == "mechanical":
-        q_start = np.array([candidate.q_start for candidate in candidates])
-        levels = np.array([[potential[id(candidate.start)], potential[id(candidate.goal)]] for candidate in candidates])
-        bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_start + displacement, levels))
+        bounds = np.maximum(bounds, mechanical_bounds(prepared, q_start, q_goal, levels))
     if prepared.problem.passes:
-        bounds = np.maximum(bounds, bound_through(prepared, candidates[0].q_start, candidates[0].q_goal))
+        bounds = np.maximum(bounds, bound_through(prepared, q_start[0], q_goal[0]))
     for candidate, value, least in zip(candidates, bounds.tolist(), shortest.tolist(), strict=True):
         candidate.lower_bound, candidate.shortest = value, least
-        for name in checked:
-            ruling = ruled_out[id(getattr(candidate, name))]
-            if ruling is not None:
-                message = f"at the {name}, {ruling.reason}"
-                candidate.settle(CandidateStatus.INFEASIBLE, Reason.INVALID_END, message)
-                candidate.lower_bound, candidate.holdable = np.inf, False
-                break
-        if candidate.holdable and not np.isfinite(value):
+        if not math.isfinite(value):
             candidate.settle(CandidateStatus.INFEASIBLE, Reason.TOO_SLOW, f"takes at least {least:.4f} s")
+    ruled = {name: check_configurations(prepared, sides[name].q) for name in checked}
+    for name in reversed(checked):  # of a candidate with two such ends, the start is named
+        for row, ruling in enumerate(ruled[name]):
+            if ruling is not None:
+                _rule_out(candidates, sides[name].rows == row, f"at the {name}, {ruling.reason}")
     for name in checked:
-        raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in sides[name]], ruled[name])
+        raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in sides[name].all], ruled[name])
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """The configurations at one side of candidates, each once, and the row (P,) of that of each candidate."""
+
+    all: list[EndConfiguration]
+    rows: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, ends: Sequence[EndConfiguration]) -> _Ends:
+        """From the end of each candidate."""
+        known = {id(end): end for end in ends}
+        row = {key: k for k, key in enumerate(known)}
+        return cls(list(known.values()), np.array([row[id(end)] for end in ends]))
+
+    @property
+    def q(self) -> Array:
+        """All configurations (n, nq) [rad]."""
+        return np.array([end.q for end in self.all])
+
+    def potential(self, prepared: PreparedProblem) -> Array:
+        """Potential energy (P,) [J] at the end of each candidate."""
+        return np.array([prepared.potential(end.q) for end in self.all])[self.rows]
+
+
+def _rule_out(candidates: Sequence[Candidate], marked: Mask, message: str) -> None:
+    """Settle the `marked` (P,) candidates as infeasible: the arm cannot be at an end."""
+    for row in np.flatnonzero(marked).tolist():
+        candidate = candidates[row]
+        candidate.settle(CandidateStatus.INFEASIBLE, Reason.INVALID_END, message)
+        candidate.lower_bound, candidate.holdable = np.inf, False
