@@ -20,11 +20,12 @@ class CandidatesFound:
 class CandidateTried:
     """What became of the candidate of this index: the `energy` [J] of its motion, None without one.
 
-    `bound` [J] is its proven lower bound, None if none is known.
+    `pruned`: it was given up, since it comes to no less energy than the best motion. `bound` [J] is its proven lower
+    bound, None if none is known.
     """
 
     index: int
-    status: Literal["solved", "failed"]
+    status: Literal["solved", "pruned", "failed"]
     bound: float | None
     energy: float | None
 

@@ -33,8 +33,9 @@ class SolveStatus(StrEnum):
     """Outcome of solving one candidate.
 
     SOLVED: there is a motion within the limits. INFEASIBLE: the method has none for this candidate. FAILED: the method
-    found none. PRUNED: the motion collides and, even so, needs at least as much energy as the best motion known.
-    POSTPONED: the planner found a path to another candidate's goal first. OUT_OF_TIME: the deadline passed.
+    found none. PRUNED: it needs at least as much energy as the best motion known, by what the solve promises, or
+    although it collides. POSTPONED: the planner found a path to another candidate's goal first. OUT_OF_TIME: the
+    deadline passed.
     """
 
     SOLVED = "solved"

@@ -137,21 +137,20 @@ class SqpMethod(Method):
             if not result.feasible:
                 reason = f"found no motion of {guess.space.n} control points within the limits"
                 return _failed(reason, collision, iterations, solves)
+            if result.status is SqpStatus.COSTLIER:
+                return SolveResult(SolveStatus.PRUNED, COSTLIER, iterations, solves)
             check = self._checked(stage.program, result)
             collision = check.collision
-            costlier = result.status is SqpStatus.COSTLIER
             if check.passed:
-                reason = STOPPED if late else COSTLIER if costlier else CONVERGED
+                reason = STOPPED if late else CONVERGED
                 return SolveResult(
                     SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity, cut_short=late
                 )
             if collision is not None and not len(stage.pairs):
-                if costlier or self.prepared.cost_of(check.spline) >= self.best_known:
+                if self.prepared.cost_of(check.spline) >= self.best_known:
                     return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
                 if self.was_postponed or (np.isfinite(self.best_known) and collision.min_clearance < -DEEP):
                     return _failed("its motion collides", collision, iterations, solves)
-            if costlier:
-                return SolveResult(SolveStatus.PRUNED, COSTLIER, iterations, solves)
             stage = self._repaired(stage, result, check)
         return _failed("the motion exceeds limits between the nodes", collision, iterations, REPAIRS)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -138,7 +139,7 @@ class WorkingSetQP:
             if attempt >= last or not self._add_broken(rows, at, bounds, x):
                 break
         mu = np.maximum(multipliers, 0.0)
-        _, mu_path, mu_torque, _ = np.split(mu, np.cumsum([len(goal.least), len(path.slack), len(torque.slack)]))
+        _, mu_path, mu_torque = _parts(mu, (len(goal.least), len(path.slack), len(torque.slack)))
         self._keep(rows, mu)
         pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
         return QPStep(
@@ -233,8 +234,8 @@ class WorkingSetQP:
     def _bounds(self, free: Array, T: float) -> tuple[Array, Array]:
         """Least and greatest change of each variable. Within position limits, control points keep the curve inside."""
         p = self.p
-        lower = np.maximum(np.tile(p.limits.q_min, p.free_count) - free.ravel(), -STEP)
-        upper = np.minimum(np.tile(p.limits.q_max, p.free_count) - free.ravel(), STEP)
+        lower = np.maximum(p.limits.q_min - free, -STEP).ravel()
+        upper = np.minimum(p.limits.q_max - free, STEP).ravel()
         if p.goal_constraints is not None:
             moved = free[-1] - p.coordinates.goal
             lower[-p.r :] = np.maximum(lower[-p.r :], -p.goal_constraints.radius - moved)
@@ -253,6 +254,12 @@ class WorkingSetQP:
         A[:, self.count - self.p.r : self.count] = constraints.rows
         moved = constraints.rows @ (free[-1] - self.p.coordinates.goal)
         return _GoalRows(A, constraints.lower - moved, constraints.upper - moved)
+
+
+def _parts(mu: Array, counts: tuple[int, ...]) -> list[Array]:
+    """The first parts of mu, of these lengths."""
+    ends = list(accumulate(counts, initial=0))
+    return [mu[first:last] for first, last in pairwise(ends)]
 
 
 def _shortened(x: Array, bounds: Array) -> Array:

@@ -116,7 +116,11 @@ class Incumbent:
         if self.tell is nobody:
             return
         index = next(k for k, each in enumerate(self.candidates) if each is candidate)
-        status: Literal["solved", "failed"] = "failed" if candidate.energy is None else "solved"
+        status: Literal["solved", "pruned", "failed"] = "failed"
+        if candidate.energy is not None:
+            status = "solved"
+        elif candidate.status is CandidateStatus.PRUNED:
+            status = "pruned"
         self.tell(CandidateTried(index, status, candidate.lower_bound, candidate.energy))
         self.tell_best()
 

@@ -13,7 +13,7 @@ from optimizer.optimize_round import optimize_round
 from optimizer.pareto import pareto
 from optimizer.problem.problem import Problem
 from optimizer.progress import CandidatesFound, CandidateTried, Event, Improved, forward, nobody
-from optimizer.solution import CandidateStatus
+from optimizer.search.candidates import Reason
 from tests.optimizer.moves import GOAL, HOME, problem, tcp_pose
 from tests.optimizer.sequence.rounds import pick_and_place
 from tests.selection import long_but
@@ -52,9 +52,8 @@ def test_a_search_ends_with_its_answer(bound: str) -> None:
     assert last.bound == answer.lower_bound
     assert last.q_goal is not None and (last.q_goal == answer.goal.q).all()
     assert events[0] == CandidatesFound(len(answer.candidates))
-    computed = (CandidateStatus.SOLVED, CandidateStatus.FAILED)
     told = {each.index: each for each in events if isinstance(each, CandidateTried)}
-    assert set(told) == {k for k, each in enumerate(answer.candidates) if each.status in computed}
+    assert set(told) == {k for k, each in enumerate(answer.candidates) if each.reason != Reason.BOUND.value}
     for index, each in told.items():
         assert each.status == answer.candidates[index].status.value
 

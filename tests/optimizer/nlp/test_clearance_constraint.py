@@ -1,5 +1,7 @@
 """Motions among obstacles: they keep away, they cost no less than without, and what is far costs nothing."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import NO_BETTER
+from optimizer.methods.sqp_method import COSTLIER, NO_BETTER
 from optimizer.nlp.clearance_constraint import COUNTED, RESERVE, SCALE, ClearanceConstraint
 from optimizer.nlp.working_set_qp import NEAR_PATH
 from optimizer.prepared_problem import PreparedProblem
@@ -21,7 +23,7 @@ from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from optimizer.problem.tool_cone import ToolCone
 from optimizer.solution import Solution
 from optimizer.trajectories.spline import sample
-from tests.optimizer.moves import problem_with
+from tests.optimizer.moves import fixed, problem_with
 
 ROBOT = load_robot("ur5e")
 HOME = np.array([0.0, -1.57, 1.57, -1.57, -1.57, 0.0])
@@ -46,6 +48,10 @@ def at(*xyz: float) -> Array:
 
 def low_post(margin: float = 0.0) -> Obstacle:
     return Obstacle("post", Box(np.array([0.08, 0.08, 0.25])), at(WAY[0], WAY[1], 0.125), margin)
+
+
+POST = Scene((low_post(),))
+Fields = dict[str, Any]
 
 
 def solved(*obstacles: Obstacle, **given: object) -> Solution:
@@ -82,18 +88,25 @@ def test_what_is_far_away_changes_nothing() -> None:
     assert with_ball == pytest.approx(without, rel=SAME_ENERGY)
 
 
-def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned() -> None:
-    task = PreparedProblem.of(problem_with(HOME, GOAL, scene=Scene((low_post(),))))
-    free = solved(collisions=False).energy.electrical.total
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [({}, COSTLIER), ({"objective": "mechanical"} | fixed(2.0), NO_BETTER)],  # no promise is made of work
+    ids=["electrical", "mechanical"],
+)
+def test_a_colliding_motion_that_needs_more_energy_than_a_known_one_is_pruned(given: Fields, reason: str) -> None:
+    task, empty = (PreparedProblem.of(problem_with(HOME, GOAL, scene=scene, **given)) for scene in (POST, Scene()))
 
-    def attempt(best_known: float) -> SolveResult:
-        solver = FreeSpline(task, HOME, GOAL, NEVER)
+    def attempt(on: PreparedProblem, best_known: float) -> SolveResult:
+        solver = FreeSpline(on, HOME, GOAL, NEVER)
         solver.best_known = best_known
         return solver.solve()
 
-    assert attempt(np.inf).status is attempt(1.1 * free).status is SolveStatus.SOLVED
-    pruned = attempt(0.9 * free)
-    assert (pruned.status, pruned.reason, pruned.spline) == (SolveStatus.PRUNED, NO_BETTER, None)
+    through = attempt(empty, np.inf).spline
+    assert through is not None
+    free = empty.cost_of(through)
+    assert attempt(task, np.inf).status is attempt(task, 1.2 * free).status is SolveStatus.SOLVED
+    pruned = attempt(task, 0.95 * free)
+    assert (pruned.status, pruned.reason, pruned.spline) == (SolveStatus.PRUNED, reason, None)
 
 
 def every_pair(model: CollisionModel) -> PathConstraints:
