@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 
 import numpy as np
 import orjson
 
+from app.convert.packed import packed, unpacked
 from optimizer.sequence.known_motions import KnownMotion, KnownMotions
 from optimizer.trajectories.spline import Spline
 
@@ -16,7 +16,7 @@ _SPLINE = ("degree", "knots", "control_points")
 
 def to_known_motions(kept: Mapping[str, bytes]) -> KnownMotions:
     """Known motions from kept ones."""
-    return KnownMotions({key: _to_motion(orjson.loads(zlib.decompress(body))) for key, body in kept.items()})
+    return KnownMotions({key: _to_motion(orjson.loads(unpacked(body))) for key, body in kept.items()})
 
 
 def to_kept(motions: KnownMotions) -> dict[str, bytes]:
@@ -33,4 +33,4 @@ def _to_motion(kept: dict[str, object]) -> KnownMotion:
 def _kept(motion: KnownMotion) -> bytes:
     spline = {name: np.ascontiguousarray(getattr(motion.spline, name)) for name in _SPLINE[1:]}
     own = {"degree": motion.spline.degree, **spline, "stationarity": motion.stationarity}
-    return zlib.compress(orjson.dumps(own, option=orjson.OPT_SERIALIZE_NUMPY))
+    return packed(orjson.dumps(own, option=orjson.OPT_SERIALIZE_NUMPY))

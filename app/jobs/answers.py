@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import csv
-import zlib
 from collections.abc import AsyncIterator, Sequence
 from functools import partial
 from io import StringIO
@@ -12,6 +11,7 @@ from typing import Any
 
 import orjson
 
+from app.convert.packed import unpacked
 from app.schemas.errors import PREFIX
 from app.store import jobs
 from app.store.job_events import eta, progress
@@ -71,7 +71,7 @@ def _lines(found: Sequence[tuple[JobRequest, bytes | None]]) -> bytes:
 
 
 def _line(request: JobRequest, body: bytes | None) -> bytes:
-    result = None if body is None else orjson.Fragment(zlib.decompress(body))
+    result = None if body is None else orjson.Fragment(unpacked(body))
     return orjson.dumps(status(request) | {"result": result}, option=orjson.OPT_APPEND_NEWLINE)
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import time
-import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
 from app import __version__
+from app.convert.packed import packed, unpacked
 from app.engine.result import AnswerFigures, TaskResult
 from app.exceptions import StoreUnavailable
 from app.jobs.heap import Held
@@ -119,7 +119,7 @@ def _copies(hits: Iterable[tuple[Held, Answer]], began: float) -> dict[Held, Out
 
 def _copy(held: Held, answer: Answer, began: float) -> Outcome:
     figures = AnswerFigures(answer.robot, answer.energy, answer.duration, answer.status)
-    result = TaskResult(zlib.decompress(answer.body), "application/json", kept_as=answer.id)
+    result = TaskResult(unpacked(answer.body), "application/json", kept_as=answer.id)
     copy = result.copied(request_id_of(held.lease))
-    document = zlib.compress(copy.document, zlib.Z_BEST_SPEED)
+    document = packed(copy.document)
     return Outcome(held.lease, "done", time.perf_counter() - began, figures, document, copy.kept_as)

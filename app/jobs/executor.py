@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol, TypeGuard
 
 from app.cluster.link import Cluster
+from app.convert.packed import unpacked
 from app.engine.pool import Engine
 from app.engine.result import TaskResult
 from app.engine.task import Task
@@ -104,7 +104,7 @@ async def _with_logs(task: Task, store: Store) -> Task:
     """The task with the logs that an identification names. Raises UnknownLog or StoreUnavailable."""
     if not _needs_logs(task):
         return task
-    asked = IdentifyRequest.model_validate_json(zlib.decompress(task.body))
+    asked = IdentifyRequest.model_validate_json(unpacked(task.body))
     found = [await store.read(partial(logs.get, log_id=each)) for each in asked.all_logs]
     return replace(task, logs=tuple((log.settings, log.body) for log in found))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from functools import partial
 from typing import Annotated, Any
 
@@ -10,6 +9,7 @@ import orjson
 from fastapi import APIRouter, Path, Query, Request, Response
 from sqlalchemy.orm import Session
 
+from app.convert.packed import unpacked
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest, UnknownIdentification, UnknownJob
 from app.http.handlers import result_response
@@ -111,7 +111,7 @@ async def residuals(id: IdentificationId, store: ServiceStore) -> Response:
     """Measured and modelled torques and power over time, move by move. Moves that were held out are predicted by a fit
     that has not seen them."""
     body = await store.read(partial(_curves, job_id=id))
-    content = {"id": id, "moves": None} if body is None else {"id": id, **orjson.loads(zlib.decompress(body))}
+    content = {"id": id, "moves": None} if body is None else {"id": id, **orjson.loads(unpacked(body))}
     return result_response(TaskResult.of_json(content))
 
 
@@ -123,7 +123,7 @@ async def _shown(store: ServiceStore, job_id: str) -> Identification:
 def _content(session: Session, job_id: str) -> dict[str, Any]:
     """The fields of an identification. Raises UnknownIdentification."""
     job, request, body = _found(session, job_id)
-    result = None if body is None else orjson.Fragment(zlib.decompress(body))
+    result = None if body is None else orjson.Fragment(unpacked(body))
     return _summary(session, job, request) | {"problem": request.problem, "result": result}
 
 

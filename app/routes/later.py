@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import zlib
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import orjson
 from fastapi import Depends, Header, Request, Response
 
+from app.convert.packed import unpacked
 from app.http.disconnect import unless_disconnected
 from app.http.handlers import PROBLEM_MEDIA_TYPE
 from app.jobs.answers import summary
@@ -91,7 +91,7 @@ class Later:
         """The answer or the problem of a job of one request that has ended."""
         request, body = await self.jobs.store.read(lambda session: stored_jobs.outcome(session, job_id, 0))
         if body is not None:
-            return Response(zlib.decompress(body), media_type="application/json")
+            return Response(unpacked(body), media_type="application/json")
         if request.problem is None:  # somebody cancelled it meanwhile
             view = await self.jobs.view(job_id)
             return Response(Job(**summary(view)).model_dump_json(), 202, media_type="application/json")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import replace
 from datetime import timedelta
 
@@ -12,6 +11,7 @@ from sqlalchemy.orm import Session, defer
 
 from app.access.client import Client
 from app.access.rules import check_owner
+from app.convert.packed import packed, unpacked
 from app.engine.result import StoredAnswer
 from app.exceptions import AnswerInUse, UnknownAnswer
 from app.store.paging import position_after, position_of
@@ -20,14 +20,14 @@ from app.store.tables import Answer, Job, is_id, now
 
 def put(
     session: Session, kind: str, answer: StoredAnswer, study_id: str | None = None, owner: str | None = None
-) -> None:
-    """Stores an answer, the JSON document of the endpoint `kind`.
+) -> int:
+    """Stores an answer, the JSON document of the endpoint `kind`. Returns its size as it is kept [byte].
 
     The answer of a study stays until the study is deleted; any other until `prune` deletes it.
     """
-    # the fastest level: a front can have a hundred megabytes, and its client waits
-    compressed = replace(answer, body=zlib.compress(answer.body, zlib.Z_BEST_SPEED))
-    session.add(_row(kind, compressed, study_id=study_id, owner=owner))
+    body = packed(answer.body)
+    session.add(_row(kind, replace(answer, body=body), study_id=study_id, owner=owner))
+    return len(body)
 
 
 def put_of_job(session: Session, kind: str, compressed: StoredAnswer, job: Job) -> None:
@@ -45,7 +45,7 @@ def get(session: Session, answer_id: str) -> tuple[Answer, bytes]:
     answer = session.get(Answer, answer_id) if is_id(answer_id) else None
     if answer is None:
         raise UnknownAnswer
-    return answer, zlib.decompress(answer.body)
+    return answer, unpacked(answer.body)
 
 
 def of_job(session: Session, job_id: str, kind: str) -> bytes | None:

@@ -15,7 +15,6 @@ from app.settings import Settings
 from app.store import answers, cache, known_motions
 from app.store.cache import Answered, Asked
 from app.store.store import Store
-from app.store.tables import Answer
 
 
 class _TooLarge(Exception):
@@ -76,10 +75,7 @@ async def _put(
     """
 
     def put(session: Session) -> int:
-        for answer in stored:
-            answers.put(session, kind, answer, owner=owner)
-        session.flush()
-        size = sum(session.get_one(Answer, answer.id).size for answer in stored)
+        size = sum(answers.put(session, kind, answer, owner=owner) for answer in stored)
         if most is not None and size > most:
             raise _TooLarge
         if also is not None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import zlib
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 from sqlalchemy.orm import Session
 
+from app.convert.packed import unpacked
 from app.engine.result import TaskResult
 from app.exceptions import StoreUnavailable
 from app.schemas.common import Request
@@ -101,7 +101,7 @@ class AnswerCache:
 
 def _with_document(session: Session, asked: Asked) -> tuple[Answer, bytes] | None:
     answer = cache.find(session, [asked]).get(asked)
-    return None if answer is None else (answer, zlib.decompress(answer.body))
+    return None if answer is None else (answer, unpacked(answer.body))
 
 
 async def asked_for(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from app.convert.json_text import parsed_json
+from app.convert.packed import packed
 from app.engine.result import TaskResult
 from app.exceptions import InvalidRequest
 from app.http.problem_details import MOST_ERRORS, invalid_request
@@ -121,7 +121,7 @@ def _new_request(kind: str, asked: Request, deadlines: Deadlines, fresh: bool) -
     deadline = min(deadlines.without if given is None else given, deadlines.longest)
     body = asked.model_dump_json(exclude_unset=True).encode()
     meaning = None if fresh else meaning_of(kind, asked)
-    return NewRequest(kind, zlib.compress(body), deadline, meaning)
+    return NewRequest(kind, packed(body), deadline, meaning)
 
 
 def _fingerprint(requests: Iterable[NewRequest], rest: str) -> str:

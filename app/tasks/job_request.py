@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import orjson
 
 from app.convert.evaluation import to_evaluate_response
+from app.convert.packed import packed, unpacked
 from app.engine.result import TaskResult
 from app.schemas.compare import CompareRequest
 from app.schemas.cycle import CycleRequest
@@ -64,7 +64,7 @@ class JobRequestTask:
     def run(self, deadline: float) -> TaskResult:
         """The answer of the endpoint, within about `deadline` seconds."""
         began = time.perf_counter()
-        body = zlib.decompress(self.body)
+        body = unpacked(self.body)
         if self.kind == IDENTIFY:
             asked = IdentifyRequest.model_validate_json(body)
             result = IdentifyTask(asked, self.logs, self.request_id).run(deadline)
@@ -77,9 +77,9 @@ class JobRequestTask:
         figures = figures_of(answer)
         # here and not in the service, which has more to do; nobody waits, so that size counts more than time
         return JobResult(
-            zlib.compress(result.document),
+            packed(result.document),
             result.media_type,
-            tuple(replace(part, body=zlib.compress(part.body)) for part in result.stored),
+            tuple(replace(part, body=packed(part.body)) for part in result.stored),
             result.kept_as,
             figures,
             result.is_optimal,

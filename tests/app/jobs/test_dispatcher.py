@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import asyncio
 import os
-import zlib
 from collections.abc import Awaitable, Callable
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
 
 from app.access.client import OPERATOR
+from app.convert.packed import packed, unpacked
 from app.engine.result import TaskResult
 from app.engine.work import Take
 from app.exceptions import ClusterUnavailable, Preempted, WorkerDied
@@ -28,11 +28,11 @@ from app.tasks.job_request import JobRequestTask, JobResult
 from optimizer.progress import Tell, nobody
 
 PATIENCE = 60.0
-BODY = zlib.compress(b"{}")
+BODY = packed(b"{}")
 
 
 def answer(name: str) -> TaskResult:
-    return JobResult(zlib.compress(f'"{name}"'.encode()), "application/json", wall_time=0.1, parts="optimize")
+    return JobResult(packed(f'"{name}"'.encode()), "application/json", wall_time=0.1, parts="optimize")
 
 
 class Work:
@@ -132,7 +132,7 @@ def test_a_second_service_takes_over_and_the_late_answer_is_dropped(tmp_path: Pa
         assert (only.state, only.attempt, first.work.begun, second.work.begun) == ("done", 2, [0], [0])
         _, body = await store.read(partial(jobs.outcome, job_id=job_id, number=0))
         assert body is not None
-        assert zlib.decompress(body) == b'"second"'
+        assert unpacked(body) == b'"second"'
 
     with_store(tmp_path, test)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import pytest
 
 from app import __version__
 from app.access.client import OPERATOR
+from app.convert.packed import packed, unpacked
 from app.engine.result import AnswerFigures, TaskResult
 from app.exceptions import TaskFailed
 from app.store import jobs
@@ -27,7 +27,7 @@ from tests.app.jobs.test_dispatcher import BODY, Service, is_done, requests, unt
 def computed(task: JobRequestTask, status: str = "optimal") -> TaskResult:
     figures = AnswerFigures("ur5e", 5.0, 1.0, status)
     result = TaskResult.of_kept_json({"id": task.request_id, "by": task.request_id}, figures)
-    document = zlib.compress(result.document)
+    document = packed(result.document)
     return JobResult(
         document, result.media_type, (), result.kept_as, figures, result.is_optimal, wall_time=0.1, parts="optimize"
     )
@@ -57,7 +57,7 @@ async def done(service: Service, *asked: NewRequest, owner: str | None = None) -
 async def document(service: Service, job_id: str, number: int) -> Any:
     _, body = await service.jobs.store.read(partial(jobs.outcome, job_id=job_id, number=number))
     assert body is not None
-    return orjson.loads(zlib.decompress(body))
+    return orjson.loads(unpacked(body))
 
 
 def test_one_is_computed_and_the_others_get_its_answer(tmp_path: Path) -> None:

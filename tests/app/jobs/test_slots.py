@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import zlib
 from datetime import timedelta
 from functools import partial
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from app.convert.packed import packed
 from app.engine.work import Ended, Take, Work, taking
 from app.exceptions import ClusterUnavailable, TaskFailed
 from app.jobs.executor import ClusterExecutor, LocalExecutor
@@ -125,7 +125,7 @@ def test_an_identification_gets_its_logs_wherever_it_is_computed(tmp_path: Path,
             id=new_id(), robot="ur5e", created=now(), size=3, settings={"robot": "ur5e"}, report={}, body=b"log"
         )
         await store.write(partial(logs.add, log=log, most=100))
-        body = zlib.compress(json.dumps({"logs": [log.id]}).encode())
+        body = packed(json.dumps({"logs": [log.id]}).encode())
         runner: Any = Runner()
         executor = LocalExecutor(runner, store, 1) if where == "here" else ClusterExecutor(runner, store)
         ended: list[Ended] = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import zlib
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -12,6 +11,7 @@ import pytest
 from sqlalchemy import func, select
 
 from app.access.client import OPERATOR
+from app.convert.packed import packed, unpacked
 from app.engine.result import AnswerFigures, StoredAnswer
 from app.exceptions import JobNotCancellable, KeyReused, TooManyWaiting, UnknownAnswer, UnknownJob
 from app.store import answers, job_events, jobs, leases
@@ -23,7 +23,7 @@ from app.store.tables import Answer, JobEvent, JobRequest, new_id
 MUCH = 1 << 30
 START = datetime(2030, 1, 1, tzinfo=UTC)
 SOON = timedelta(seconds=30)
-BODY = zlib.compress(b"{}")
+BODY = packed(b"{}")
 
 
 class Bench:
@@ -53,7 +53,7 @@ class Bench:
 
     async def answer(self, job_id: str, number: int) -> bytes | None:
         _, body = await self.store.read(partial(jobs.outcome, job_id=job_id, number=number))
-        return None if body is None else zlib.decompress(body)
+        return None if body is None else unpacked(body)
 
     async def events(self, job_id: str) -> list[JobEvent]:
         found, _ = await self.store.read(partial(job_events.after, job_id=job_id, number=0, limit=MUCH))
@@ -61,7 +61,7 @@ class Bench:
 
 
 def done(lease: Lease, answer: bytes = b"{}") -> Outcome:
-    return Outcome(lease, "done", 0.1, AnswerFigures("ur5e", 2.0, 1.0, "optimal"), zlib.compress(answer))
+    return Outcome(lease, "done", 0.1, AnswerFigures("ur5e", 2.0, 1.0, "optimal"), packed(answer))
 
 
 @pytest.fixture
@@ -235,9 +235,7 @@ def test_answers_live_as_long_as_their_job(bench: Bench) -> None:
         part = new_id()
         await bench.settle(
             "a",
-            Outcome(
-                lease, "done", answer=BODY, parts=(StoredAnswer(part, zlib.compress(b'"part"')),), parts_kind="optimize"
-            ),
+            Outcome(lease, "done", answer=BODY, parts=(StoredAnswer(part, packed(b'"part"')),), parts_kind="optimize"),
         )
         await bench.store.write(partial(answers.prune, max_bytes=0, max_age=timedelta(0)))
         await bench.store.write(partial(jobs.prune, max_age=timedelta(days=36500)))

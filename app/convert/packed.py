@@ -1,0 +1,24 @@
+"""Documents as the database keeps them: compressed, since one has up to a hundred megabytes."""
+
+from __future__ import annotations
+
+import zlib
+
+import zstandard
+
+_LEVEL = 1
+"""Of Zstandard: on documents of numbers its higher levels are slower, and no smaller."""
+_ZSTANDARD = zstandard.FRAME_HEADER
+
+
+def packed(document: bytes) -> bytes:
+    """A document, compressed."""
+    # a compressor may not be shared by threads
+    return zstandard.ZstdCompressor(level=_LEVEL).compress(document)
+
+
+def unpacked(kept: bytes) -> bytes:
+    """The document that is kept. Earlier versions of the service compressed with zlib."""
+    if kept.startswith(_ZSTANDARD):
+        return zstandard.ZstdDecompressor().decompress(kept)
+    return zlib.decompress(kept)
