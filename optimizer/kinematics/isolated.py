@@ -33,8 +33,10 @@ def distinct(q: Array, missed: Array, smallest: Array | None = None) -> list[int
     if smallest is not None:
         same = np.maximum(same, ROUNDED / np.maximum(smallest, 1e-12))
     # a wave changes by no more than the sum of what its joints do: few pairs are left
-    wave = np.sin(q + np.arange(q.shape[1])).sum(axis=1)
-    i, j = np.nonzero(np.triu(np.abs(wave[:, None] - wave) <= q.shape[1] * same.max(initial=0.0), 1))
+    wave, near = np.sin(q + np.arange(q.shape[1])).sum(axis=1), q.shape[1] * same.max(initial=0.0)
+    if np.diff(np.sort(wave)).min(initial=np.inf) > near:
+        return list(range(len(q)))
+    i, j = np.nonzero(np.triu(np.abs(wave[:, None] - wave) <= near, 1))
     alike = np.abs(wrapped(q[i] - q[j])).max(axis=1) <= np.maximum(same[i], same[j])
     if not alike.any():
         return list(range(len(q)))

@@ -57,13 +57,14 @@ class RedundantArm:
         pose = RedundantPose(self.form, T)
         curves = [
             RedundantCurve.of(pose, sheet, interval, label_of(sheet))
-            for elbow in (1.0, -1.0)
+            for elbow in pose.elbows(limits)
             for interval in pose.intervals(elbow)
             for sheet in (np.array([shoulder, elbow, wrist]) for shoulder, wrist in product((1.0, -1.0), repeat=2))
         ]
+        aligned: Sequence[RedundantCurve] = curves
         if limits is not None:
-            curves = within(curves, limits.q_min, limits.q_max)
-        return [*curves, *crossing(curves), *stretched(pose, label_of(np.ones(3)))]
+            curves, aligned = within(curves, limits.q_min, limits.q_max)
+        return [*curves, *crossing(aligned), *stretched(pose, label_of(np.ones(3)))]
 
     def distance_to_reach(self, T: Array) -> float:
         """Distance [m] by which T (4, 4) must shift, with its orientation kept, to have a solution; 0 if it has one."""

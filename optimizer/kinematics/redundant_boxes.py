@@ -6,8 +6,10 @@ azimuth changed by at most asin(m / r), or by anything once m reaches r. In orde
 - |v|² and v_z are waves over q7, with exact ranges. |v|² gives the range of cos θ and so of θ, exactly; θ that of c(θ).
 - ψ: the range of its cosine from those of c, v_z and r. v moves by at most its radius about the last axis times the
   half interval; this bounds its azimuth about the sixth axis, and so q6.
-- q5: the azimuth of S about the fifth axis seen from both sides; S moves by ρ times the half range of θ on one side,
-  and by that of v and r times the half range of q6 on the other.
+- q5: the azimuth of S about the fifth axis, seen from both sides. On one side, S moves by ρ times the half range of θ.
+  On the other, S is at the angle β from the sixth axis: fifth axis, sixth axis and v make a spherical triangle with the
+  angle ψ at the sixth axis and β at the fifth, so that (v_z - e c) = s sqrt(1 - e²) cos β, with s the distance of S
+  from the fifth axis, s² = |v|² - c².
 - The orientation of link 3 is turned by at most H, the sum of the half ranges of q4 … q7. So is the third axis, seen
   from the first, and the first, seen from the third: this bounds q2, q1 and q3. Where the third axis is within H of
   the first, q1 and q3 may be anything: a box on a singularity holds the configurations that turn freely there, too.
@@ -19,6 +21,7 @@ Blurred boxes hold the configurations of every pose of the same orientation that
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 
 import numpy as np
 
@@ -61,7 +64,9 @@ def held_boxes(pose: RedundantPose, cells: Cells, blur: float = 0.0) -> HeldBoxe
     form = pose.form
     low, high, (side, elbow, wrist) = cells.low, cells.high, cells.sheet.T
     middle, half = (low + high) / 2, (high - low) / 2
-    distance, v_z = np.stack(_wave_range(np.array(pose.waves).T[:, :, None], low, high), axis=1)
+    mean, size, waves = pose.range_waves
+    ahead = waves @ np.array([np.ones(len(low)), np.cos(middle), np.sin(middle)])
+    (distance, v_z), v = _wave_ranges(mean, size, ahead[:2], ahead[2:4], half), ahead[4:]
     if blur:
         length = np.sqrt(np.maximum(distance, 0.0))
         distance = np.array([np.maximum(length[0] - blur, 0.0), length[1] + blur]) ** 2
@@ -70,19 +75,21 @@ def held_boxes(pose: RedundantPose, cells: Cells, blur: float = 0.0) -> HeldBoxe
     # an angle at most this much beyond its cosine's: arccos is steepest, as a root, at 1
     theta_low, theta_high = np.arccos(to_cosine(np.array([cos[1] + COSINE, cos[0] - COSINE])))
     theta, theta_half = elbow * (theta_low + theta_high) / 2, (theta_high - theta_low) / 2
-    along = _wave_range(np.array(form.along_fifth), theta - theta_half, theta + theta_half)
-    radius = _radii(distance, v_z)
-    cos_psi = _wrist_cosine(form.fifth_in_6[2], form.inclined, along, v_z, radius)
-    wide, narrow = np.arccos(to_cosine(np.array(cos_psi)))
-    psi, psi_half = (wide + narrow) / 2, (wide - narrow) / 2
-    last, (v_from_6, S_from_5, seen_from_5) = pose.wrist(middle, theta, wrist * psi)
+    mean, size, waves = form.range_waves
+    ahead = waves @ np.array([np.ones(len(low)), np.cos(theta), np.sin(theta)])
+    (along,), S = _wave_ranges(mean, size, ahead[:1], ahead[1:2], theta_half), ahead[2:]
+    cos_psi = _wrist_cosine(form.fifth_in_6[2], form.inclined, along, v_z, _radii(distance, v_z))
+    psi, psi_half = _angles(cos_psi)
+    beta, beta_half = _angles(_wrist_cosine(form.fifth_in_6[2], form.inclined, v_z, along, _radii(distance, along)))
+    v_azimuth, S_azimuth = np.arctan2(np.array([v[1], S[1]]), np.array([v[0], S[0]]))
+    last = np.empty((4, len(low)))
+    last[0], last[1] = form.q4_at_zero - theta, S_azimuth - form.sixth_azimuth + wrist * beta
+    last[2], last[3] = wrist * psi - v_azimuth + form.fifth_azimuth, middle
     centre = pose.completed(last, side)
-    moved = 2 * np.hypot(*pose.shoulder[:2]) * np.sin(np.minimum(half, np.pi) / 2) + blur
-    q6_half = psi_half + _turned(moved, v_from_6)
-    far = moved + 2 * radius[1] * np.sin(np.minimum(q6_half, np.pi) / 2)
-    q5_half = _turned(form.rho * theta_half, S_from_5) + _turned(far, seen_from_5)
+    moved = 2 * hypot(*pose.shoulder[:2]) * np.sin(np.minimum(half, np.pi) / 2) + blur
+    turned = _turned(np.array([form.rho * theta_half, moved]), np.hypot(*np.array([[S[0], v[0]], [S[1], v[1]]])))
     sides = np.zeros((len(low), 7))
-    sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, q5_half, q6_half, half
+    sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, beta_half + turned[0], psi_half + turned[1], half
     sides = with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
     held = (cos[0] <= 1 + COSINE) & (cos[1] >= -1 - COSINE) & (cos_psi[0] <= 1) & (cos_psi[1] >= -1)
     inside = (np.abs(np.array([*cos, *cos_psi])) <= 1).all(axis=0)
@@ -99,37 +106,42 @@ def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
     return sides
 
 
-def _wave_range(wave: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Least and greatest of a + b cos x + c sin x over [low, high] (n,); widened for rounding.
-
-    Of a wave (3,) they are (n,), of waves (3, m, 1) they are (m, n).
-    """
-    a, b, c = wave
-    size, phase = np.hypot(b, c), np.arctan2(c, b)
-    start, length = (low - phase) % (2 * np.pi), high - low
-    ends = np.cos(start), np.cos(start + length)
-    most = np.where(start + length >= 2 * np.pi, 1.0, np.maximum(*ends))
-    opposite = (start <= np.pi) & (start + length >= np.pi) | (start + length >= 3 * np.pi)
-    least = np.where(opposite, -1.0, np.minimum(*ends))
-    return a + size * least - COSINE, a + size * most + COSINE
+def _wave_ranges(mean: Array, size: Array, ahead: Array, aside: Array, half: Array) -> Array:
+    """Least and greatest (m, 2, n) of waves mean + size cos x, with mean and size (m, 1), x within `half` (n,) of where
+    size cos x is `ahead` and size sin x is `aside` (m, n); widened for rounding."""
+    half = np.minimum(half, np.pi)
+    c, s = np.cos(half), np.sin(half)
+    ends, rise, first = ahead * c, np.abs(aside) * s, size * c
+    found = np.empty((len(mean), 2, len(half)))
+    found[:, 0] = mean - COSINE + np.where(ahead <= -first, -size, ends - rise)
+    found[:, 1] = mean + COSINE + np.where(ahead >= first, size, ends + rise)
+    return found
 
 
-def _radii(distance: Array, v_z: Array) -> tuple[Array, Array]:
-    """Range of r = sqrt(|v|² - v_z²) [m]."""
-    largest = np.maximum(np.abs(v_z[0]), np.abs(v_z[1]))
-    smallest = np.where(v_z[0] * v_z[1] <= 0, 0.0, np.minimum(np.abs(v_z[0]), np.abs(v_z[1])))
+def _angles(cosine: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Middles and half ranges (n,) [rad] of angles with cosines in a range, two (n,)."""
+    wide, narrow = np.arccos(to_cosine(np.array(cosine)))
+    return (wide + narrow) / 2, (wide - narrow) / 2
+
+
+def _radii(distance: Array, along: Array) -> tuple[Array, Array]:
+    """Range of sqrt(|v|² - x²) [m], the distance from an axis, by those (2, n) of |v|² and of x along the axis."""
+    ends = np.abs(along)
+    largest = np.maximum(ends[0], ends[1])
+    smallest = np.where(along[0] * along[1] <= 0, 0.0, np.minimum(ends[0], ends[1]))
     return (
         np.sqrt(np.maximum(distance[0] - largest**2, 0.0)),
         np.sqrt(np.maximum(distance[1] - smallest**2, 0.0)),
     )
 
 
-def _wrist_cosine(
-    cosine: float, sine: float, along: tuple[Array, Array], v_z: Array, radius: tuple[Array, Array]
-) -> tuple[Array, Array]:
-    """Range (n,) of the cosine of ψ, (c - e v_z) / (r sine) with e the given cosine; widened for rounding."""
-    ends = [cosine * v_z[0], cosine * v_z[1]]
-    least, most = along[0] - np.maximum(*ends), along[1] - np.minimum(*ends)
+def _wrist_cosine(cosine: float, sine: float, x: Array, y: Array, radius: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Range (n,) of (x - e y) / (r sine), with e the given cosine, by those (2, n) of x, y and r; widened for rounding.
+
+    With c and v_z for x and y it is that of the cosine of ψ, with v_z and c that of β.
+    """
+    ends = [cosine * y[0], cosine * y[1]]
+    least, most = x[0] - np.maximum(*ends), x[1] - np.minimum(*ends)
     near, far = (np.maximum(each * sine, 1e-300) for each in radius)
     low = np.where(least < 0, least / near, least / far)
     high = np.where(most > 0, most / near, most / far)

@@ -20,7 +20,7 @@ from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.problem.branches import Label
 
 # parts that a curve is cut into to find where it is within the limits, then parts of what is not decided, and again
-PARTS = (32, 4, 4)
+PARTS = (40, 8)
 # a configuration is sought along the tangent if it is farther than NEAREST from the member with its last angle [rad],
 # and first among MEMBERS of each arc if it is farther than FAR; steps, and the difference of parameters for the tangent
 NEAREST, FAR, MEMBERS, STEPS, STEP = 1e-9, 1e-2, 16, 3, 1e-6
@@ -114,20 +114,23 @@ class RedundantCurve:
 
 def members(curves: Sequence[RedundantCurve], parameters: Sequence[Array]) -> list[Array]:
     """The configurations (n, 7) [rad] of each of the curves of one pose at its parameters (n,) on its arcs."""
-    counts = [len(at) for at in parameters]
-    q7 = np.concatenate([curve.last_angle(at) for curve, at in zip(curves, parameters, strict=True)])
-    sheet = np.repeat([curve.sheet for curve in curves], counts, axis=0)
-    return np.split(curves[0].pose.configurations(q7, sheet), np.cumsum(counts)[:-1])
+    counts, stack = [len(at) for at in parameters], CurveStack.of(curves)
+    rows, last = np.repeat(np.arange(len(curves)), counts), np.cumsum(counts).tolist()
+    q = stack.pose.configurations(stack.last_angle(np.concatenate(parameters), rows), stack.sheet[rows])
+    return [q[end - count : end] for count, end in zip(counts, last, strict=True)]
 
 
-def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list[RedundantCurve]:
-    """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every member that is.
+def within(
+    curves: Sequence[RedundantCurve], q_min: Array, q_max: Array
+) -> tuple[list[RedundantCurve], list[RedundantCurve]]:
+    """The curves of one pose that may be within limits (7,) [rad], cut to arcs that hold every member that is; and
+    those of the given curves with a member that may be, whose third axis may be in line with the first.
 
     Each is given with both shoulders. What is left out is proven to be outside by its box. The arcs reach beyond the
-    limits by some thousandths.
+    limits by some hundredths [rad].
     """
     if not curves:
-        return []
+        return [], []
     owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
     right = CurveStack.of([curves[k] for k in owner[0]])
     lower, upper = np.array([curves[k].arcs[0] for k in owner[0]]).T
@@ -139,23 +142,22 @@ def within(curves: Sequence[RedundantCurve], q_min: Array, q_max: Array) -> list
         ends[:, -1] = upper
         lower, upper = ends[:, :-1].ravel(), ends[:, 1:].ravel()
         pair, undecided = np.repeat(pair, count), np.repeat(undecided, count, axis=1)
-        held, inside = _judged(right, pair, lower, upper, q_min, q_max)
-        side, row = np.nonzero(inside & undecided)
-        kept.append(np.array([owner[side, pair[row]], lower[row], upper[row]]))
-        undecided &= held & ~inside
-        left = undecided.any(axis=0)
+        held, inside, aligned = _judged(right, pair, lower, upper, q_min, q_max)
+        undecided &= held
+        side, row = np.nonzero(undecided & inside)
+        kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[row]]))
+        undecided &= ~inside
+        left = np.flatnonzero(undecided.any(axis=0))
         pair, lower, upper, undecided = pair[left], lower[left], upper[left], undecided[:, left]
         if not len(pair):
             break
     side, row = np.nonzero(undecided)
-    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row]]))
-    return _joined(curves, np.concatenate(kept, axis=1))
-
-
-def _joined(curves: Sequence[RedundantCurve], parts: Array) -> list[RedundantCurve]:
-    """The curves, cut to parts (3, n): index of a curve, lower and upper end."""
-    found = joined(parts, len(curves))
-    return [replace(curve, arcs=own) for curve, own in zip(curves, found, strict=True) if own]
+    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[left][row]]))
+    parts = np.concatenate(kept, axis=1)
+    passing = sorted(set(parts[0, parts[3] > 0].tolist()))
+    arcs = joined(parts[:3], len(curves))
+    cut = [replace(curve, arcs=own) for curve, own in zip(curves, arcs, strict=True) if own]
+    return cut, [curves[int(k)] for k in passing]
 
 
 def joined(parts: Array, count: int) -> list[list[tuple[float, float]]]:
@@ -203,20 +205,24 @@ class CurveStack:
 
 def _judged(
     curves: CurveStack, rows: NDArray[np.intp], low: Array, high: Array, q_min: Array, q_max: Array
-) -> tuple[Mask, Mask]:
+) -> tuple[Mask, Mask, Mask]:
     """Which parts, low … high (n,) of curves (n,) on the right shoulder, may have members within the limits, and which
-    have no others; (2, n) each, the second row for their counterparts with the left shoulder."""
+    have no others; (2, n) each, the second row for their counterparts with the left shoulder. Then which (n,) may have
+    a member whose third axis is in line with the first."""
     start, end = curves.last_angle(np.array([low, high]), rows)
     right, half = boxes_of(curves.pose, Cells(start, end, curves.sheet[rows]))
-    # with the other shoulder, the third axis leans to the other side
-    left = right.copy()
-    left[:, 0], left[:, 2] = right[:, 0] + np.pi, right[:, 2] + np.pi
-    left[:, 1] = -right[:, 1] - 2 * curves.pose.form.lean_at_zero
-    middle, width = (q_min + q_max) / 2, (q_max - q_min) / 2 + ROUNDING
-    away = np.abs(wrapped(np.array([right, left]) - middle))
-    held = (away <= width + half).all(axis=2)
-    inside = ((away + half <= width) | (width >= np.pi)).all(axis=2)
-    return np.asarray(held), np.asarray(inside)
+    # with the other shoulder, the third axis leans to the other side; the last four joints are the same
+    joints = np.array([*range(7), 0, 1, 2])
+    q, half = right.T[joints], half.T[joints]
+    q[8] = -q[1] - 2 * curves.pose.form.lean_at_zero
+    q[[7, 9]] += np.pi
+    middle, width = ((q_min + q_max) / 2)[joints, None], ((q_max - q_min) / 2 + ROUNDING)[joints, None]
+    away = np.abs(wrapped(q - middle))
+    held, inside = (
+        np.array([each[:3].all(axis=0), each[7:].all(axis=0)]) & each[3:7].all(axis=0)
+        for each in (away <= width + half, (away + half <= width) | (width >= np.pi))
+    )
+    return np.asarray(held), np.asarray(inside), np.asarray(half[0] >= np.pi)
 
 
 def last_angle(u: Array, interval: Array, whole: Mask) -> Array:

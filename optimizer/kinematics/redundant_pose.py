@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import acos, remainder, tau
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Limits
 from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.spherical_shoulder import SphericalShoulder
+from optimizer.kinematics.spherical_shoulder import SphericalShoulder, carrier, wave_parts
 
 # zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART [rad] they are one
 NEAR_CIRCLE, APART = 1e-4, 1e-9
@@ -21,6 +22,8 @@ NEAR_CIRCLE, APART = 1e-4, 1e-9
 NEGLIGIBLE = 1e-14
 # a squared sine counts as zero from this below [1]: cosines are clipped to 1
 ROUNDING = 1e-12
+# rounding of an angle on a limit [rad]
+ANGLE = 1e-9
 # a squared sine is zero at an edge to this: an angle where it has a double zero is found to some 1e-8 rad
 ZERO = 1e-7
 # a squared distance [m²] that is none
@@ -66,6 +69,13 @@ class RedundantPose:
         square = np.array([still @ still + cos @ cos, 2 * still @ cos, 2 * still @ sin])
         return square, np.array([still[2], cos[2], sin[2]])
 
+    @cached_property
+    def range_waves(self) -> tuple[Array, Array, Array]:
+        """`wave_parts` of |v|² and v_z: means and sizes (2, 1), and the coefficients (6, 3) of their parts and of v_x
+        and v_y."""
+        mean, size, parts = wave_parts(np.array(self.waves))
+        return mean, size, np.vstack([parts, np.array(self._wrist_waves).T[:2]])
+
     def cosines(self, q7: Array, elbow: Array) -> tuple[Array, Array, Array]:
         """cos θ (n,), and of cos ψ the numerator and the denominator [m] (n,), at q7 (n,) and signs of the elbow (n,).
 
@@ -97,17 +107,14 @@ class RedundantPose:
     ) -> Array:
         """Configurations (n, 7) [rad] with the given angles (n,). On a singularity the first joint (0) or the fifth (4)
         may have any angle (n,): that in `free`."""
-        last = self.wrist(q7, theta, psi)[0]
+        last = self.wrist(q7, theta, psi)
         free = {} if free is None else free
         if 4 in free:
             last[1] = free[4]
         return self.completed(last, shoulder, free.get(0))
 
-    def wrist(self, q7: Array, theta: Array, psi: Array) -> tuple[Array, Array]:
-        """The last four joint positions (4, n) [rad] at the given angles (n,), and three distances (3, n) [m].
-
-        They are that of v from the sixth axis, and that of S from the fifth, seen from either side of it.
-        """
+    def wrist(self, q7: Array, theta: Array, psi: Array) -> Array:
+        """The last four joint positions (4, n) [rad] at the given angles (n,)."""
         form, v, S = self.form, self.from_wrist(q7).T, self.form.shoulder_about_fifth(theta).T
         last = np.empty((4, len(q7)))
         last[0], last[3] = form.q4_at_zero - theta, q7
@@ -115,7 +122,7 @@ class RedundantPose:
         # the fifth angle is between the azimuths of S, seen from both sides
         x, y, _ = form.rotations[5] @ _turned(v, np.cos(last[2]), np.sin(last[2]))
         last[1] = np.arctan2(S[1] * x - S[0] * y, S[0] * x + S[1] * y)
-        return last, np.hypot(np.array([v[0], S[0], x]), np.array([v[1], S[1], y]))
+        return last
 
     def completed(self, last: Array, shoulder: Array, q1: Array | None = None) -> Array:
         """Configurations (n, 7) [rad] in [-π, π] with the last four joints (4, n) and signs of the shoulder (n,)."""
@@ -127,36 +134,48 @@ class RedundantPose:
         # what is left of the first axis of link 3 is turned by the third angle
         c, s = np.cos(q[:2]), np.sin(q[:2])
         for j in (0, 1):
-            first = form.rotations[j + 1].T @ _turned(first, c[j], -s[j])
+            first = _carried(form.carriers[j + 1], first, c[j], s[j])
         q[2] = np.arctan2(first[1], first[0])
         return np.ascontiguousarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi).T)
 
     def third_axis(self, q7: Array, theta: Array, psi: Array) -> Array:
         """The third axis (3, n) in the frame of joint 1 at q1 = 0, at angles (n,)."""
-        return self._axes(self.wrist(q7, theta, psi)[0], [2])[:, 0]
+        return self._axes(self.wrist(q7, theta, psi), [2])[:, 0]
 
     def _axes(self, last: Array, which: list[int]) -> Array:
         """Axes (3, k, n) of link 3, 0 … 2 its x, y, z, in the frame of joint 1 at q1 = 0, at the last joints (4, n)."""
-        R, c, s = self.form.rotations, np.cos(last), np.sin(last)
-        seen = np.repeat(R[3][which].T[:, :, None], last.shape[1], axis=2)
-        for j, placement in enumerate((*R[4:], self._from_last)):
-            seen = (placement.T @ _turned(seen, c[j], -s[j]).reshape(3, -1)).reshape(seen.shape)
+        c, s = np.cos(last), np.sin(last)
+        seen = self.form.rotations[3][which].T[:, :, None]
+        for j, each in enumerate((*self.form.carriers[4:], self._from_last)):
+            seen = _carried(each, seen, c[j], s[j])
         return np.asarray(seen)
 
     @cached_property
     def _from_last(self) -> Array:
-        """Rotation (3, 3) of joint 1 at q1 = 0 in the frame of the last link."""
-        return np.asarray(self.orientation.T @ self.form.rotations[0])
+        """What carries vectors from the last link to joint 1 at q1 = 0: see `carrier`."""
+        return carrier(self.orientation.T @ self.form.rotations[0])
+
+    def elbows(self, limits: Limits | None) -> list[float]:
+        """The signs of θ with which the fourth joint may be within the limits."""
+        form, square, low, high = self.form, self.waves[0], -np.pi, np.pi
+        if limits is not None:
+            low, high = float(limits.q_min[3]), float(limits.q_max[3])
+        size, scale = float(np.hypot(square[1], square[2])), 2 * form.rho * form.nu
+        cosines = [(form.squares - float(square[0]) + side * size) / scale + side * ROUNDING for side in (1.0, -1.0)]
+        least, most = (acos(min(max(each, -1.0), 1.0)) for each in cosines)
+        middle, half = (least + most) / 2, (most - least + high - low) / 2
+        away = {elbow: remainder(form.q4_at_zero - elbow * middle - (low + high) / 2, tau) for elbow in (1.0, -1.0)}
+        return [elbow for elbow, each in away.items() if abs(each) <= half + ANGLE]
 
     def intervals(self, elbow: float) -> list[tuple[float, float]]:
         """The intervals [rad] of q7, each within a turn, in which both sheets of this elbow are; (-π, π) if nothing
         bounds them. An interval may be one angle."""
         edges = self._edges
+        own = self._excesses[0 if elbow > 0 else 1]
         if not len(edges):
-            return [(-np.pi, np.pi)] if self._excess(np.array([0.0]), elbow)[0] >= -ROUNDING else []
-        ends = np.append(edges, edges[0] + 2 * np.pi)
-        inside = (self._excess((ends[1:] + ends[:-1]) / 2, elbow) >= -ROUNDING).tolist()
-        at = self._excess(edges, elbow)
+            return [(-np.pi, np.pi)] if own[0] >= -ROUNDING else []
+        at, between = own[: len(edges)], own[len(edges) :]
+        inside = (between >= -ROUNDING).tolist()
         # an edge of the other elbow's sheets is none here
         bounds = np.abs(at) < ZERO
         if all(inside) and not bounds.any():
@@ -176,13 +195,21 @@ class RedundantPose:
             found.append((start, end if end > start else end + 2 * np.pi))
         return found
 
-    def _excess(self, q7: Array, elbow: float) -> Array:
-        """The lesser of sin²θ and of sin²ψ r²/|v|² at q7 (n,); negative off the sheets of this elbow."""
+    @cached_property
+    def _excesses(self) -> Array:
+        """The excess (2, k) at the edges, then between each and the next, for both elbows; without edges, anywhere."""
+        edges = self._edges
+        middles = (np.append(edges[1:], edges[:1] + 2 * np.pi) + edges) / 2
+        q7 = np.concatenate([edges, middles]) if len(edges) else np.zeros(1)
+        return self._excess(np.tile(q7, 2), np.repeat([1.0, -1.0], len(q7))).reshape(2, -1)
+
+    def _excess(self, q7: Array, elbow: Array) -> Array:
+        """The lesser of sin²θ and of sin²ψ r²/|v|² at q7 (n,); negative off the sheets of these elbows (n,)."""
         form, square = self.form, self.waves[0]
         c, s = np.cos(q7), np.sin(q7)
         distance = square[0] + square[1] * c + square[2] * s
         cos = (form.squares - distance) / (2 * form.rho * form.nu)
-        _, along, reach = self.cosines(q7, np.full_like(q7, elbow))
+        _, along, reach = self.cosines(q7, elbow)
         return np.asarray(np.minimum(1 - cos**2, (reach**2 - along**2) / np.maximum(distance, TINY)))
 
     @cached_property
@@ -225,6 +252,12 @@ def _turned(v: Array, c: Array, s: Array) -> Array:
     turned = np.empty(v.shape)
     turned[0], turned[1], turned[2] = c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
     return turned
+
+
+def _carried(carrier: Array, v: Array, c: Array, s: Array) -> Array:
+    """Vectors (3, …, n), seen from behind a joint whose angle has cosine c and sine s (n,)."""
+    ahead, aside, along = (carrier @ v.reshape(3, -1)).reshape(3, *v.shape)
+    return np.asarray(ahead * c + aside * s + along)
 
 
 def _wave(coefficients: Array) -> Array:

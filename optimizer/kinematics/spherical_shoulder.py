@@ -74,6 +74,11 @@ class SphericalShoulder:
         return tuple(self.placements[:, :3, :3])
 
     @cached_property
+    def carriers(self) -> tuple[Array, ...]:
+        """`carrier` (9, 3) of each of them."""
+        return tuple(map(carrier, self.rotations))
+
+    @cached_property
     def _wrist_in_4(self) -> Array:
         """W in the frame of link 4."""
         return np.asarray(self.placements[4][:3, 3] + self.fifth * self.placements[4][:3, 2])
@@ -124,6 +129,12 @@ class SphericalShoulder:
         return np.asarray(self.placements[5][2, :3])
 
     @cached_property
+    def range_waves(self) -> tuple[Array, Array, Array]:
+        """`wave_parts` of c: mean and size (1, 1), and the coefficients (4, 3) of its parts and of x and y of S."""
+        mean, size, parts = wave_parts(np.array([self.along_fifth]))
+        return mean, size, np.vstack([parts, self.shoulder_waves.T[:2]])
+
+    @cached_property
     def inclined(self) -> float:
         """Sine of the angle between the fifth and the sixth axis."""
         return float(np.hypot(*self.fifth_in_6[:2]))
@@ -164,6 +175,11 @@ class SphericalShoulder:
         return float(np.arctan2(self.fifth_in_6[1], self.fifth_in_6[0]))
 
     @cached_property
+    def sixth_azimuth(self) -> float:
+        """Azimuth [rad] of the sixth axis in the frame of link 5."""
+        return float(np.arctan2(self.placements[5][1, 2], self.placements[5][0, 2]))
+
+    @cached_property
     def aligned(self) -> tuple[float, ...]:
         """The angles θ [rad] at which the fifth axis meets the shoulder, as it does where an arm without offsets is
         stretched or folded."""
@@ -192,6 +208,23 @@ class SphericalShoulder:
         c, s = self.rho * np.cos(towards), self.rho * np.sin(towards)
         waves = np.array([[-n[0], -n[1], self._shoulder_in_3[2] - n[2]], [c, s, 0.0], [-s, c, 0.0]])
         return np.asarray(waves @ self.placements[4][:3, :3])
+
+
+def carrier(R: Array) -> Array:
+    """Matrix (9, 3) that turns a vector by -q about z, then by the transpose of R (3, 3): three rows for the part that
+    goes with cos q, three for that with sin q, and three for what stays."""
+    x, y, z = R
+    none = np.zeros(3)
+    return np.vstack([np.array([x, y, none]).T, np.array([-y, x, none]).T, np.array([none, none, z]).T])
+
+
+def wave_parts(waves: Array) -> tuple[Array, Array, Array]:
+    """Of waves a + b cos x + c sin x, (m, 3), means a and sizes |(b, c)| (m, 1), and coefficients (2m, 3) of two parts:
+    where a wave is a + size cos y, those of size cos y for all waves, then those of size sin y."""
+    a, b, c = waves.T
+    none = np.zeros_like(a)
+    ahead, aside = np.array([none, b, c]).T, np.array([none, -c, b]).T
+    return a[:, None], np.hypot(b, c)[:, None], np.vstack([ahead, aside])
 
 
 def _meeting(P: Array) -> tuple[float, float] | None:

@@ -231,6 +231,20 @@ def test_what_turns_freely_on_a_singularity_is_a_curve(joint: int, step: list[fl
                         assert max(np.abs(forward(robot, each) - T).max() for each in members) < ACCURACY
 
 
+def test_limits_keep_what_turns_freely_within_them() -> None:
+    """With the first and the third axis in line; only curves that may pass this are searched for it."""
+    rng = np.random.default_rng(52)
+    for name in ("iiwa14", "panda", "xarm7"):
+        robot = load_robot(name)
+        arm = RedundantArm.of(robot.model)
+        assert arm is not None
+        for q in configurations(robot, 10, seed=53):
+            q[1], most = 0.0, np.minimum(robot.limits.q_max, np.pi)[[0, 2]]
+            # both angles stay within limits, which are symmetric
+            turned = q + rng.uniform(-1, 1) * (most - np.abs(q[[0, 2]])).min() * np.array([1.0, 0, -1.0, 0, 0, 0, 0])
+            assert away(arm.self_motions(forward(robot, q), robot.limits), turned) < FOUND
+
+
 def test_boxes_hold_what_turns_freely_on_a_singularity(robot: Robot, arm: RedundantArm) -> None:
     """With the third axis in line with the first, both may turn against each other while the last angle stands still:
     no curve over it has these configurations, but the box around the point has."""
