@@ -179,7 +179,8 @@ class NonlinearProgram:
             H = np.moveaxis(np.moveaxis(H @ P, 2, -1) @ P, -1, 2)
 
         total = float(w @ cost)
-        D = self._nodes_free * np.array([1.0, 1.0 / T, 1.0 / (T * T)])[:, None]
+        scale = np.array([1.0, 1.0 / T, 1.0 / (T * T)])
+        D = self._nodes_free * scale[:, None]
         rate = z * np.array([0.0, -1.0 / T, -2.0 / T])[:, None]
         slope = (w[:, None, None] * G * rate).sum()
         wG = (w[:, None, None] * G).reshape(count * 3, r)
@@ -189,7 +190,7 @@ class NonlinearProgram:
         line = Linearisation(
             cost=self.constant + T * total,
             gradient=np.append(gradient_s.ravel(), total + T * slope),
-            hessian=_Nodes(T, z, D, rate, lagrangian, H).hessian(gradient_s, slope),
+            hessian=_Nodes(T, z, D, rate, lagrangian, H, scale).hessian(self._overlaps, gradient_s, slope),
             tau=tau,
             jacobian=J,
             rate=rate,
@@ -209,6 +210,10 @@ class NonlinearProgram:
     def _nodes_free(self) -> Array:
         """Basis and derivatives of the free control points at the nodes, (N, 3, m)."""
         return np.ascontiguousarray(self.free_columns(self.basis.at_nodes).transpose(1, 0, 2))
+
+    @cached_property
+    def _overlaps(self) -> _Overlaps:
+        return _Overlaps.of(self._nodes_free)
 
     def torque_rows(self, line: Linearisation, T: float, k: Index, j: Index) -> Array:
         """Gradients (rows, n) of the torques of joints j at nodes k with respect to x."""
@@ -232,11 +237,41 @@ class NonlinearProgram:
 
 
 @dataclass(frozen=True)
+class _Overlaps:
+    """Pairs i ≤ j of free control points that move the same nodes: a control point moves few of them.
+
+    `products` (pairs, 9 N) are those of basis functions and their derivatives at each node, D_kdi · D_kej in order of
+    k, d, e.
+    """
+
+    i: Index
+    j: Index
+    products: Array
+
+    @classmethod
+    def of(cls, D: Array) -> _Overlaps:
+        """From D (N, 3, m): basis functions and derivatives of the control points at the nodes."""
+        reached = np.abs(D).max(axis=1) > 0
+        i, j = np.nonzero(np.triu(reached.T @ reached))
+        products = D[:, :, None, i] * D[:, None, :, j]
+        return cls(i, j, np.ascontiguousarray(products.reshape(-1, len(i)).T))
+
+    def sum(self, H: Array, m: int) -> Array:
+        """Σ_k D_kᵀ H_k D_k as (m r, m r), for symmetric H (N, 3, r, 3, r)."""
+        r = H.shape[2]
+        blocks = (self.products @ H.transpose(0, 1, 3, 2, 4).reshape(-1, r * r)).reshape(-1, r, r)
+        total = np.zeros((m, r, m, r))
+        total[self.i, :, self.j] = blocks
+        total[self.j, :, self.i] = blocks.transpose(0, 2, 1)
+        return total.reshape(m * r, m * r)
+
+
+@dataclass(frozen=True)
 class _Nodes:
     """States z = (s, v, a) (N, 3, r) at the nodes, and derivatives there.
 
-    D (N, 3, m) is ∂z/∂s and `rate` (N, 3, r) is ∂z/∂T; `lagrangian` (N, 3, r) and H (N, 3, r, 3, r) are the first and
-    second derivatives of the Lagrangian by z.
+    D (N, 3, m) is ∂z/∂s, with `scale` (3,) the powers of T in it, and `rate` (N, 3, r) is ∂z/∂T; `lagrangian` (N, 3, r)
+    and H (N, 3, r, 3, r) are the first and second derivatives of the Lagrangian by z.
     """
 
     T: float
@@ -245,8 +280,9 @@ class _Nodes:
     rate: Array
     lagrangian: Array
     H: Array
+    scale: Array
 
-    def hessian(self, gradient_s: Array, slope: float) -> Array:
+    def hessian(self, overlaps: _Overlaps, gradient_s: Array, slope: float) -> Array:
         """Hessian (m r + 1, m r + 1) of the Lagrangian by (s, T).
 
         `gradient_s` (m, r) is the cost's gradient by s, `slope` is Σ_k w_k ∂ℓ_k/∂T.
@@ -254,10 +290,7 @@ class _Nodes:
         T, rate = self.T, self.rate
         (count, _, m), r = self.D.shape, self.z.shape[2]
         flat = self.D.reshape(count * 3, m)
-        # Σ_k D_kᵀ H_k D_k as two dense products
-        left = self.D.transpose(0, 2, 1) @ self.H.reshape(count, 3, r * 3 * r)
-        left = left.reshape(count, m, r, 3, r).transpose(1, 2, 4, 0, 3).reshape(m * r * r, count * 3)
-        H_ss = (left @ flat).reshape(m, r, r, m).transpose(0, 1, 3, 2).reshape(m * r, m * r)
+        H_ss = overlaps.sum(self.H * np.outer(self.scale, self.scale)[:, None, :, None], m)
         H_rate = (self.H.reshape(count, 3 * r, 3 * r) @ rate.reshape(count, 3 * r, 1)).reshape(count, 3, r)
         D_rate = self.D * np.array([0.0, -1.0 / T, -2.0 / T])[:, None]
         H_sT = (
