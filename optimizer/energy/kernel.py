@@ -14,13 +14,13 @@ import threading
 from collections.abc import Sequence
 from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Robot
 from optimizer.deadline import checkpoint
 from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, mark_used, seal_path
-from optimizer.energy.kernel_expressions import FUNCTION_NAMES, SYMBOLICS, build
+from optimizer.energy.kernel_expressions import build
+from optimizer.energy.kernel_functions import Compiled, Evaluation, Functions, Interpreted
 
 # nodes per call of a function whose number of nodes varies from caller to caller
 CHUNK = 64
@@ -28,56 +28,29 @@ CHUNK = 64
 CHUNKS_PER_CHECK = 128
 
 
-class _Evaluation:
-    """A function mapped over a fixed number of nodes, with its own memory: for one thread.
-
-    Arguments and results are numpy arrays that CasADi reads and writes in place, without copies or conversions.
-    """
-
-    def __init__(self, mapped: ca.Function) -> None:
-        self._buffer, self._run = mapped.buffer()
-        self.arguments = [np.zeros(mapped.size_in(i)[::-1]) for i in range(mapped.n_in())]
-        self.results = [np.zeros(mapped.size_out(i)[::-1]) for i in range(mapped.n_out())]
-        for i, array in enumerate(self.arguments):
-            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
-        for i, array in enumerate(self.results):
-            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
-
-    def __call__(self, *arguments: Array) -> list[Array]:
-        """Evaluate; row k of every argument belongs to node k. The next call overwrites the results."""
-        for own, given in zip(self.arguments, arguments, strict=True):
-            own[...] = given
-        self._run()
-        return self.results
-
-
 class _Evaluations(threading.local):
     """The calling thread's evaluations by function and number of nodes. They are freed when the thread ends."""
 
     def __init__(self) -> None:
-        self.known: dict[tuple[str, int], _Evaluation] = {}
+        self.known: dict[tuple[str, int], Evaluation] = {}
 
 
 class Kernel:
     """A robot's functions on arrays of nodes. Any number of threads may call one kernel at the same time.
 
-    Every thread has its own memory for arguments and results, because CasADi evaluates without Python's global lock.
+    Every thread has its own memory for arguments and results, because functions run without Python's global lock.
     """
 
-    def __init__(self, robot: Robot, functions: list[ca.Function], compiled: bool) -> None:
+    def __init__(self, robot: Robot, functions: Functions) -> None:
         self.nq = robot.nq
-        self.compiled = compiled
-        self._functions = dict(zip(FUNCTION_NAMES, functions, strict=True))
-        self._mapped: dict[tuple[str, int], ca.Function] = {}
+        self.compiled = functions.compiled
+        self._functions = functions
         self._evaluations = _Evaluations()
 
-    def _evaluation(self, name: str, count: int) -> _Evaluation:
+    def _evaluation(self, name: str, count: int) -> Evaluation:
         known, key = self._evaluations.known, (name, count)
         if key not in known:
-            with SYMBOLICS:
-                if key not in self._mapped:
-                    self._mapped[key] = self._functions[name].map(count)
-                known[key] = _Evaluation(self._mapped[key])
+            known[key] = self._functions.evaluation(name, count)
         return known[key]
 
     def node(self, y: Array, multiplier: Array, weight: Array, p: Array) -> tuple[Array, ...]:
@@ -154,12 +127,10 @@ class _Loader:
             return self._interpreted
         if is_intact(self.library_path):
             mark_used(self.library_path)
-            with SYMBOLICS:
-                functions = [ca.external(name, str(self.library_path)) for name in FUNCTION_NAMES]
-            self._compiled = Kernel(self._robot, functions, compiled=True)
+            self._compiled = Kernel(self._robot, Compiled(self.library_path, self._robot.nq))
             return self._compiled
         if self._interpreted is None:
-            self._interpreted = Kernel(self._robot, build(self._robot), compiled=False)
+            self._interpreted = Kernel(self._robot, Interpreted(build(self._robot)))
         if self._compiling is None and compiler() is not None:
             self._compiling = threading.Thread(target=self._compile, name="kernel-compiler", daemon=True)
             self._compiling.start()

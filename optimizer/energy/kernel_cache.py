@@ -18,22 +18,23 @@ from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 
 import models.robot
 from models.robot import Robot
-from optimizer.energy import inverse_dynamics, kernel_expressions, losses
+from optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source, losses
 from optimizer.energy.kernel_expressions import SYMBOLICS, build
+from optimizer.energy.kernel_source import lanes, source
 
 log = logging.getLogger(__name__)
 
-# at -O2 it takes twice as long to compile, and runs no faster: the code is one long run of multiplications
-COMPILER_FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
+# at -O1 it takes twice as long to compile, and runs a tenth faster: the code is one long run of multiplications. Without
+# contraction, all processors round alike
+COMPILER_FLAGS = ("-Og", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off", "-Wno-psabi")
 # users may bring any number of arms, each with a library of about a megabyte
 MOST_LIBRARIES = 200
 # modules whose code decides what is compiled
-SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions)
+SOURCES = (models.robot, inverse_dynamics, losses, kernel_expressions, kernel_source)
 
 
 def cache_directory() -> Path:
@@ -47,7 +48,7 @@ def digest(robot: Robot) -> str:
     h = hashlib.sha256()
     for path in (*(str(module.__file__) for module in SOURCES), __file__):
         h.update(Path(path).read_bytes())
-    h.update(repr((version("casadi"), COMPILER_FLAGS, os.uname().machine)).encode())
+    h.update(repr((version("casadi"), COMPILER_FLAGS, lanes(), os.uname().machine)).encode())
     h.update(repr(robot.has_load_friction).encode())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
@@ -97,9 +98,11 @@ def compile_kernel(robot: Robot) -> Path:
             raise RuntimeError("no C compiler found")
         with workplace(target) as folder:
             library, seal = folder / "kernel.so", folder / "kernel.sha256"
-            source = _write_source(robot, folder)
+            count, flags = lanes()
+            code = folder / "kernel.c"
+            code.write_text(_source(robot, count))
             run = subprocess.run(
-                [command, *COMPILER_FLAGS, str(source), "-o", str(library), "-lm"], capture_output=True, text=True
+                [command, *COMPILER_FLAGS, *flags, str(code), "-o", str(library), "-lm"], capture_output=True, text=True
             )
             if run.returncode:
                 raise RuntimeError(f"the C compiler failed: {run.stderr[-500:]}")
@@ -138,15 +141,7 @@ def _prune(folder: Path) -> None:
                 file.unlink(missing_ok=True)
 
 
-def _write_source(robot: Robot, folder: Path) -> Path:
-    """Write the functions of a robot as C; their expressions are freed before the lock is."""
+def _source(robot: Robot, count: int) -> str:
+    """The functions of a robot as C, of so many nodes at once; their expressions are freed before the lock is."""
     with SYMBOLICS:
-        _generate(robot, folder)
-    return folder / "kernel.c"
-
-
-def _generate(robot: Robot, folder: Path) -> None:
-    generator = ca.CodeGenerator("kernel.c", {"with_header": False})
-    for function in build(robot):
-        generator.add(function)
-    generator.generate(f"{folder}/")
+        return source(build(robot), count)

@@ -13,8 +13,6 @@ from models.robot import Array, Drives, FrictionLaw, Robot
 from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
 from optimizer.energy.losses import drawn_power, friction_torque, power_flow, smooth_abs
 
-FUNCTION_NAMES = ("torque", "value", "node")
-
 # Held while expressions are built, turned into functions, mapped or freed. CasADi works on them without Python's global
 # lock, all expressions share constants and caches, and only some of its builds guard these against other threads.
 # Evaluating a function needs no lock, as long as every thread has a buffer of its own.
@@ -120,6 +118,16 @@ class _Power:
     bend: ca.SX
     friction_slope: ca.SX
     friction_bend: ca.SX
+
+
+def sizes(nq: int) -> dict[str, tuple[tuple[int, ...], tuple[int, ...]]]:
+    """How many numbers each argument and each result of the functions of an arm of nq joints has, by function."""
+    state, parameters = 3 * nq, sum(_SIZES.get(name, nq) for name in Parameters.__dataclass_fields__)
+    return {
+        "torque": ((state, parameters), (nq,)),
+        "value": ((state, parameters), (1, nq)),
+        "node": ((state, nq, 1, parameters), (1, nq, state, nq * state, state * state)),
+    }
 
 
 def build(robot: Robot) -> list[ca.Function]:

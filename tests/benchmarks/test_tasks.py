@@ -13,6 +13,7 @@ from models.registry import load_robot
 from models.robot import Robot
 from optimizer.energy.kernel import Kernel
 from optimizer.energy.kernel_expressions import build
+from optimizer.energy.kernel_functions import Interpreted
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.prepared_problem import PreparedProblem
 from tests.optimizer.moves import problem_with
@@ -60,7 +61,7 @@ def test_varied_requests_are_valid(index: int) -> None:
 def test_chains_move_as_pinocchio_says(robot: Robot, joints: int) -> None:
     arm = chain(robot, joints)
     assert arm.nq == joints and arm.limits.v_max.shape == arm.friction.coulomb.shape == (joints,)
-    kernel = Kernel(arm, build(arm), compiled=False)
+    kernel = Kernel(arm, Interpreted(build(arm)))
     q, v, a = np.random.default_rng(joints).normal(size=(3, 5, joints))
     task = PreparedProblem.of(problem_with(np.zeros(joints), np.zeros(joints), robot=arm))
     tau = kernel.torque(q, v, a, task.objective_parameters)

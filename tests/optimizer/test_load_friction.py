@@ -15,6 +15,7 @@ from models.robot import Array, Robot
 from optimizer.certificate import certify
 from optimizer.energy.kernel import Kernel
 from optimizer.energy.kernel_expressions import Parameters, build
+from optimizer.energy.kernel_functions import Interpreted
 from optimizer.energy.limited_torque import greatest_smooth_part, limited_torque
 from optimizer.energy.losses import drawn_power, power_flow
 from optimizer.optimize import optimize
@@ -72,7 +73,7 @@ def test_a_load_of_zero_is_no_load() -> None:
     tau = torques(none, q, v, a)
     flows = [power_flow(tau, v, a, each.arm.drives, each.arm.friction_law).joints for each in (none, zero)]
     assert (flows[0] == flows[1]).all()
-    kernels = [Kernel(each.arm.robot, build(each.arm.robot), compiled=False) for each in (none, zero)]
+    kernels = [Kernel(each.arm.robot, Interpreted(build(each.arm.robot))) for each in (none, zero)]
     p = PreparedProblem.of(none).parameters(electrical=1.0)
     assert (PreparedProblem.of(zero).parameters(electrical=1.0) == p).all()
     assert (kernels[0].value(y, p)[0] == kernels[1].value(y, p)[0]).all()
@@ -83,7 +84,7 @@ def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
     """With corners as good as sharp the cost is the reported power; smoothed, derivatives are the slopes."""
     robot = loaded(drives=LOSSY, torque_side=side, electronics=replace(ROBOT.electronics, regeneration=0.3))
     prepared = PreparedProblem.of(problem(robot=robot, payload=PAYLOAD, gravity=TILTED))
-    kernel, y, arm = Kernel(robot, build(robot), compiled=False), states(23, 12), prepared.arm
+    kernel, y, arm = Kernel(robot, Interpreted(build(robot))), states(23, 12), prepared.arm
     p = prepared.parameters(electrical=1.0)
     exact = p.copy()
     for name, value in {"knee": arm.friction_law.knee, "width": 1e-9, "bend": 0.0}.items():

@@ -14,6 +14,7 @@ from optimizer.energy import kernel
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.kernel_expressions import Parameters, build
+from optimizer.energy.kernel_functions import Interpreted
 from optimizer.energy.losses import drawn_power, power_flow
 from tests.optimizer.energy.kernel_states import LOSSY, NODES, TASK, TORQUE, states
 from tests.optimizer.moves import ROBOT, torques
@@ -40,7 +41,7 @@ def compiled() -> Kernel:
 
 @pytest.fixture(scope="module")
 def interpreted() -> Kernel:
-    return Kernel(ROBOT, build(ROBOT), compiled=False)
+    return Kernel(ROBOT, Interpreted(build(ROBOT)))
 
 
 OBJECTIVES = {"electrical": 1.0}, {"mechanical": 1.0}, {"electrical": 1.0, "time": 1e4}

@@ -26,6 +26,7 @@ from optimizer.energy import kernel, kernel_cache
 from optimizer.energy.kernel import Kernel, kernel_for
 from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
 from optimizer.energy.kernel_expressions import build
+from optimizer.energy.kernel_source import source
 from optimizer.optimize import optimize
 from tests.optimizer.energy.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
@@ -53,7 +54,7 @@ def test_the_digest_tells_chains_apart() -> None:
     assert len(digests) == 4
 
 
-def test_the_digest_covers_every_source_that_runs_while_the_functions_are_built() -> None:
+def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> None:
     ours, ran = Path(__file__).parents[3], set()
 
     def note(frame: FrameType, event: str, argument: object) -> None:
@@ -61,7 +62,7 @@ def test_the_digest_covers_every_source_that_runs_while_the_functions_are_built(
 
     sys.setprofile(note)
     try:
-        build(ROBOT)
+        source(build(ROBOT), 2)
     finally:
         sys.setprofile(None)
     sources = {Path(str(module.__file__)) for module in SOURCES}

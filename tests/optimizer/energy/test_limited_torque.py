@@ -15,6 +15,7 @@ from models.robot import Array
 from optimizer.certificate import certify
 from optimizer.energy.kernel import Kernel
 from optimizer.energy.kernel_expressions import build
+from optimizer.energy.kernel_functions import Interpreted
 from optimizer.energy.limited_torque import limited_torque
 from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
@@ -46,7 +47,7 @@ def test_the_link_bears_the_bodies_alone() -> None:
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
     assert np.abs(limited_torque(task.arm, torques(task, q, v, a), v, a) - at_link(task, q, v, a)).max() < TORQUE
     prepared = PreparedProblem.of(task)
-    kernel = Kernel(LINK, build(LINK), compiled=False)
+    kernel = Kernel(LINK, Interpreted(build(LINK)))
     assert np.abs(kernel.value(y, prepared.parameters(electrical=1.0))[1] - at_link(task, q, v, a)).max() < TORQUE
 
 
@@ -55,13 +56,13 @@ def test_the_energy_is_that_of_the_motor_all_the_same() -> None:
     y = states(12)
     for robot in (LINK, replace(LINK, torque_side="motor")):
         prepared = PreparedProblem.of(problem(robot=robot, payload=PAYLOAD))
-        costs.append(Kernel(robot, build(robot), compiled=False).value(y, prepared.parameters(electrical=1.0))[0])
+        costs.append(Kernel(robot, Interpreted(build(robot))).value(y, prepared.parameters(electrical=1.0))[0])
     assert (costs[0] == costs[1]).all()
 
 
 def test_derivatives_are_the_slopes() -> None:
     """As in test_kernel, of the torque at the link: first ones against values, second ones against first ones."""
-    kernel = Kernel(LINK, build(LINK), compiled=False)
+    kernel = Kernel(LINK, Interpreted(build(LINK)))
     p = PreparedProblem.of(problem(robot=LINK, payload=PAYLOAD, gravity=TILTED)).parameters(electrical=1.0)
     y = states(13)
     multiplier, weight = np.random.default_rng(3).normal(size=(len(y), 6)), np.linspace(0.5, 1.5, len(y))
