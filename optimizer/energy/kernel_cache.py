@@ -28,8 +28,8 @@ from optimizer.energy.kernel_source import lanes, source
 
 log = logging.getLogger(__name__)
 
-# at -O1 it takes twice as long to compile, and runs a tenth faster: the code is one long run of multiplications. Without
-# contraction, all processors round alike
+# at -O1 it takes twice as long to compile, and runs a tenth faster: the code is one long run of multiplications. All
+# processors round alike without contraction
 COMPILER_FLAGS = ("-Og", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off", "-Wno-psabi")
 # users may bring any number of arms, each with a library of about a megabyte
 MOST_LIBRARIES = 200
