@@ -18,6 +18,7 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.path_planner import plan_paths
+from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.inverse import required_inverse_kinematics
@@ -71,10 +72,11 @@ def cell_task(seed: int, index: int) -> CellTask:
         from_, to = (_clear(arm, model, T) for T in (T_start, T_goal))
         if not from_ or not to:
             continue
+        checkers = ValidityCheckers(arm, model)
         q_start = from_[int(rng.integers(len(from_)))]
         # the nearest configuration of the goal to which there is a path
         for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
-            if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, model=model).paths:
+            if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, checkers=checkers).paths:
                 blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
                 return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
     raise AssertionError

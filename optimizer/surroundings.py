@@ -13,6 +13,7 @@ from optimizer.collision.bodies import Indices
 from optimizer.collision.clearance_proof import proven_clearance
 from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from optimizer.collision.path_planner import MOST_STATES, PlannedPaths, PlanningEnd, plan_paths
+from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
@@ -114,27 +115,53 @@ class Surroundings:
     ) -> PlannedPaths:
         """Collision-free joint paths from q_start to q_goal or one of the others, (nq,) [rad]; see `plan_paths`.
 
-        Paths found are kept: a later call for the goal that they lead to returns them. A planning without a path is
-        kept only until more states are allowed, and not at all if the deadline ended it.
+        Paths found are kept: a later call for the goal that they lead to returns them, and the first one for a goal
+        that differs by full turns follows the shortest of them. A planning without a path is kept, for all goals that
+        differ by full turns, only until more states are allowed, and not at all if the deadline ended it.
         """
-        known = self._planned.get(_key(q_start, q_goal))
-        if known is not None and (known.paths or known.checked_states >= most_states):
-            return known
-        goals = np.vstack([q_goal, *other_goals])
-        planned = plan_paths(self.arm, q_start, goals, deadline, model=self.model, most_states=most_states)
+        known, turned = self._planned.get(_key(q_start, q_goal)), self._turned.get(_turned_key(q_start, q_goal))
+        for earlier in (known, turned if turned is not None and not turned.paths else None):
+            if earlier is not None and (earlier.paths or earlier.checked_states >= most_states):
+                return earlier
+        like = turned.paths[0] if known is None and turned is not None and turned.paths else None
+        goals = q_goal[None] if like is not None else np.vstack([q_goal, *other_goals])
+        planned = plan_paths(
+            self.arm, q_start, goals, deadline, checkers=self._checkers, most_states=most_states, like=like
+        )
         for goal in {path[-1].tobytes(): path[-1] for path in planned.paths}.values():
-            self._planned[_key(q_start, goal)] = replace(planned, paths=planned.leading_to(goal))
+            self._keep(q_start, goal, replace(planned, paths=planned.leading_to(goal)))
         if planned.end is PlanningEnd.EXHAUSTED:
-            self._planned.update({_key(q_start, goal): planned for goal in goals})
+            for goal in goals:
+                self._keep(q_start, goal, planned)
         return planned
+
+    def _keep(self, q_start: Array, q_goal: Array, planned: PlannedPaths) -> None:
+        self._planned[_key(q_start, q_goal)] = planned
+        turned = self._turned.get(_turned_key(q_start, q_goal))
+        if turned is None or not turned.paths:
+            self._turned[_turned_key(q_start, q_goal)] = planned
 
     def has_planned_paths(self, q_start: Array, q_goal: Array) -> bool:
         """Whether paths from q_start to q_goal (nq,) have been planned and found."""
         known = self._planned.get(_key(q_start, q_goal))
         return known is not None and bool(known.paths)
 
+    def seems_enclosed(self, q_start: Array, q_goal: Array) -> bool:
+        """Whether plannings to q_goal (nq,) [rad], and to what differs from it by full turns, have found no path."""
+        known = self._turned.get(_turned_key(q_start, q_goal))
+        return known is not None and not known.paths
+
+    @cached_property
+    def _checkers(self) -> ValidityCheckers:
+        return ValidityCheckers(self.arm, self.model)
+
     @cached_property
     def _planned(self) -> dict[bytes, PlannedPaths]:
+        return {}
+
+    @cached_property
+    def _turned(self) -> dict[bytes, PlannedPaths]:
+        """The first paths that were found, else the last planning, for all goals that differ by full turns."""
         return {}
 
     def _sampled_distances(self, spline: Spline, within: float) -> Array:
@@ -145,3 +172,8 @@ class Surroundings:
 
 def _key(q_start: Array, q_goal: Array) -> bytes:
     return q_start.tobytes() + q_goal.tobytes()
+
+
+def _turned_key(q_start: Array, q_goal: Array) -> bytes:
+    """The same for all goals that differ by full turns."""
+    return q_start.tobytes() + (np.round([np.cos(q_goal), np.sin(q_goal)], 6) + 0.0).tobytes()

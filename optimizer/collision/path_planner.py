@@ -11,14 +11,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 from ompl import util as ou
 
 from models.robot import Array, Limits
 from optimizer.collision.model import CollisionModel, collision_model
-from optimizer.collision.path_search import Box, PathSearch, joint_weights
-from optimizer.collision.state_validity import StateValidityChecker
+from optimizer.collision.path_search import RANGE, Box, PathSearch, joint_weights
+from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
 from optimizer.trajectories import quintic
@@ -32,6 +33,8 @@ STEP = 0.06
 MOST_STATES = 200_000
 # checked states for further paths, once one is found
 MORE_STATES = 3_000
+# checked states of a planning that may follow a known path
+STATES_BESIDE = 5_000
 # two paths are the same if no joint differs by this much [rad] at the same fraction of their lengths
 SAME_PATH = 0.5
 # linear interpolation between two paths: samples of each path, steps from one to the other, and penetration [m] that is
@@ -65,9 +68,6 @@ class Region:
 # Narrow bounds give short paths, wide ones find a way out of a cage; no margin lets a path turn a joint by a needless
 # full turn. The last searches are for gaps that the reserve or the step closes
 REGIONS = (Region(0.7, 400), Region(2.2, 1_600), Region(2.2, 800, 20_000, narrow=True), Region(3.5, 800, 20_000))
-
-
-Checkers = tuple[StateValidityChecker, StateValidityChecker, StateValidityChecker]
 
 
 class PlanningEnd(Enum):
@@ -112,35 +112,42 @@ def plan_paths(
     deadline: Deadline,
     most: int = 2,
     seed: int = 1,
-    model: CollisionModel | None = None,
+    checkers: ValidityCheckers | None = None,
     most_states: int = MOST_STATES,
+    like: Array | None = None,
 ) -> PlannedPaths:
     """Up to `most` collision-free joint paths from q_start (nq,) to any of q_goals, (nq,) or (m, nq) [rad].
 
     A path is piecewise linear, within the joint limits and the tool cone of the arm. It is checked at short steps,
     which is no proof. The planning ends after about `most_states` checked states, or at `deadline`. Unless the deadline
-    passes, `seed` determines the result. `model` is the collision model of the arm, if at hand.
+    passes, `seed` determines the result. `checkers` are those of the arm, if at hand.
+    `like` (k, nq) [rad] is such a path to a goal that differs by full turns. Then one path is sought, which may follow
+    it away from the start and, turned as fully, to the goal: narrow ways out of an obstacle are found once.
     """
-    model = collision_model(arm) if model is None else model
-    found = _checkers(arm, model, q_start, np.atleast_2d(q_goals))
+    checkers = ValidityCheckers(arm, collision_model(arm)) if checkers is None else checkers
+    if like is not None:
+        most, most_states = 1, min(most_states, STATES_BESIDE)
+    found = _reserves(checkers, q_start, np.atleast_2d(q_goals))
     if found is None:
         return PlannedPaths(PlanningEnd.INVALID_END)
     with _seeded(seed, deadline):
-        planning = _Planning(arm, model, q_start, *found, deadline)
+        planning = _Planning(checkers, q_start, *found, like, deadline)
         paths = planning.run(most, most_states)
     end = PlanningEnd.FOUND if paths else PlanningEnd.CUT_SHORT if deadline.passed else PlanningEnd.EXHAUSTED
     v_max = arm.active_limits.v_max
     return PlannedPaths(end, sorted(paths, key=lambda path: length(path, v_max)), planning.checked_states)
 
 
-def _checkers(arm: Arm, model: CollisionModel, q_start: Array, q_goals: Array) -> tuple[Checkers, Array] | None:
-    """The checkers with the first possible reserve, with a smaller one, and with the least; and the goals valid for the
-    first one. None if no reserve leaves the start and a goal."""
-    checkers = [StateValidityChecker(arm, model, reserve) for reserve in RESERVES]
-    for number, checker in enumerate(checkers):
+def _reserves(checkers: ValidityCheckers, q_start: Array, q_goals: Array) -> tuple[tuple[float, float], Array] | None:
+    """The first possible reserve, and one for narrow regions; and the goals valid for the first one.
+
+    None if no reserve leaves the start and a goal.
+    """
+    for reserve in RESERVES:
+        checker = checkers[reserve]
         valid = np.array([checker.is_valid(q_goal) for q_goal in q_goals])
         if checker.is_valid(q_start) and valid.any():
-            return (checker, checkers[max(number, len(checkers) - 2)], checkers[-1]), q_goals[valid]
+            return (reserve, min(reserve, RESERVES[-2])), q_goals[valid]
     return None
 
 
@@ -149,15 +156,16 @@ class _Planning:
 
     def __init__(
         self,
-        arm: Arm,
-        model: CollisionModel,
+        checkers: ValidityCheckers,
         q_start: Array,
-        checkers: Checkers,
+        reserves: tuple[float, float],
         q_goals: Array,
+        like: Array | None,
         deadline: Deadline,
     ) -> None:
-        self._limits, self._weights = arm.active_limits, joint_weights(arm, model)
-        self._checkers, self._ends, self._deadline = checkers, (q_start, q_goals), deadline
+        self._limits, self._weights = checkers.arm.active_limits, joint_weights(checkers.arm, checkers.model)
+        self._checkers, self._reserves, self._deadline = checkers, reserves, deadline
+        self._begin, self._ends = _leads(q_start, q_goals, like, self._weights)
         self._searches: dict[Region, PathSearch] = {}
         self._steps = {region: STEP / 2 if region.narrow else STEP for region in REGIONS}
         self.checked_states = 0
@@ -201,16 +209,30 @@ class _Planning:
 
     def _search(self, region: Region) -> PathSearch:
         """A new search in a region."""
-        q_start, q_goals = self._ends
+        ends = np.vstack([self._begin[:1], *(end[-1:] for end in self._ends)])
         return PathSearch(
-            self._checkers[region.narrow],
-            self._checkers[-1],
+            self._checkers[self._reserves[region.narrow]],
+            self._checkers[RESERVES[-1]],
             self._weights,
-            _box(self._limits, np.vstack([q_start, q_goals]), region.margin, self._steps[region]),
-            q_start,
-            q_goals,
+            _box(self._limits, ends, region.margin, self._steps[region]),
+            self._begin,
+            self._ends,
             self._deadline,
         )
+
+
+def _leads(q_start: Array, q_goals: Array, like: Array | None, weights: Array) -> tuple[Array, list[Array]]:
+    """The known ways, (k, nq) each, from the start on and to each of the goals (m, nq): `like`, or the ends alone.
+
+    Their points are at most RANGE apart.
+    """
+    if like is None:
+        return q_start[None], [q_goal[None] for q_goal in q_goals]
+    steps = [int(np.linalg.norm((b - a) * weights) / RANGE) + 1 for a, b in pairwise(like)]
+    pieces = [np.linspace(a, b, n, endpoint=False) for (a, b), n in zip(pairwise(like), steps, strict=True)]
+    begin = np.vstack([*pieces, like[-1:]])
+    # without rounding at the goal
+    return begin, [np.vstack([(begin + (q_goal - like[-1]))[:-1], q_goal]) for q_goal in q_goals]
 
 
 def _box(limits: Limits, ends: Array, margin: float, step: float) -> Box:

@@ -6,6 +6,7 @@ implementation of OMPL; OMPL's path simplifier shortens the path.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -35,6 +36,10 @@ class Box:
     lower: Array
     upper: Array
     step: float
+
+    def inside(self, q: Array) -> Array:
+        """Those of the configurations (k, nq) [rad] that lie in the box."""
+        return q[((q >= self.lower) & (q <= self.upper)).all(axis=1)]
 
 
 def joint_weights(arm: Arm, model: CollisionModel) -> Array:
@@ -74,9 +79,12 @@ class _Effort:
 
 
 class PathSearch:
-    """A search from q_start (nq,) to any of q_goals (m, nq) [rad] in a box. `advance` goes on where it paused.
+    """A search in a box. `advance` goes on where it paused.
 
-    `last_checker` checks the path at short steps, with less reserve: what long steps cut must not be more than that.
+    The path sought begins at the first point of `begin` (k, nq) [rad], which is a collision-free path, and leaves it at
+    any of its points. It ends at the last point of one of `ends`, and meets this path, (m, nq) each, at any of its
+    points. `last_checker` checks the path at short steps, with less reserve: what long steps cut must not be more than
+    that.
     """
 
     def __init__(
@@ -85,11 +93,11 @@ class PathSearch:
         last_checker: StateValidityChecker,
         weights: Array,
         box: Box,
-        q_start: Array,
-        q_goals: Array,
+        begin: Array,
+        ends: Sequence[Array],
         deadline: Deadline,
     ) -> None:
-        self._weights = weights
+        self._weights, self._begin, self._ends = weights, begin, ends
         self._effort = _Effort(checker, weights, deadline)
         space = ob.RealVectorStateSpace(len(weights))
         bounds = ob.RealVectorBounds(len(weights))
@@ -102,12 +110,13 @@ class PathSearch:
         self._information.setStateValidityCheckingResolution(box.step / space.getMaximumExtent())
         self._information.setup()
         self._problem = ob.ProblemDefinition(self._information)
-        self._problem.addStartState(self._state(space, q_start))
+        self._space = space
+        for q in box.inside(begin):
+            self._problem.addStartState(self._state(q))
         goals = ob.GoalStates(self._information)
-        for q_goal in q_goals:
-            goals.addState(self._state(space, q_goal))
+        for q in box.inside(np.vstack(ends)):
+            goals.addState(self._state(q))
         self._problem.setGoal(goals)
-        self._ends = (q_start, q_goals)
         self._last_checker = last_checker
         self._planner = og.RRTConnect(self._information)
         self._planner.setRange(RANGE)
@@ -132,7 +141,7 @@ class PathSearch:
 
     def path(self) -> Array | None:
         """The path found (k, nq) [rad], shortened; None if a state of it is in collision when it is checked densely."""
-        path = self._problem.getSolutionPath()
+        path = self._whole(self._problem.getSolutionPath())
         # limited by counts, not by the clock, so that the same seed gives the same path
         simplifier = og.PathSimplifier(self._information)
         simplifier.reduceVertices(path, SHORTCUTS, SHORTCUTS)
@@ -142,9 +151,23 @@ class PathSearch:
         points = np.array([[state[joint] for joint in joints] for state in path.getStates()]) / self._weights
         points = points[np.append(True, np.abs(np.diff(points, axis=0)).max(axis=1) > 0)]
         # without the rounding of the weights
-        q_start, q_goals = self._ends
-        points[0], points[-1] = q_start, q_goals[np.abs(q_goals - points[-1]).max(axis=1).argmin()]
+        chosen, _ = _nearest([end[-1:] for end in self._ends], points[-1])
+        points[0], points[-1] = self._begin[0], self._ends[chosen][-1]
         return points if self._is_valid(points) else None
+
+    def _whole(self, path: og.PathGeometric) -> og.PathGeometric:
+        """The path found, with the part of `begin` before it and the part of one of `ends` after it."""
+        states = path.getStates()
+        first, last = (
+            np.array([state[j] for j in range(len(self._weights))]) / self._weights for state in (states[0], states[-1])
+        )
+        _, left = _nearest([self._begin], first)
+        chosen, met = _nearest(self._ends, last)
+        for q in self._begin[:left][::-1]:
+            path.prepend(self._state(q))
+        for q in self._ends[chosen][met + 1 :]:
+            path.append(self._state(q))
+        return path
 
     def _is_valid(self, points: Array) -> bool:
         """Whether states LAST_STEP apart along a path (k, nq) are valid."""
@@ -154,8 +177,15 @@ class PathSearch:
                 return False
         return True
 
-    def _state(self, space: ob.RealVectorStateSpace, q: Array) -> ob.RealVectorStateType:
-        state = space.allocState()
+    def _state(self, q: Array) -> ob.RealVectorStateType:
+        state = self._space.allocState()
         for joint, value in enumerate((q * self._weights).tolist()):
             state[joint] = value
         return state
+
+
+def _nearest(paths: Sequence[Array], q: Array) -> tuple[int, int]:
+    """Which of the paths (k, nq), and which of its points, is nearest to q (nq,)."""
+    apart = [np.abs(path - q).max(axis=1) for path in paths]
+    chosen = min(range(len(paths)), key=lambda k: float(apart[k].min()))
+    return chosen, int(apart[chosen].argmin())

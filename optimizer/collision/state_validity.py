@@ -7,6 +7,7 @@ and only needs to know whether it is valid: that takes tens of microseconds here
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 
 import coal
 import numpy as np
@@ -83,3 +84,17 @@ class StateValidityChecker:
         placement = pin.SE3(body.T_link_core @ T)
         self._geometry.addGeometryObject(pin.GeometryObject(str(number), body.link, placement, shape))
         return skin
+
+
+@dataclass(frozen=True)
+class ValidityCheckers:
+    """The checkers of an arm by their reserves, each made when it is first asked for: that takes milliseconds."""
+
+    arm: Arm
+    model: CollisionModel
+    _made: dict[float, StateValidityChecker] = field(default_factory=dict, repr=False)
+
+    def __getitem__(self, reserve: float) -> StateValidityChecker:
+        if reserve not in self._made:
+            self._made[reserve] = StateValidityChecker(self.arm, self.model, reserve)
+        return self._made[reserve]

@@ -33,7 +33,7 @@ def around_obstacles(method: Method, own: str, collision: Clearance, law: Law) -
     failed = SolveResult(SolveStatus.FAILED, f"on {own}, {collision.message}", collision=collision)
     paths = to_goal(method, planned)
     if not paths:
-        return without_path(failed, planned)
+        return without_path(method, failed, planned)
     for path in paths:
         if found and patience.passed:
             break

@@ -35,6 +35,9 @@ REFINED, EXACT = 2, 3
 # control points of the attempts from a planned path, and penetration [m] of a spline fitted to it beyond which more are
 # taken
 ALONG_PATH, ALLOWED_CUT = (COARSE, 20, 30), 0.02
+# a motion of more control points than COARSE is solved to the end unless it needs more than this multiple of the best
+# energy known: that gains a few percent at most
+POLISHED = 1.05
 # relative decrease of the cost that a further step must promise in a solve whose motion is followed to sharper corners
 CORNERED_PROGRESS = 5e-2
 
@@ -77,8 +80,9 @@ class FreeSpline(SqpMethod):
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths, solved to the end; `failed` if there is none."""
+        known = self.best_known
         best = super().from_planned_paths(failed)
-        if best.spline is None or self.may_refine(best.spline):
+        if best.spline is None or self.may_refine(best.spline) or self.prepared.cost_of(best.spline) > POLISHED * known:
             return best
         polished = self._polished(best.spline)
         if polished.spline is None or self.prepared.cost_of(polished.spline) >= self.prepared.cost_of(best.spline):

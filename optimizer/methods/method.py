@@ -34,7 +34,7 @@ class SolveStatus(StrEnum):
 
     SOLVED: there is a motion within the limits. INFEASIBLE: the method has none for this candidate. FAILED: the method
     found none. PRUNED: it needs at least as much energy as the best motion known, by what the solve promises, or
-    although it collides. POSTPONED: the planner found a path to another candidate's goal first. OUT_OF_TIME: the
+    although it collides. POSTPONED: the planner found no path to its goal yet, and others come first. OUT_OF_TIME: the
     deadline passed.
     """
 
@@ -82,9 +82,10 @@ class Method(ABC):
     converges: ClassVar[bool] = True
     # energy of the best motion known [J], in the objective: motions that collide and need more are not solved further
     best_known: float = np.inf
-    # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any will do
+    # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any may do
     other_goals: Callable[[], Sequence[Array]] = tuple
-    # whether the candidate was postponed: then clearance constraints on its own motion were tried in vain
+    # whether the candidate was postponed: then clearance constraints on its own motion, and a planning in few states,
+    # were tried in vain
     was_postponed: bool = False
 
     def __init__(

@@ -13,9 +13,9 @@ from optimizer.prepared_problem import RATIO_ROUNDING, PreparedProblem
 from optimizer.trajectories import bspline
 from optimizer.trajectories.spline import Spline
 
-# while no motion is known, a planning may take this fraction of the time left: the rest is for the solves. Once one is
-# known, it may check so many states
-PLANNING, FEW_STATES = 0.75, 5_000
+# a planning may take this fraction of the time left: the rest is for the solves. The first one to a goal, and all of
+# them once a motion is known, may check so many states
+PLANNING, FEW_STATES = 0.75, 20_000
 # fraction of the time left that a method which follows paths gives to the second one
 PATIENCE = 0.3
 # planned paths longer than this multiple of the shortest one are skipped
@@ -30,14 +30,19 @@ CONE_POINTS = 401
 
 
 def plan(method: Method) -> PlannedPaths:
-    """Planned paths of a method's candidate; while no motion is known, also to the goals of other candidates."""
-    left = method.deadline.left
-    return method.prepared.surroundings.planned_paths(
+    """Planned paths of a method's candidate, in a few states.
+
+    If that has failed, and no motion is known: in many states, and also to the goals of other candidates.
+    """
+    left, surroundings, others = method.deadline.left, method.prepared.surroundings, method.other_goals()
+    tried = method.was_postponed or surroundings.seems_enclosed(method.q_start, method.q_goal)
+    thorough = np.isinf(method.best_known) and (tried or not others)
+    return surroundings.planned_paths(
         method.q_start,
         method.q_goal,
         method.deadline.within(PLANNING * left) if np.isfinite(left) else method.deadline,
-        method.other_goals(),
-        MOST_STATES if np.isinf(method.best_known) else FEW_STATES,
+        others if thorough else (),
+        MOST_STATES if thorough else FEW_STATES,
     )
 
 
@@ -47,9 +52,13 @@ def to_goal(method: Method, planned: PlannedPaths) -> list[Array]:
     return [path for path in paths if length(path, v_max) <= DETOUR * length(paths[0], v_max)]
 
 
-def without_path(failed: SolveResult, planned: PlannedPaths) -> SolveResult:
-    """The result where no path leads to the goal: postponed if one leads to another candidate's, else failed."""
-    if planned.paths:
+def without_path(method: Method, failed: SolveResult, planned: PlannedPaths) -> SolveResult:
+    """The result where no path leads to the goal: failed, or postponed if other candidates come first.
+
+    They do if a path leads to one of them, or, as long as no motion is known, if few states have been checked.
+    """
+    few = planned.end is PlanningEnd.EXHAUSTED and planned.checked_states < MOST_STATES
+    if planned.paths or (few and np.isinf(method.best_known) and not method.was_postponed):
         return replace(failed, status=SolveStatus.POSTPONED)
     late = planned.end is PlanningEnd.CUT_SHORT
     return replace(failed, status=SolveStatus.FAILED, reason=f"{failed.reason}; {planned.message}", cut_short=late)

@@ -84,7 +84,7 @@ class PolynomialGA(Method):
         planned = plan(self)
         paths = to_goal(self, planned)
         if not paths:
-            return without_path(first, planned)
+            return without_path(self, first, planned)
         self._planned = self.space.fit(*along(paths[0], 1.0, self.prepared.problem.arm.active_limits.v_max))[1:-1]
         second = self._evolved()
         if second.spline is not None:

@@ -43,6 +43,9 @@ ROUGH_PROGRESS = 1e-3
 TIME_SCALES = (1.02, 1.15, 1.3, 1.5, 1.8, 2.3, 3.0, 4.5)
 # time [s] before the deadline at which an optimisation among obstacles stops, to check its motion
 CHECKING = 0.15
+# among obstacles, a solve ends early if it comes to no less than this multiple of the best energy known: an SQP that
+# still changes sides seldom gets this far below what it promises
+NOT_MUCH_BETTER = 1.05
 # penetration [m] of the motion without clearance constraints beyond which, once a motion is known, they are added to a
 # planned path alone: what is that deep inside an obstacle seldom gets out of it
 DEEP = 0.09
@@ -157,11 +160,12 @@ class SqpMethod(Method):
     def _must_be_below(self, stage: _Stage) -> float:
         """The energy [J] that a solve must promise to come below.
 
-        Around obstacles and through passes, promises are not kept.
+        Through passes, promises are not kept; around obstacles not quite.
         """
         smoothed = has_corners(self.prepared.problem.objective, self.prepared.arm)
-        kept = not (len(stage.pairs) or len(self.passes) or smoothed or self.interval.minimum_time)
-        return self.best_known if kept else np.inf
+        if len(self.passes) or smoothed or self.interval.minimum_time:
+            return np.inf
+        return self.best_known * NOT_MUCH_BETTER if len(stage.pairs) else self.best_known
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths as initial guesses; `failed` if there is none.
@@ -173,7 +177,7 @@ class SqpMethod(Method):
         planned = plan(self)
         paths, found = to_goal(self, planned), list[SolveResult]()
         if not paths:
-            return without_path(failed, planned)
+            return without_path(self, failed, planned)
         for path in paths:
             if self.deadline.passed:
                 break
@@ -183,8 +187,11 @@ class SqpMethod(Method):
                 continue
             result = self.along_path(q, t)
             found.append(replace(result, reason=f"{result.reason}{FROM_PLANNED_PATH}"))
-        best = min(found, key=lambda result: prepared.cost_of(result.spline), default=failed)
-        return with_effort(failed if best.spline is None else best, found)
+            self.best_known = min(self.best_known, prepared.cost_of(result.spline))
+        if not found:
+            return failed
+        best = min(found, key=lambda result: (prepared.cost_of(result.spline), result.status is not SolveStatus.PRUNED))
+        return with_effort(failed if best.status is SolveStatus.FAILED else best, found)
 
     @abstractmethod
     def along_path(self, q: Array, t: Array) -> SolveResult:

@@ -62,11 +62,11 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
 def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> SolveResult:
     """The result of a solver that knows what the search knows so far."""
     best = incumbent.best()
-    if best is not None and best.energy is not None:
-        solver.best_known = best.energy
-    else:
-        solver.other_goals = partial(_other_goals, incumbent, candidate)
     solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
+    if best is None or best.energy is None:
+        solver.other_goals = partial(_other_goals, incumbent, candidate)
+    else:
+        solver.best_known = best.energy
     return solver.solve()
 
 

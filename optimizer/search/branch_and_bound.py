@@ -21,8 +21,9 @@ def explore(
 ) -> Candidate | None:
     """Solve candidates in order of lower bound until none is below the incumbent; returns it, None if there is none.
 
-    After `most_solved` solved candidates the others are not solved. A candidate that is postponed comes again after the
-    one whose path was found instead. `ended` gets every candidate that was solved, or tried in vain.
+    After `most_solved` solved candidates the others are not solved. A candidate that is postponed comes again after
+    those to which a path is known, and, if none is known to itself, after those whose goals do not seem enclosed.
+    `ended` gets every candidate that was solved, or tried in vain.
     """
     best = min((e for e in candidates if e.energy is not None), key=lambda e: e.energy or 0.0, default=None)
     queue = sorted(candidates, key=lambda e: (e.lower_bound, e.shortest))
@@ -44,7 +45,7 @@ def explore(
             break
         if result.status is SolveStatus.POSTPONED:
             queue.insert(0, candidate)
-            queue.sort(key=lambda e: not prepared.surroundings.has_planned_paths(e.q_start, e.q_goal))
+            queue.sort(key=lambda e: _hopelessness(prepared, e))
             continue
         candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
         if result.spline is not None:
@@ -53,3 +54,11 @@ def explore(
                 best = candidate
         ended(candidate)
     return best
+
+
+def _hopelessness(prepared: PreparedProblem, candidate: Candidate) -> int:
+    """0 if a path to a candidate's goal is known, 2 if this goal seems enclosed, else 1."""
+    ends = candidate.q_start, candidate.q_goal
+    if prepared.surroundings.has_planned_paths(*ends):
+        return 0
+    return 2 if prepared.surroundings.seems_enclosed(*ends) else 1

@@ -126,3 +126,17 @@ def test_a_path_to_another_goal_is_kept_for_that_goal() -> None:
     assert planned.paths and not planned.leading_to(within)
     assert all((path[-1] == GOAL).all() for path in planned.paths)
     assert surroundings.has_planned_paths(START, GOAL) and not surroundings.has_planned_paths(START, within)
+
+
+def test_a_planning_stands_for_all_goals_that_differ_by_full_turns() -> None:
+    """Without a path, none is looked for again; with one, the next is found in fewer states."""
+    surroundings, few = behind_a_wall(), 1
+    turned = GOAL + 2 * np.pi * np.eye(6)[4]
+    first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), most_states=few)
+    assert surroundings.seems_enclosed(START, turned) and not surroundings.has_planned_paths(START, turned)
+    assert surroundings.planned_paths(START, turned, Deadline.after(AMPLE), most_states=few) is first
+    found = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
+    assert found.paths and not surroundings.seems_enclosed(START, turned)
+    (path,) = surroundings.planned_paths(START, turned, Deadline.after(AMPLE)).paths
+    np.testing.assert_array_equal(path[[0, -1]], [START, turned])
+    assert surroundings.has_planned_paths(START, turned) and not surroundings.seems_enclosed(GOAL, START)

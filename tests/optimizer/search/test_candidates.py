@@ -15,7 +15,7 @@ from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.exceptions import TorqueInfeasible, UnreachablePose
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.methods import solver_for
-from optimizer.methods.method import SolveResult
+from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
@@ -25,6 +25,7 @@ from optimizer.search import candidates as search
 from optimizer.search.branch_and_bound import explore
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import ends
+from optimizer.surroundings import Surroundings
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, tcp_pose, torques
 from tests.selection import long_but
 
@@ -256,6 +257,24 @@ def test_what_was_not_reached_says_so() -> None:
     assert {candidate.status for candidate in found} <= {"solved", "failed", "infeasible", "unvisited"}
     waiting = [candidate.report() for candidate in found if candidate.status == "unvisited"]
     assert waiting and all("deadline" in each.reason and each.energy is None for each in waiting)
+
+
+def test_goals_that_seem_enclosed_are_tried_after_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A first attempt finds this one enclosed, and a path to another one."""
+    task = PreparedProblem.of(problem(goal=tcp_pose(GOAL)))
+    found, tried = candidates(task.problem)[:4], list[Candidate]()
+    search.bound(task, found)
+    found.sort(key=lambda candidate: candidate.lower_bound)
+    enclosed, known = [id(found[k].q_goal) for k in (0, 1)], id(found[3].q_goal)
+    monkeypatch.setattr(Surroundings, "seems_enclosed", lambda self, q_start, q_goal: id(q_goal) in enclosed)
+    monkeypatch.setattr(Surroundings, "has_planned_paths", lambda self, q_start, q_goal: id(q_goal) == known)
+
+    def attempt(candidate: Candidate) -> SolveResult:
+        tried.append(candidate)
+        return SolveResult(SolveStatus.POSTPONED if len(tried) == 1 else SolveStatus.FAILED, "")
+
+    explore(task, found, attempt, NEVER)
+    assert [[id(each) for each in found].index(id(candidate)) for candidate in tried] == [0, 3, 2, 0, 1]
 
 
 def test_durations_rule_candidates_out() -> None:
