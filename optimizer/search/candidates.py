@@ -125,23 +125,23 @@ def pairs(
     """
     result: list[Candidate] = []
     due = PAIRS_PER_CHECK
+    only = {id(end): _only_choice(end) for end in (*starts, *goals)}
     for start in starts:
         for goal in goals:
             if len(result) > due:
                 checkpoint()
                 due = len(result) + PAIRS_PER_CHECK
-            windings = prepared.problem.windings and not (start.sampled or goal.sampled)
-            options = [
-                _joint_options(s, g, start.fixed or goal.fixed, windings)
-                for s, g in zip(start.choices, goal.choices, strict=True)
-            ]
-            if len(result) + math.prod(map(len, options)) > MOST_PAIRS:
+            q_start, q_goal = only[id(start)], only[id(goal)]
+            if q_start is None or q_goal is None:
+                windings = prepared.problem.windings and not (start.sampled or goal.sampled)
+                q_start, q_goal = _combined(start, goal, windings, MOST_PAIRS)
+            if len(result) + len(q_start) > MOST_PAIRS:
                 raise InvalidProblem(
                     "goal" if isinstance(prepared.problem.goal, AnyOf) else "start",
                     f"These targets make more than {MOST_PAIRS} pairs of arm configurations: give fewer of them, a "
                     "`branch`, or `windings` false.",
                 )
-            new = [Candidate(start, goal, *both) for both in zip(*_combined(options), strict=True)]
+            new = [Candidate(start, goal, *both) for both in zip(q_start, q_goal, strict=True)]
             if new[0].sampled:
                 for candidate in new:
                     candidate.deferred = True
@@ -150,12 +150,26 @@ def pairs(
     return result
 
 
-def _combined(options: list[list[tuple[float, float]]]) -> tuple[Array, Array]:
-    """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last joint's first."""
-    chosen = np.indices([len(each) for each in options]).reshape(len(options), -1)
-    both = [np.array(each)[rows] for each, rows in zip(options, chosen, strict=True)]
-    start, goal = np.array(both).transpose(2, 1, 0).copy()
-    return start, goal
+def _only_choice(end: EndConfiguration) -> Array | None:
+    """The joint positions (1, nq) [rad] of an end without full-turn alternatives; else None."""
+    return None if any(len(each) > 1 for each in end.choices) else np.array([[each[0] for each in end.choices]])
+
+
+def _combined(start: EndConfiguration, goal: EndConfiguration, windings: bool, most: int) -> tuple[Array, Array]:
+    """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last joint's first; of some
+    of them, if there are more than `most`."""
+    options = [
+        _joint_options(s, g, start.fixed or goal.fixed, windings)
+        for s, g in zip(start.choices, goal.choices, strict=True)
+    ]
+    count = math.prod(map(len, options))
+    if count == 1:
+        both = np.array(options)
+        return both[:, :, 0].T, both[:, :, 1].T
+    chosen = np.unravel_index(np.arange(min(count, most + 1)), [len(each) for each in options])
+    both = np.array([np.array(each)[rows] for each, rows in zip(options, chosen, strict=True)])
+    q_start, q_goal = both.transpose(2, 1, 0).copy()
+    return q_start, q_goal
 
 
 def _joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
