@@ -92,13 +92,14 @@ class Surroundings:
     def is_near_contact(self, q: Array) -> bool:
         """Whether any of q (k, nq) [rad] has a clearance below NEAR_CONTACT.
 
-        An obstacle is then likely to limit the optimum.
+        An obstacle is then likely to limit the optimum. About CONTACT_SAMPLES of them are checked.
         """
-        return self.arm.collisions and self.model.least_distance(q, NEAR_CONTACT) < NEAR_CONTACT
+        checked = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
+        return self.arm.collisions and self.model.least_distance(checked, NEAR_CONTACT) < NEAR_CONTACT
 
     def active_pairs(self, spline: Spline) -> Indices:
         """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a sample of the motion."""
-        return np.flatnonzero(self._sampled_distances(spline, ACTIVE).min(axis=0) < ACTIVE)
+        return np.flatnonzero(self.model.pairs_within(self._sampled_frames(spline), ACTIVE))
 
     def with_clearance(self, pairs: Indices) -> PathConstraints:
         """The path constraints of the arm, and the clearance of `pairs` (k,) of the collision model."""
@@ -166,8 +167,11 @@ class Surroundings:
 
     def _sampled_distances(self, spline: Spline, within: float) -> Array:
         """Signed distances (CONTACT_SAMPLES, pairs) [m] at equal steps of a motion, exact up to `within`."""
-        q = spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES))
-        return self.model.pair_distances(self.model.frames(q), within=within).distance
+        return self.model.pair_distances(self._sampled_frames(spline), within=within).distance
+
+    def _sampled_frames(self, spline: Spline) -> Array:
+        """Link frames (CONTACT_SAMPLES, nq + 1, 4, 4) at equal steps of a motion."""
+        return self.model.frames(spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES)))
 
 
 def _key(q_start: Array, q_goal: Array) -> bytes:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from models.robot import Array
+from optimizer.collision.many_points import cross
 
 # two cores nearer than this [m] touch: the direction from one to the other is only rounding
 TOUCHING = 1e-10
@@ -90,7 +91,7 @@ def _penetration(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
     """
     u = b[:, 1] - b[:, 0]
     faces = np.broadcast_to(np.eye(3), (len(b), 3, 3))
-    edges = np.cross(u[:, None], faces)
+    edges = cross(u[:, None], faces)
     length = np.linalg.norm(edges, axis=2, keepdims=True)
     edges = np.where(length > 1e-9, edges / np.maximum(length, 1e-9), faces)
     directions = np.concatenate([faces, edges], axis=1)
@@ -103,7 +104,7 @@ def _penetration(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
     # at an edge of the box, the witness point is where segment and edge cross, seen along the normal
     edge = best % 6 - 3
     crossed = edge >= 0
-    across = np.cross(normal[crossed], np.eye(3)[edge[crossed]])
+    across = cross(normal[crossed], np.eye(3)[edge[crossed]])
     start, along = b[crossed, 0], u[crossed]
     slope = _dot(along, across)
     fraction = _dot(np.sign(normal[crossed]) * half_size[crossed] - start, across) / np.where(slope == 0, 1.0, slope)
@@ -119,11 +120,11 @@ def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
     are those of the facets of the triangle swept along the segment.
     """
     corner, edge = triangles, np.roll(triangles, -1, axis=1) - triangles
-    face = np.cross(edge[:, 0], edge[:, 1])
+    face = cross(edge[:, 0], edge[:, 1])
     face = face / np.maximum(np.linalg.norm(face, axis=1), 1e-300)[:, None]
     found = [segment_segment(np.stack([corner[:, i], corner[:, i] + edge[:, i]], axis=1), b) for i in range(3)]
     heights = np.einsum("kei,ki->ke", b - corner[:, :1], face)
-    inward = np.cross(face[:, None], edge)
+    inward = cross(face[:, None], edge)
     above = [(np.einsum("kci,kci->kc", b[:, e, None] - corner, inward) >= 0).all(axis=1) for e in range(2)]
     distances = np.stack([d for d, *_ in found] + [np.where(above[e], np.abs(heights[:, e]), np.inf) for e in range(2)])
     up = [np.where(heights[:, e, None] >= 0, face, -face) for e in range(2)]
@@ -147,7 +148,7 @@ def triangle_segment(triangles: Array, b: Array) -> tuple[Array, Array, Array]:
 
 def _crossing(triangles: Array, edge: Array, face: Array, b: Array, on_edges: Array) -> tuple[Array, Array, Array]:
     """The same for segments that cross the triangle; `on_edges` (3, k, 3) are their points nearest to the edges."""
-    sideways = np.cross(edge, (b[:, 1] - b[:, 0])[:, None])
+    sideways = cross(edge, (b[:, 1] - b[:, 0])[:, None])
     length = np.linalg.norm(sideways, axis=2, keepdims=True)
     sideways = np.where(length > NONE, sideways / np.maximum(length, NONE), face[:, None])
     directions = np.concatenate([face[:, None], sideways], axis=1)
@@ -166,8 +167,8 @@ def _dot(x: Array, y: Array) -> Array:
 
 def _perpendicular(u: Array, v: Array) -> Array:
     """Unit vectors (k, 3) perpendicular to u and v (k, 3); if these are parallel, any vector perpendicular to u."""
-    across = np.cross(u, v)
+    across = cross(u, v)
     flat = _dot(across, across) < NONE
-    across[flat] = np.cross(u[flat], np.eye(3)[np.argmin(np.abs(u[flat]), axis=1)])
+    across[flat] = cross(u[flat], np.eye(3)[np.argmin(np.abs(u[flat]), axis=1)])
     across[_dot(across, across) < NONE] = np.array([0.0, 0.0, 1.0])
     return np.asarray(across / np.linalg.norm(across, axis=1, keepdims=True))

@@ -20,3 +20,11 @@ def into(T: Array, points: Array) -> Array:
     """Points (..., 3) [m] in the frames of poses T (..., 4, 4)."""
     x, y, z = (points[..., i, None] - T[..., i, 3, None] for i in range(3))
     return np.asarray(T[..., 0, :3] * x + T[..., 1, :3] * y + T[..., 2, :3] * z)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Products a × b (..., 3)."""
+    result = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        result[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return result

@@ -14,6 +14,7 @@ import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Mask, Robot
 from optimizer.collision.bodies import Body, Indices, bodies_of
+from optimizer.collision.many_points import cross
 from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.problem.arm import Arm
@@ -92,15 +93,7 @@ class CollisionModel:
         the distances of the balls.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
-        distance = self.geometry.ball_distances(frames, pairs) if known is None else known
-        configuration, column = np.nonzero(distance <= within)
-        if np.isfinite(within):
-            # the ball around a shelf encloses half of the cell: a second bound leaves out most of these pairs
-            near = configuration, column
-            bound = self.geometry.bead_distances(frames, configuration, pairs[column])
-            distance[near] = np.maximum(distance[near], bound)
-            chosen = bound <= within
-            configuration, column = configuration[chosen], column[chosen]
+        distance, configuration, column = self._bounds(frames, pairs, within, known)
         nearest = self.geometry.witness_points(frames, configuration, pairs[column], within)
         if self.geometry.is_cloud.any() and np.isfinite(within):
             # no part of these patches is within the limit, which is then the better lower bound
@@ -110,6 +103,37 @@ class CollisionModel:
             configuration, column, nearest = configuration[~beyond], column[~beyond], nearest[~beyond]
         distance[configuration, column] = nearest.distance
         return PairDistances(distance, configuration, column, nearest)
+
+    def _bounds(
+        self, frames: Array, pairs: Indices, within: float, known: Array | None = None
+    ) -> tuple[Array, Indices, Indices]:
+        """Lower bounds (n, p) [m] on the distances of `pairs` (p,), and where (k,) they are at most `within`: rows and
+        columns."""
+        distance = self.geometry.ball_distances(frames, pairs) if known is None else known
+        configuration, column = np.nonzero(distance <= within)
+        if np.isfinite(within):
+            # the ball around a shelf encloses half of the cell: a second bound leaves out most of these pairs
+            near = configuration, column
+            bound = self.geometry.bead_distances(frames, configuration, pairs[column])
+            distance[near] = np.maximum(distance[near], bound)
+            chosen = bound <= within
+            configuration, column = configuration[chosen], column[chosen]
+        return distance, configuration, column
+
+    def pairs_within(self, frames: Array, within: float) -> Mask:
+        """Which pairs (p,) are less than `within` [m] apart at any of n configurations.
+
+        Most are so where their lower bounds are least: few distances are needed.
+        """
+        every = np.arange(len(self.pairs))
+        bound = self._bounds(frames, every, within)[0]
+        least = bound.argmin(axis=0)
+        found = np.zeros(len(every), dtype=bool)
+        (near,) = np.nonzero((bound[least, every] < within) & ~self.geometry.is_cloud)
+        found[near] = self.geometry.witness_points(frames, least[near], near).distance < within
+        (rest,) = np.nonzero((bound[least, every] < within) & ~found)
+        found[rest] = (self.pair_distances(frames, rest, within, bound[:, rest]).distance < within).any(axis=0)
+        return found
 
     def chosen_distances(self, frames: Array, pairs: Indices, wanted: Mask) -> PairDistances:
         """Exact signed distances of those of `pairs` (p,) that are `wanted` (n, p); the others are zero."""
@@ -155,9 +179,9 @@ class CollisionModel:
         By the envelope theorem, the motion of the witness points over the bodies does not contribute.
         """
         axes, origins = frames[:, 1:, :3, 2], frames[:, 1:, :3, 3]
-        moment = np.cross(found.point, found.normal)
+        moment = cross(found.point, found.normal)
         gradient = np.einsum("kji,ki->kj", axes[configuration], moment)
-        gradient -= np.einsum("kji,ki->kj", np.cross(axes, origins)[configuration], found.normal)
+        gradient -= np.einsum("kji,ki->kj", cross(axes, origins)[configuration], found.normal)
         return np.asarray(gradient * self.joints_between[pair])
 
     @cached_property

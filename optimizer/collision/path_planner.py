@@ -28,7 +28,7 @@ from optimizer.trajectories import quintic
 RESERVES = (5e-3, 5e-4, 0.0)
 # distance [rad] between the checked states of an edge, in weighted joints. A region where it was too long to see that a
 # path collides has half of it from then on
-STEP = 0.06
+STEP = 0.1
 # checked states of a planning, of all its searches
 MOST_STATES = 200_000
 # checked states for further paths, once one is found
@@ -55,19 +55,25 @@ _OMPL = threading.Lock()
 class Region:
     """Where a search samples: `margin` [rad] beyond the range between start and goals, within the joint limits.
 
-    It begins after `after` states of all searches, and checks `states` whenever it is its turn. `narrow`: with half of
+    It takes its turns, of `states` each, between `after` and `before` states of all searches. `narrow`: with half of
     the STEP and a reserve for narrow gaps.
     """
 
     margin: float
     states: int
-    after: int = 0
+    after: float = 0
+    before: float = np.inf
     narrow: bool = False
 
 
-# Narrow bounds give short paths, wide ones find a way out of a cage; no margin lets a path turn a joint by a needless
-# full turn. The last searches are for gaps that the reserve or the step closes
-REGIONS = (Region(0.7, 400), Region(2.2, 1_600), Region(2.2, 800, 20_000, narrow=True), Region(3.5, 800, 20_000))
+# Narrow bounds give short paths, if any, wide ones find a way out of a cage; no margin lets a path turn a joint by a
+# needless full turn. The last searches are for gaps that the reserve or the step closes
+REGIONS = (
+    Region(0.7, 400, before=4_000),
+    Region(2.2, 1_600),
+    Region(2.2, 800, 20_000, narrow=True),
+    Region(3.5, 800, 20_000),
+)
 
 
 class PlanningEnd(Enum):
@@ -177,7 +183,7 @@ class _Planning:
             for region in REGIONS:
                 if len(paths) == most or self._deadline.passed or self.checked_states >= most_states:
                     return paths
-                if self.checked_states < region.after:
+                if not region.after <= self.checked_states < region.before:
                     continue
                 path = self._slice(region, most_states - self.checked_states)
                 if path is None or any(_is_same(path, other) for other in paths):

@@ -46,6 +46,9 @@ CHECKING = 0.15
 # among obstacles, a solve ends early if it comes to no less than this multiple of the best energy known: an SQP that
 # still changes sides seldom gets this far below what it promises
 NOT_MUCH_BETTER = 1.05
+# a planned path is not optimised if the motion along it needs more than this multiple of the best energy known: that
+# seldom falls by so much
+FAR_COSTLIER = 2.5
 # penetration [m] of the motion without clearance constraints beyond which, once a motion is known, they are added to a
 # planned path alone: what is that deep inside an obstacle seldom gets out of it
 DEEP = 0.09
@@ -125,6 +128,10 @@ class SqpMethod(Method):
 
     def _improved(self, guess: Guess, deadline: Deadline) -> SolveResult:
         stage = self._first_stage(guess)
+        if guess.rough and len(stage.pairs) and np.isfinite(self._must_be_below(stage)):
+            cost, _ = stage.program.value(stage.free, stage.duration)
+            if cost > FAR_COSTLIER * self.best_known:
+                return SolveResult(SolveStatus.PRUNED, COSTLIER)
         iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):
             # while no motion is known, one that is not yet optimal is better than none

@@ -29,9 +29,7 @@ from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraint_list
 from optimizer.methods import planned_paths
 from optimizer.methods.free_spline import FreeSpline
-from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
-from optimizer.methods.sqp_method import NOT_MUCH_BETTER
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
@@ -266,54 +264,6 @@ def test_a_request_among_obstacles_has_the_same_answer_whatever_time_it_takes() 
     asked = problem(*task("cage"))
     calm, busy = optimize(asked, clock=still), optimize(asked, clock=CountingClock(tick=1e-4))
     np.testing.assert_array_equal(calm.trajectory.spline.control_points, busy.trajectory.spline.control_points)
-
-
-def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
-    """The first bars are passed once: what comes after is the same, a full turn of a wrist away."""
-    arm, q_start, q_goal = task("cage")
-    (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    turned = q_goal - 2 * np.pi * np.sign(q_goal) * np.eye(6)[3]
-    alone = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), 1)
-    beside = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), like=path)
-    (found,) = beside.paths
-    np.testing.assert_array_equal(found[[0, -1]], [q_start, turned])
-    assert least(arm, between(found)) > 0
-    assert beside.checked_states < alone.checked_states
-
-
-def test_a_solve_among_obstacles_ends_once_it_cannot_come_near_the_best_motion() -> None:
-    arm, q_start, q_goal = task("post")
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
-    (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
-    path, t = along(path, 1.0, arm.active_limits.v_max)
-    alone = solver.along_path(path, t)
-    energy = solver.prepared.cost_of(alone.spline)
-    solver.best_known = energy / NOT_MUCH_BETTER * 1.01
-    np.testing.assert_array_equal(solver.along_path(path, t).spline.control_points, alone.spline.control_points)  # type: ignore[union-attr]
-    solver.best_known = energy / 2
-    assert solver.along_path(path, t).iterations < alone.iterations
-
-
-@pytest.mark.parametrize(
-    ("best_known", "was_postponed", "others", "thorough"),
-    [(np.inf, False, 1, False), (np.inf, True, 1, True), (np.inf, False, 0, True), (1e3, True, 1, False)],
-)
-def test_many_states_are_checked_only_where_few_were_in_vain(
-    best_known: float, was_postponed: bool, others: int, thorough: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Walled in, the planning uses all states that it may; so long as others are open, the candidate is postponed."""
-    monkeypatch.setattr(planned_paths, "FEW_STATES", 100)
-    monkeypatch.setattr(planned_paths, "MOST_STATES", 1_000)
-    arm, q_start, q_goal = walled_in()
-    solver = FreeSpline(PreparedProblem.of(problem(arm, q_start, q_goal)), q_start, q_goal, NEVER)
-    solver.best_known, solver.was_postponed = best_known, was_postponed
-    solver.other_goals = lambda: [q_goal] * others
-    found = planned_paths.plan(solver)
-    assert found.end is PlanningEnd.EXHAUSTED
-    assert (found.checked_states >= 1_000) == thorough
-    failed = planned_paths.without_path(solver, SolveResult(SolveStatus.FAILED, "it collides"), found)
-    few = np.isinf(best_known) and not thorough
-    assert failed.status is (SolveStatus.POSTPONED if few else SolveStatus.FAILED)
 
 
 def test_a_failed_candidate_says_whether_the_deadline_ended_the_planning(monkeypatch: pytest.MonkeyPatch) -> None:
