@@ -17,7 +17,7 @@ from optimizer.collision.path_planner import SAMPLES
 from optimizer.energy.plant import has_corners
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.planned_paths import FROM_PLANNED_PATH
-from optimizer.methods.sqp_method import Guess, SqpMethod, with_effort
+from optimizer.methods.sqp_method import Guess, SqpMethod, above, with_effort
 from optimizer.nlp.sqp import PROGRESS
 from optimizer.problem.problem import LEAST_DURATION
 from optimizer.solution import BaselineName
@@ -82,7 +82,11 @@ class FreeSpline(SqpMethod):
         """The motion of least energy from planned paths, solved to the end; `failed` if there is none."""
         known = self.best_known
         best = super().from_planned_paths(failed)
-        if best.spline is None or self.may_refine(best.spline) or self.prepared.cost_of(best.spline) > POLISHED * known:
+        if (
+            best.spline is None
+            or self.may_refine(best.spline)
+            or self.prepared.cost_of(best.spline) > above(known, POLISHED)
+        ):
             return best
         polished = self._polished(best.spline)
         if polished.spline is None or self.prepared.cost_of(polished.spline) >= self.prepared.cost_of(best.spline):

@@ -128,10 +128,8 @@ class SqpMethod(Method):
 
     def _improved(self, guess: Guess, deadline: Deadline) -> SolveResult:
         stage = self._first_stage(guess)
-        if guess.rough and len(stage.pairs) and np.isfinite(self._must_be_below(stage)):
-            cost, _ = stage.program.value(stage.free, stage.duration)
-            if cost > FAR_COSTLIER * self.best_known:
-                return SolveResult(SolveStatus.PRUNED, COSTLIER)
+        if self._is_far_costlier(guess, stage):
+            return SolveResult(SolveStatus.PRUNED, COSTLIER)
         iterations, collision = 0, None
         for solves in range(1, REPAIRS + 1):
             # while no motion is known, one that is not yet optimal is better than none
@@ -172,7 +170,16 @@ class SqpMethod(Method):
         smoothed = has_corners(self.prepared.problem.objective, self.prepared.arm)
         if len(self.passes) or smoothed or self.interval.minimum_time:
             return np.inf
-        return self.best_known * NOT_MUCH_BETTER if len(stage.pairs) else self.best_known
+        return above(self.best_known, NOT_MUCH_BETTER) if len(stage.pairs) else self.best_known
+
+    def _is_far_costlier(self, guess: Guess, stage: _Stage) -> bool:
+        """Whether a planned path needs so much more energy than the best motion that solving from it is in vain."""
+        # where energy comes back, a net energy may fall to any fraction of itself
+        returned = self.prepared.arm.bus.mode in ("recuperating", "storage")
+        if returned or not (guess.rough and len(stage.pairs)) or np.isinf(self._must_be_below(stage)):
+            return False
+        cost, _ = stage.program.value(stage.free, stage.duration)
+        return cost > above(self.best_known, FAR_COSTLIER)
 
     def from_planned_paths(self, failed: SolveResult) -> SolveResult:
         """The motion of least energy from planned paths as initial guesses; `failed` if there is none.
@@ -291,6 +298,11 @@ class SqpMethod(Method):
         # the SQP takes no step for positions alone: it bounds them
         free = np.clip(result.free, program.limits.q_min, program.limits.q_max)
         return _Stage(program, limits, nearby, free, result.duration, result.multiplier)
+
+
+def above(energy: float, multiple: float) -> float:
+    """A multiple ≥ 1 of an energy [J]; of a negative one, as much more than it as its absolute value would become."""
+    return energy if np.isinf(energy) else energy + (multiple - 1) * abs(energy)
 
 
 def with_effort(result: SolveResult, tried: list[SolveResult]) -> SolveResult:
