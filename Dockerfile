@@ -33,7 +33,7 @@ ENV JOULEPATH_CACHE_DIR=/opt/joulepath/kernels MPLCONFIGDIR=/opt/matplotlib
 COPY scripts/import_all.py /tmp/
 RUN mkdir /opt/matplotlib \
     && python /tmp/import_all.py \
-    && python -m optimizer.energy.precompile
+    && python -m optimizer.energy.precompile --portable
 
 FROM ${BASE_IMAGE}
 RUN apt-get update \

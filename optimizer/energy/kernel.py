@@ -18,7 +18,7 @@ import numpy as np
 
 from models.robot import MOST_ROBOTS, Array, Robot
 from optimizer.deadline import checkpoint
-from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_path, log, mark_used, seal_path
+from optimizer.energy.kernel_cache import compile_kernel, compiler, is_intact, library_paths, log, mark_used, seal_path
 from optimizer.energy.kernel_expressions import build
 from optimizer.energy.kernel_functions import Compiled, Evaluation, Functions, Interpreted
 
@@ -108,7 +108,7 @@ class _Loader:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self.library_path = library_path(robot)
+        self.paths = library_paths(robot)
         self._lock = threading.Lock()
         self._compiled: Kernel | None = None
         self._interpreted: Kernel | None = None
@@ -123,11 +123,12 @@ class _Loader:
             return self._compiled or self._load()
 
     def _load(self) -> Kernel:
-        if self._interpreted is not None and not seal_path(self.library_path).exists():
+        if self._interpreted is not None and not any(seal_path(path).exists() for path in self.paths):
             return self._interpreted
-        if is_intact(self.library_path):
-            mark_used(self.library_path)
-            self._compiled = Kernel(self._robot, Compiled(self.library_path, self._robot.nq))
+        found = next(filter(is_intact, self.paths), None)
+        if found is not None:
+            mark_used(found)
+            self._compiled = Kernel(self._robot, Compiled(found, self._robot.nq))
             return self._compiled
         if self._interpreted is None:
             self._interpreted = Kernel(self._robot, Interpreted(build(self._robot)))

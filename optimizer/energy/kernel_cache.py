@@ -24,7 +24,7 @@ import models.robot
 from models.robot import Robot
 from optimizer.energy import inverse_dynamics, kernel_expressions, kernel_source, losses
 from optimizer.energy.kernel_expressions import SYMBOLICS, build
-from optimizer.energy.kernel_source import lanes, source
+from optimizer.energy.kernel_source import PORTABLE, Vectors, source, vectors
 
 log = logging.getLogger(__name__)
 
@@ -43,12 +43,12 @@ def cache_directory() -> Path:
     return Path(given) if given else Path.home() / ".cache" / "joulepath"
 
 
-def digest(robot: Robot) -> str:
+def digest(robot: Robot, using: Vectors) -> str:
     """Hash of everything that the compiled functions depend on: the chain, the sources, versions, compiler flags."""
     h = hashlib.sha256()
     for path in (*(str(module.__file__) for module in SOURCES), __file__):
         h.update(Path(path).read_bytes())
-    h.update(repr((version("casadi"), COMPILER_FLAGS, lanes(), os.uname().machine)).encode())
+    h.update(repr((version("casadi"), COMPILER_FLAGS, using, os.uname().machine)).encode())
     h.update(repr(robot.has_load_friction).encode())
     flange = robot.model.frames[robot.model.getFrameId("flange")].placement
     constants = [placement.homogeneous for placement in [*robot.model.jointPlacements, flange]]
@@ -59,9 +59,14 @@ def digest(robot: Robot) -> str:
     return h.hexdigest()[:24]
 
 
-def library_path(robot: Robot) -> Path:
+def library_path(robot: Robot, using: Vectors) -> Path:
     """Path of a robot's compiled kernel."""
-    return cache_directory() / f"{robot.name}-{digest(robot)}.so"
+    return cache_directory() / f"{robot.name}-{digest(robot, using)}.so"
+
+
+def library_paths(robot: Robot) -> list[Path]:
+    """Paths of the compiled kernels that this machine can use, the fastest first."""
+    return list(dict.fromkeys(library_path(robot, using) for using in (vectors(), PORTABLE)))
 
 
 def seal_path(path: Path) -> Path:
@@ -82,12 +87,14 @@ def compiler() -> str | None:
     return shutil.which(os.environ.get("CC", "cc")) or shutil.which("gcc") or shutil.which("clang")
 
 
-def compile_kernel(robot: Robot) -> Path:
+def compile_kernel(robot: Robot, portable: bool = False) -> Path:
     """Compile a robot's functions, once however many threads and processes ask. Returns the path of the library.
 
+    It is for this machine's processor, or, if `portable`, for every one of its kind, which takes twice as long to run.
     Raises RuntimeError if there is no compiler or it fails, OSError if the cache cannot be written.
     """
-    target = library_path(robot)
+    count, flags = using = PORTABLE if portable else vectors()
+    target = library_path(robot, using)
     target.parent.mkdir(parents=True, exist_ok=True)
     with (target.with_suffix(".lock")).open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
@@ -98,7 +105,6 @@ def compile_kernel(robot: Robot) -> Path:
             raise RuntimeError("no C compiler found")
         with workplace(target) as folder:
             library, seal = folder / "kernel.so", folder / "kernel.sha256"
-            count, flags = lanes()
             code = folder / "kernel.c"
             code.write_text(_source(robot, count))
             run = subprocess.run(

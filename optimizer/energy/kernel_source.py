@@ -10,8 +10,10 @@ from pathlib import Path
 
 import casadi as ca
 
-# of every processor of this kind, and of one with AVX2: numbers per vector, and what the compiler must be told
-BASELINE, AVX2 = (2, ()), (4, ("-mavx2",))
+# numbers per vector, and what the compiler must be told: for every processor of this kind, and for one with AVX2
+Vectors = tuple[int, tuple[str, ...]]
+PORTABLE: Vectors = (2, ())
+AVX2: Vectors = (4, ("-mavx2",))
 _CPU = Path("/proc/cpuinfo")
 
 _CALLS = {ca.OP_SQRT: "sqrt", ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_ASINH: "asinh", ca.OP_FABS: "fabs"}
@@ -43,12 +45,12 @@ static inline void give(const lanes *y, long size, long first, long count, doubl
 """
 
 
-def lanes() -> tuple[int, tuple[str, ...]]:
-    """Numbers per vector of this machine's processor, and the compiler's flags for it."""
+def vectors() -> Vectors:
+    """The longest vectors of this machine's processor."""
     try:
-        return AVX2 if " avx2 " in _CPU.read_text().replace("\n", " ") else BASELINE
+        return AVX2 if " avx2 " in _CPU.read_text().replace("\n", " ") else PORTABLE
     except OSError:
-        return BASELINE
+        return PORTABLE
 
 
 def source(functions: list[ca.Function], count: int) -> str:

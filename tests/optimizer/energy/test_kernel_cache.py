@@ -24,9 +24,9 @@ from models.registry import robot_names
 from models.robot import Robot
 from optimizer.energy import kernel, kernel_cache
 from optimizer.energy.kernel import Kernel, kernel_for
-from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest
+from optimizer.energy.kernel_cache import SOURCES, cache_directory, compile_kernel, compiler, digest, library_path
 from optimizer.energy.kernel_expressions import build
-from optimizer.energy.kernel_source import source
+from optimizer.energy.kernel_source import AVX2, PORTABLE, source
 from optimizer.optimize import optimize
 from tests.optimizer.energy.kernel_states import LOSSY, TASK, TORQUE, states
 from tests.optimizer.moves import GOAL, ROBOT, START, problem, torques
@@ -45,13 +45,14 @@ def whole() -> Path:
 def test_the_digest_tells_chains_apart() -> None:
     """What is compiled in changes it; what a request passes as a parameter does not."""
     same = replace(ROBOT, drives=LOSSY, electronics=replace(ROBOT.electronics, idle_power=1.0), title="another")
-    assert digest(same) == digest(ROBOT)
+    assert digest(same, PORTABLE) == digest(ROBOT, PORTABLE)
     heavier, longer, turned = ROBOT.model.copy(), ROBOT.model.copy(), ROBOT.model.copy()
     heavier.inertias[3] = pin.Inertia(1.01 * heavier.inertias[3].mass, heavier.inertias[3].lever, np.eye(3))
     longer.jointPlacements[2].translation = longer.jointPlacements[2].translation + np.array([1e-4, 0, 0])
     turned.frames[turned.getFrameId("flange")].placement = pin.SE3.Random()
-    digests = {digest(replace(ROBOT, model=model)) for model in (ROBOT.model, heavier, longer, turned)}
-    assert len(digests) == 4
+    models = (ROBOT.model, heavier, longer, turned)
+    digests = {digest(replace(ROBOT, model=model), using) for model in models for using in (PORTABLE, AVX2)}
+    assert len(digests) == 8
 
 
 def test_the_digest_covers_every_source_that_runs_while_the_c_is_written() -> None:
@@ -124,6 +125,18 @@ def assert_right(found: Kernel) -> None:
     y = states(6)
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
     assert np.abs(found.torque(q, v, a, TASK.parameters()) - torques(TASK.problem, q, v, a)).max() < TORQUE
+
+
+def test_a_portable_kernel_is_used_where_there_is_no_other(
+    workshop: Workshop, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made = compile_kernel(workshop.robot, portable=True)
+    assert compile_kernel(workshop.robot, portable=True) == made == library_path(workshop.robot, PORTABLE)
+    assert workshop.compilations == 1
+    no_compiler(monkeypatch, tmp_path)
+    found = kernel_for(workshop.robot)
+    assert found.compiled
+    assert_right(found)
 
 
 def test_the_virtual_machine_serves_while_the_compiler_runs(workshop: Workshop) -> None:
@@ -208,7 +221,7 @@ def test_several_processes_make_one_library_of_each_robot(workshop: Workshop, na
 
 @pytest.mark.long
 def test_what_a_killed_process_left_is_deleted(workshop: Workshop) -> None:
-    target = kernel_cache.library_path(workshop.robot)
+    target = library_path(workshop.robot, PORTABLE)
     target.parent.mkdir()
     with kernel_cache.workplace(target) as folder:
         (folder / "kernel.c").write_text("half")
