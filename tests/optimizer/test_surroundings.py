@@ -9,6 +9,7 @@ import pytest
 
 from models.robot import Array
 from optimizer.collision.clearance_proof import GAP, proven_clearance
+from optimizer.collision.model import CollisionModel
 from optimizer.collision.path_planner import PlanningEnd
 from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
@@ -16,7 +17,7 @@ from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
 from optimizer.surroundings import ACTIVE, CLEAR, Surroundings
 from optimizer.trajectories.spline import sample
 from optimizer.trajectories.time_scalings import quintic_spline
-from tests.optimizer.cells import at
+from tests.optimizer.cells import LOADS, arm_in_cell, at, cell
 from tests.optimizer.moves import ROBOT
 
 START = np.array([-0.8, -1.4, 1.6, -1.7, -1.57, 0.0])
@@ -85,6 +86,16 @@ def test_active_pairs_are_those_that_come_near() -> None:
     assert set(np.flatnonzero(least < ACTIVE - 0.02)) <= set(active.tolist()) <= set(np.flatnonzero(least < ACTIVE))
     constraints = surroundings.with_clearance(active)
     assert len(constraints.names) == len(active)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pairs_within_a_distance_are_those_that_come_so_near_anywhere(seed: int) -> None:
+    model = CollisionModel(arm_in_cell(LOADS[seed], cell(seed)))
+    rng, within = np.random.default_rng(seed), 0.1
+    q = START + rng.uniform(-1.5, 1.5, (20, len(START)))
+    expected = (model.signed_distances(q)[0] < within).any(axis=0)
+    assert 0 < expected.sum() < len(expected)
+    np.testing.assert_array_equal(model.pairs_within(model.frames(q), within), expected)
 
 
 def behind_a_wall() -> Surroundings:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,8 +12,9 @@ from optimizer.deadline import NEVER, Deadline
 from optimizer.methods import planned_paths
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import NOT_MUCH_BETTER
+from optimizer.methods.sqp_method import NOT_MUCH_BETTER, above
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.bus import Bus, BusMode
 from tests.optimizer.collision.test_path_planner import AMPLE, between, least, problem, task, walled_in
 
 
@@ -64,3 +67,18 @@ def test_many_states_are_checked_only_where_few_were_in_vain(
     failed = planned_paths.without_path(solver, SolveResult(SolveStatus.FAILED, "it collides"), found)
     few = np.isinf(best_known) and not thorough
     assert failed.status is (SolveStatus.POSTPONED if few else SolveStatus.FAILED)
+
+
+def test_a_multiple_of_an_energy_is_above_it_whatever_its_sign() -> None:
+    assert (above(10.0, 1.5), above(-10.0, 1.5), above(0.0, 1.5), above(np.inf, 1.5)) == (15.0, -5.0, 0.0, np.inf)
+
+
+@pytest.mark.parametrize(("mode", "skipped"), [("shared", True), ("recuperating", False)])
+def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(mode: BusMode, skipped: bool) -> None:
+    arm, q_start, q_goal = task("post")
+    asked = problem(arm, q_start, q_goal)
+    prepared = PreparedProblem.of(replace(asked, arm=replace(asked.arm, bus=Bus(mode))))
+    solver = FreeSpline(prepared, q_start, q_goal, NEVER)
+    (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
+    solver.best_known = 0.1
+    assert (solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0) == skipped
