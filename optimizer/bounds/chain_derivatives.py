@@ -10,7 +10,8 @@ joint, whose axis stands still.
 M_jk = Σ_i (m_i J_ij · J_ik + z_j · I_i z_k) with J_ij = z_j × (c_i - o_j). By the same rule a derivative of J_ij is
 no longer than ρ_i of the last of its joints, with ρ_i(k) ≥ |c_i - o_k|. In z_j · I_i z_k the rotation of a joint
 occurs at most twice, and its derivatives of any order have norm 1: n derivatives are at most 2^n times the greatest
-principal moment. M_jk does not change with the joints up to the first of j, k: they turn all that it depends on.
+principal moment. M_jk does not change with the joints up to the first of j, k: they turn all that it depends on. The
+bounds of `inertia_spectrum` are mostly lower.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from itertools import product
 import numpy as np
 
 from models.robot import Array
+from optimizer.bounds.inertia_spectrum import InertiaSpectrum
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.vectors import cross
@@ -100,7 +102,11 @@ class ChainDerivatives:
                 products += self._reach[i][first] * self._reach[i][second]
             own = self.mass[i] * products + 2.0**order * principal[i]
             bound += np.where(changes & (last <= i), own, 0.0)
-        return bound
+        return bound if self._spectrum is None else np.minimum(bound, self._spectrum.bound(order))
+
+    @cached_property
+    def _spectrum(self) -> InertiaSpectrum | None:
+        return InertiaSpectrum.of(self.joint_inertia, self.nq)
 
     def gravity_torque(self, q: Array) -> tuple[Array, Array]:
         """∂U/∂q_j (n, nq) [N·m] and ∂²U/∂q_j∂q_k (n, nq, nq) [N·m] at q (n, nq) [rad]."""
