@@ -16,11 +16,13 @@ bounds of `inertia_spectrum` are mostly lower.
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import numpy as np
+from cachetools import LRUCache, cached
 
 from models.robot import Array
 from optimizer.bounds.inertia_spectrum import InertiaSpectrum
@@ -28,6 +30,9 @@ from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.kinematics.rigid_body_model import rigid_body_model
 from optimizer.kinematics.vectors import cross
 from optimizer.problem.arm import Arm
+
+# chains whose inertia's terms are kept
+_MOST_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -106,7 +111,7 @@ class ChainDerivatives:
 
     @cached_property
     def _spectrum(self) -> InertiaSpectrum | None:
-        return InertiaSpectrum.of(self.joint_inertia, self.nq)
+        return _spectrum_of(self)
 
     def gravity_torque(self, q: Array) -> tuple[Array, Array]:
         """∂U/∂q_j (n, nq) [N·m] and ∂²U/∂q_j∂q_k (n, nq, nq) [N·m] at q (n, nq) [rad]."""
@@ -136,6 +141,17 @@ class ChainDerivatives:
         rotations = frames[..., :3, :3]
         centres = frames[..., :3, 3] + (rotations @ self.lever[:, :, None])[..., 0]
         return np.ascontiguousarray(rotations[..., 2]), np.ascontiguousarray(frames[..., :3, 3]), rotations, centres
+
+
+def _digest(chain: ChainDerivatives) -> bytes:
+    """What the inertia depends on."""
+    return b"".join(each.tobytes() for each in (chain.placements, chain.mass, chain.lever, chain.inertia))
+
+
+@cached(LRUCache(_MOST_KEPT), key=_digest, lock=threading.Lock())
+def _spectrum_of(chain: ChainDerivatives) -> InertiaSpectrum | None:
+    """The terms of the inertia, kept for the chains last seen: they take as long as a request."""
+    return InertiaSpectrum.of(chain.joint_inertia, chain.nq)
 
 
 def _from_outside(each: Array) -> Array:

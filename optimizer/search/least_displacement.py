@@ -19,11 +19,10 @@ def least_displacement(
     A box counts with every full turn of a joint that brings a part of it within the limits. Starts that are `given`
     stand as they are.
     """
-    q_min, q_max = limits.q_min - ROUNDING, limits.q_max + ROUNDING
-    starts = [(start, np.ones(start.shape, dtype=bool))] if given else _turned(start, start_half, q_min, q_max)
+    starts = [(start, np.ones(start.shape, dtype=bool))] if given else turned(start, start_half, limits)
     least = np.full(np.broadcast_shapes(start.shape, goal.shape), np.inf)
     half = start_half + goal_half
-    for to, reached in _turned(goal, goal_half, q_min, q_max):
+    for to, reached in turned(goal, goal_half, limits):
         for source, left in starts:
             away = np.maximum(np.abs(to - source) - half, 0.0)
             least = np.where(reached & left, np.minimum(least, away), least)
@@ -31,8 +30,9 @@ def least_displacement(
     return np.where(np.isfinite(least), least, 0.0), np.asarray(possible)
 
 
-def _turned(q: Array, half: Array, q_min: Array, q_max: Array) -> list[tuple[Array, Mask]]:
+def turned(q: Array, half: Array, limits: Limits) -> list[tuple[Array, Mask]]:
     """Boxes (n, nq) with every full turn that may bring some of them within limits, and which parts (n, nq) it does."""
+    q_min, q_max = limits.q_min - ROUNDING, limits.q_max + ROUNDING
     least = np.ceil((q_min - half - q) / (2 * np.pi))
     most = np.floor((q_max + half - q) / (2 * np.pi))
     turns = range(int(least.min(initial=0.0)), int(most.max(initial=0.0)) + 1)

@@ -93,7 +93,7 @@ def travel_bounds(
     distance = np.abs(displacement)
     t_min = np.maximum((distance / prepared.arm.active_limits.v_max).max(axis=-1), SHORTEST_PART)
     cruise = EvenTravel(distance, prepared.arm)
-    net = _NetEnergy.of(prepared.arm, cruise, potential_gain, np.full_like(t_min, -price), most=0.0)
+    net = NetEnergy.of(prepared.arm, cruise, potential_gain, np.full_like(t_min, -price), most=0.0)
     bound = net.least(t_min, np.full_like(t_min, longest))
     return np.where(t_min > longest, np.inf, bound)
 
@@ -173,23 +173,20 @@ def electrical(
     This is the value of a linear program whose right-hand side is linear in T, so it is convex in T, with slope
     g(c) - c g'(c). So is it of (1 + 2 η) g(v) - η² v² / c in the place of g, as long as that is convex up to the
     greatest speed: η is no greater. For each T the bound is a parabola in η, and its greatest value is known. The
-    greatest of convex functions is convex: `_NetEnergy.least` finds the least over [t_min, t_max].
+    greatest of convex functions is convex: `NetEnergy.least` finds the least over [t_min, t_max].
     """
-    cruise = Cruise(np.abs(displacement), prepared.arm)
-    return _NetEnergy.of(prepared.arm, cruise, potential_gain, waiting, _most_copper(prepared.arm)).least(t_min, t_max)
+    return NetEnergy.for_motions(prepared.arm, displacement, potential_gain, waiting).least(t_min, t_max)
 
 
 def copper_multiplier(prepared: PreparedProblem, displacement: Array, potential_gain: float, duration: float) -> float:
     """The η of `electrical` with which the bound on motions of one displacement (nq,) [rad] and duration [s] is
     greatest."""
-    arm, gain = prepared.arm, np.array([potential_gain])
-    cruise = Cruise(np.abs(displacement)[None], arm)
-    net = _NetEnergy.of(arm, cruise, gain, np.zeros(1), _most_copper(arm))
+    net = NetEnergy.for_motions(prepared.arm, displacement[None], np.array([potential_gain]))
     return float(net.multiplier(np.array([duration]))[0])
 
 
 @dataclass(frozen=True)
-class _NetEnergy:
+class NetEnergy:
     """The bound of `electrical` over the duration T, with the least losses of `cruise`, for P pairs: `power` (P,) [W]
     that is drawn at all times, and `work` (P,) [J], the gain with the Coulomb loss, less `deficit` [W] times T; η up to
     `most`."""
@@ -201,14 +198,21 @@ class _NetEnergy:
     most: float
 
     @staticmethod
-    def of(arm: Arm, cruise: Cruise, potential_gain: Array, waiting: Array, most: float) -> _NetEnergy:
+    def of(arm: Arm, cruise: Cruise, potential_gain: Array, waiting: Array, most: float) -> NetEnergy:
         """The bound of an arm; `potential_gain` and `waiting` (P,) as of `electrical`."""
         law = arm.friction_law
         power = arm.base_power + float(arm.drives.inverter_constant.sum()) - waiting
         deficit = _KNEE_DEFICIT * law.knee * float(law.coulomb.sum())
-        return _NetEnergy(cruise, power, potential_gain + cruise.distance @ law.coulomb, deficit, most)
+        return NetEnergy(cruise, power, potential_gain + cruise.distance @ law.coulomb, deficit, most)
 
-    def __getitem__(self, k: NDArray[np.intp]) -> _NetEnergy:
+    @staticmethod
+    def for_motions(arm: Arm, displacement: Array, gain: Array, waiting: Array | float = 0.0) -> NetEnergy:
+        """The bound of `electrical` for displacements (P, nq) [rad] and gains of potential energy (P,) [J]."""
+        return NetEnergy.of(
+            arm, Cruise(np.abs(displacement), arm), gain, waiting + np.zeros(len(gain)), _most_copper(arm)
+        )
+
+    def __getitem__(self, k: NDArray[np.intp]) -> NetEnergy:
         return replace(self, cruise=self.cruise[k], power=self.power[k], work=self.work[k])
 
     def at(self, T: Array) -> tuple[Array, Array]:

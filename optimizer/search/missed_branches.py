@@ -30,23 +30,29 @@ def all_known(problem: Problem) -> bool:
     return (kinematics is None or kinematics.complete) or not (_poses(problem.start) + _poses(problem.goal))
 
 
-def bound_of_others(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
+def bound_of_others(
+    prepared: PreparedProblem,
+    candidates: Sequence[Candidate],
+    deadline: Deadline = NEVER,
+    enough: float = np.inf,
+) -> float:
     """Lower bound [J] on the motions between poses in configurations that are none of the candidates; inf if there are
     none.
 
     If all branches are known, the others are on self-motions. Else they may be anywhere. Of an arm that is nearly of a
     form whose curves are known, they are on `covering_sheets`. From given joint positions of any other arm the bound is
     that of the motions to the goal poses with any rotation about their z axes, by boxes of joint positions that need no
-    inverse kinematics. From poses it is that of the motions between any two configurations.
+    inverse kinematics. From poses it is that of the motions between any two configurations. `enough` [J]: see
+    `self_motion_bound`.
     """
     problem = prepared.problem
     if all_known(problem):
-        return self_motion_bound(prepared, candidates, deadline)
+        return self_motion_bound(prepared, candidates, deadline, enough)
     between_poses = bool(_poses(problem.start))
     if not (between_poses and any(isinstance(each, ConeOrientedPose) for each in members(problem.goal))):
         starts, goals = _covered(prepared, candidates, "start"), _covered(prepared, candidates, "goal")
         if starts is not None and goals is not None:
-            return bound_between(prepared, starts, goals, deadline)
+            return bound_between(prepared, starts, goals, deadline, enough)
     if between_poses:
         return _bound_of_any(prepared)
     poses = [ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) for pose in _poses(problem.goal)]

@@ -300,7 +300,7 @@ class Run:
                 candidate.settle(CandidateStatus.PRUNED, Reason.BOUND)
         # of a target that infinitely many configurations reach, only samples are solved: it is done only if a bound
         # rules all of it out
-        family, beside = bound_of_others(prepared, candidates, incumbent.deadline), np.inf
+        family, beside = bound_of_others(prepared, candidates, incumbent.deadline, objective), np.inf
         if self.problem.tool_path is None:
             family = min(family, family_bound_of(prepared, candidates, incumbent.deadline, objective))
         else:

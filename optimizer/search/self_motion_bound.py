@@ -5,6 +5,8 @@ positions. The joint displacement between two boxes is at least the distance bet
 energy at least that between their middles less what it can change within them (`potential_rates`). `lower_bounds` falls
 with neither, so that its value there bounds every motion between the boxes. The pairs of least bound are halved until
 their boxes are small. The least value over all pairs bounds the family.
+
+From given joint positions, the lowest pairs then get the copper loss of holding (`holding_cells`), and are halved on.
 """
 
 from __future__ import annotations
@@ -23,8 +25,10 @@ from optimizer.kinematics.redundant_curve import CurveStack, RedundantCurve
 from optimizer.kinematics.self_motion import SelfMotion
 from optimizer.kinematics.wrist_geometry import potential_rates
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.box_search import NEARLY
 from optimizer.search.candidates import Candidate
 from optimizer.search.ends import EndConfiguration
+from optimizer.search.holding_cells import HoldingCells
 from optimizer.search.least_displacement import least_displacement
 from optimizer.search.lower_bound import LeastBound
 
@@ -34,27 +38,47 @@ FIRST_HALF, LAST_HALF, SPLIT, ROUNDS = np.pi / 24, 1e-4, 256, 60
 # the middles of so many pairs in each round
 CLOSE, MIDDLES = 1e-3, 4
 
+# rounds in which pairs get the copper loss of holding, and the most that do in one; half side [rad] of the groups of
+# cells for which it is found, and how near to the least pair's bound those of the others are that get it
+HOLDING_ROUNDS, HELD, GROUP_HALF, NEAR = 8, 1024, 0.02, 0.1
+
 # finds boxes from rows in a group of curves (n,), parameters and half sides (n,) [rad]
 _Boxes = Callable[[NDArray[np.intp], Array, Array], tuple[Array, Array]]
 
 
-def self_motion_bound(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline = NEVER) -> float:
+def self_motion_bound(
+    prepared: PreparedProblem,
+    candidates: Sequence[Candidate],
+    deadline: Deadline = NEVER,
+    enough: float = np.inf,
+) -> float:
     """Bound [J] on motions between targets of which at least one is held on a self-motion; inf if there are none.
 
+    It has the copper loss of holding where it would be far below `enough` [J], or is to be tight.
     Ends of free orientation are left to `free_goal_bound` and `free_ends_bound`.
     """
     pairs = [each for each in candidates if each.sampled and not (each.start.tolerance or each.goal.tolerance)]
     if not pairs:
         return np.inf
     return bound_between(
-        prepared, EndCurves.of([each.start for each in pairs]), EndCurves.of([each.goal for each in pairs]), deadline
+        prepared,
+        EndCurves.of([each.start for each in pairs]),
+        EndCurves.of([each.goal for each in pairs]),
+        deadline,
+        enough,
     )
 
 
-def bound_between(prepared: PreparedProblem, starts: EndCurves, goals: EndCurves, deadline: Deadline = NEVER) -> float:
+def bound_between(
+    prepared: PreparedProblem,
+    starts: EndCurves,
+    goals: EndCurves,
+    deadline: Deadline = NEVER,
+    enough: float = np.inf,
+) -> float:
     """Bound [J] on motions from any of the starts to any of the goals, of which at least one is no isolated
     configuration."""
-    return _CellSearch(prepared, starts, goals).run(deadline)
+    return _CellSearch(prepared, starts, goals, enough).run(deadline)
 
 
 @dataclass(frozen=True)
@@ -162,11 +186,13 @@ def _boxes_of(curves: Sequence[Array | SelfMotion | CoveringSheet]) -> _Boxes:
 class _CellSearch:
     """Branch and bound over pairs of cells."""
 
-    def __init__(self, prepared: PreparedProblem, start: EndCurves, goal: EndCurves) -> None:
+    def __init__(self, prepared: PreparedProblem, start: EndCurves, goal: EndCurves, enough: float) -> None:
         self.prepared, self.start, self.goal = prepared, start, goal
         self.bound = LeastBound(prepared)
         self.rates = potential_rates(prepared.model, prepared.arm.gravity)
         self.limits = prepared.arm.active_limits
+        self.holding = HoldingCells.of(prepared) if start.given else None
+        self.will_do = enough - (0.0 if prepared.problem.bound == "tight" else NEARLY) * abs(enough)
 
     def run(self, deadline: Deadline) -> float:
         """The least bound [J] of any pair after at most ROUNDS rounds of halving; inf if there is none."""
@@ -195,7 +221,64 @@ class _CellSearch:
             fresh = np.maximum(fresh, np.tile(value[lowest], 2))
             starts, goals = starts[rest].joined(fresh_starts), goals[rest].joined(fresh_goals)
             value = np.concatenate([value[rest], fresh])
+        return self._held(starts, goals, value, deadline)
+
+    def _held(self, starts: Cells, goals: Cells, value: Array, deadline: Deadline) -> float:
+        """The least bound [J] of pairs with bounds (n,), of which the lowest get the copper loss of holding."""
+        done = np.zeros(len(value), dtype=bool)
+        for _ in range(0 if self.holding is None else HOLDING_ROUNDS):
+            order = np.argsort(value, kind="stable")[:HELD]
+            least = float(value[order[0]])
+            if deadline.passed or not np.isfinite(least) or least >= self.will_do:
+                break
+            order = order[value[order] <= least + NEAR * abs(least)]
+            held, parts = order[~done[order]], order[done[order] & (goals.half[order] >= LAST_HALF)][:SPLIT]
+            if done[order[0]] and order[0] not in parts:
+                break
+            (s0, s1), (g0, g1) = (
+                starts[parts].halved(np.zeros(len(parts), dtype=bool)),
+                goals[parts].halved(np.ones(len(parts), dtype=bool)),
+            )
+            fresh_starts, fresh_goals = s0.joined(s1), g0.joined(g1)
+            fresh = np.maximum(self.bounds(fresh_starts, fresh_goals), np.tile(value[parts], 2))
+            rest = np.setdiff1d(np.arange(len(value)), np.concatenate([parts, held]))
+            raised_starts, raised_goals = starts[held].joined(fresh_starts), goals[held].joined(fresh_goals)
+            raised = self._with_holding(raised_starts, raised_goals, np.concatenate([value[held], fresh]))
+            starts, goals = starts[rest].joined(raised_starts), goals[rest].joined(raised_goals)
+            value = np.concatenate([value[rest], raised])
+            done = np.concatenate([done[rest], np.ones(len(raised), dtype=bool)])
         return float(value.min())
+
+    def _with_holding(self, starts: Cells, goals: Cells, value: Array) -> Array:
+        """Bounds (n,) [J] raised by the copper loss of holding, on motions from cells without extent."""
+        possible = np.flatnonzero(np.isfinite(value) & (starts.half == 0) & (goals.half <= GROUP_HALF))
+        if self.holding is None or not len(possible):
+            return value
+        starts, goals = starts[possible], goals[possible]
+        (q_start, _), (q_goal, half) = self.start.boxes(starts), self.goal.boxes(goals)
+        potentials = self._potentials(self.start, starts, q_start), self._potentials(self.goal, goals, q_goal)
+        gain = potentials[1] - potentials[0] - half @ self.rates
+        groups = np.stack([starts.curve, goals.curve, np.floor(goals.parameter / (2 * GROUP_HALF))], axis=1)
+        first, row = np.unique(groups, axis=0, return_index=True, return_inverse=True)[1:]
+        row = row.ravel()
+        shape = (len(first), q_goal.shape[1])
+        low, high, least, plain = (
+            np.full(shape, np.inf),
+            np.full(shape, -np.inf),
+            np.full(len(first), np.inf),
+            np.full(len(first), np.inf),
+        )
+        np.minimum.at(low, row, q_goal - half)
+        np.maximum.at(high, row, q_goal + half)
+        np.minimum.at(least, row, gain)
+        np.minimum.at(plain, row, value[possible])
+        # the lowest first: its choices are those of all
+        order = np.argsort(plain, kind="stable")
+        rank = np.argsort(order)[row]
+        found = self.holding.group(q_start[first[order]], low[order], high[order], least[order], plain[order])
+        value = value.copy()
+        value[possible] = np.maximum(value[possible], found.at(rank, q_goal, half, gain))
+        return value
 
     def first(self) -> tuple[Cells, Cells]:
         """Every pair of cells of which at least one is of a self-motion."""
