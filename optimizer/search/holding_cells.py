@@ -18,7 +18,7 @@ from optimizer.bounds.straight_line import Line
 from optimizer.collision.bodies import Indices
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
-from optimizer.search.cruise import copper_loss
+from optimizer.search.cruise import TINY, copper_loss
 from optimizer.search.least_displacement import turned
 from optimizer.search.lower_bound import LeastBound, NetEnergy
 from optimizer.trajectories.seven_segment import shortest_duration
@@ -58,7 +58,9 @@ class HoldingCells:
         first = np.maximum(shortest_duration(nearest, self.prepared.arm.active_limits), LEAST_DURATION)
         first = np.maximum(first, problem.duration_min or 0.0)
         longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
-        last = np.minimum((cap - net.work) / (net.power - net.deficit), longest)
+        # the plain bound is no less than work and the power that is drawn at all times
+        drawn = net.power - net.deficit
+        last = np.minimum(np.where(drawn > 0, (cap - net.work) / np.maximum(drawn, TINY), np.inf), longest)
         probes = first[:, None] * np.maximum(last / first, 1 + LEAST_RATIO)[:, None] ** np.linspace(0, 1, PROBES)
         repeated = np.repeat(np.arange(len(d)), PROBES)
         below = net[repeated].at(probes.ravel())[0].reshape(probes.shape) < cap[:, None]
