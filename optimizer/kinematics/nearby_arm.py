@@ -1,8 +1,8 @@
-"""Starts for the curves of an arm that is nearly of the form `SphericalShoulder`, from its base or from its flange on.
+"""What is near the curves of an arm that nearly has the form `SphericalShoulder`, from its base or from its flange on.
 
 Kinova's Gen3 is of this form from the flange on, but for 0.35 mm between the axes of its wrist; a calibrated Panda is
-from the base on. The curves of the simplest arm nearby (`joint_axes`) are known. Points spread over all of them are
-near those of the arm itself.
+from the base on. The curves of the simplest arm nearby (`joint_axes`) are known. They are near those of
+the arm itself.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ import numpy as np
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.joint_axes import JointAxes
+from optimizer.kinematics.nearby_loops import STEPS, loops
 from optimizer.kinematics.redundant_arm import RedundantArm
-from optimizer.kinematics.redundant_curve import RedundantCurve, members
+from optimizer.kinematics.redundant_curve import RedundantCurve
 from optimizer.kinematics.spherical_shoulder import SphericalShoulder
 
 # starts on each curve of the arm nearby: two of them make a loop, mostly
@@ -41,13 +42,17 @@ class NearbyArm:
                 return cls(RedundantArm(form), mirrored, JointAxes.of(each))
         return None
 
-    def starts(self, T: Array) -> Array:
-        """Configurations (n, 7) [rad] of the arm nearby with its flange at T (4, 4), spread over all curves."""
+    def loops(self, T: Array) -> tuple[list[Array], Array]:
+        """Points (m, 7) [rad] along loops on which the arm nearby holds its flange at T (4, 4): see `nearby_loops`; and
+        configurations (n, 7) spread over the curves that are in none."""
         motions = self.arm.self_motions(np.asarray(np.linalg.inv(T)) if self.mirrored else T)
-        curves = [each for each in motions if isinstance(each, RedundantCurve)]
-        if not curves:
-            return np.zeros((0, 7))
-        share = (np.arange(STARTS) + 0.5) / STARTS
-        q = np.vstack(members(curves, [low + (high - low) * share for low, high in (each.arcs[0] for each in curves)]))
+        found, rest = loops([each for each in motions if isinstance(each, RedundantCurve)])
+        q = np.vstack([np.zeros((0, 7)), *(spread_over(each) for each in rest)])
         # from the flange on, the joints come in the other order and turn the other way
-        return -q[:, ::-1] if self.mirrored else q
+        return ([-each[:, ::-1] for each in found], -q[:, ::-1]) if self.mirrored else (found, q)
+
+
+def spread_over(points: Array) -> Array:
+    """Starts (n, nq) among the points (m, nq) along curves of the arm nearby: STARTS on each."""
+    count = STARTS * max(len(points) // STEPS, 1)
+    return np.asarray(points[((np.arange(count) + 0.5) * len(points) / count).astype(int)])

@@ -1,7 +1,8 @@
 """Inverse kinematics of any seven-joint arm: the curves of configurations that hold a pose, followed point by point.
 
-Starts near the pose come from the closed form of an arm nearby (`nearby_arm`), or from a table of configurations inside
-the joint ranges (`seed_table`). Newton's method leads them onto curves, and each curve is followed all around
+Where the closed form of an arm nearby is known (`nearby_arm`), its curves are led onto those of the arm, all points at
+once (`nearby_loops`). Next to a singularity they only give starts, and for other arms a table of configurations inside
+the joint ranges does (`seed_table`). Newton's method leads starts onto curves, and each curve is followed all around
 (`curve_tracing`). A curve that no start leads to is missed, and so may be what passes a singularity: nothing here is
 `complete`.
 """
@@ -19,7 +20,8 @@ from optimizer.exceptions import SingularPose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.curve_tracing import TracedPath, traced
-from optimizer.kinematics.nearby_arm import NearbyArm
+from optimizer.kinematics.nearby_arm import NearbyArm, spread_over
+from optimizer.kinematics.nearby_loops import followed
 from optimizer.kinematics.newton import solved
 from optimizer.kinematics.seed_table import SeedTable
 from optimizer.kinematics.traced_curve import TracedCurve
@@ -103,24 +105,33 @@ class TracedArm:
         found = solved(self._chain, around.reshape(-1, JOINTS), T, STEPS)
         return np.concatenate([q, found[0]]), np.concatenate([missed, found[1]])
 
+    def _beside_nearby(self, T: Array) -> tuple[list[TracedPath], Array]:
+        """The curves along those of the arm nearby with the flange at T (4, 4), and starts (n, 7) near the others."""
+        if self._nearby is None:
+            return [], np.zeros((0, JOINTS))
+        loops, starts = self._nearby.loops(T)
+        paths, good = followed(self._chain, loops, T)
+        left = [spread_over(each[:-1]) for each, done in zip(loops, good.tolist(), strict=True) if not done]
+        return paths, np.vstack([starts, *left])
+
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
         checkpoint()
-        starts = np.zeros((0, JOINTS)) if self._nearby is None else self._nearby.starts(T)
+        paths, starts = self._beside_nearby(T)
         q, missed = solved(self._chain, starts, T, STEPS)
-        if not (missed < SOLVED).any():
+        if not paths and not (missed < SOLVED).any():
             starts = self._seeds.starts(T)
             q, missed = solved(self._chain, starts, T, STEPS)
         q, missed = self._with_near(q, missed, T)
-        if not (missed < SOLVED).any():
+        if not paths and not (missed < SOLVED).any():
             q, missed = solved(self._chain, starts[:FEW], T, MOST_STEPS)
         # what Newton's method nearly reaches after many steps is on a singularity
-        q = q[missed < (SOLVED if (missed < SOLVED).any() else ON_EDGE)]
+        q = q[missed < (SOLVED if paths or (missed < SOLVED).any() else ON_EDGE)]
         smallest = np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
         regular = smallest > SINGULAR
-        if len(q) and not regular.any():
+        if len(q) and not paths and not regular.any():
             raise SingularPose("goal", float(smallest.min()))
-        paths = sorted(traced(self._chain, q[regular], T), key=_place)
+        paths = sorted([*paths, *traced(self._chain, q[regular], T)], key=_place)
         found: list[TracedCurve] = []
         for path in paths:
             # where a curve bends, one start may pass another unseen

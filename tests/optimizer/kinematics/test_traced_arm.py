@@ -17,10 +17,13 @@ from optimizer.kinematics.chain import Chain, miss, pose_error
 from optimizer.kinematics.curve_tracing import cycles, traced
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.nearby_arm import NearbyArm
+from optimizer.kinematics.nearby_loops import SHORT, followed
+from optimizer.kinematics.newton import solved
 from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.seed_table import SeedTable
 from optimizer.kinematics.traced_arm import TracedArm
 from optimizer.kinematics.traced_curve import TracedCurve
+from optimizer.problem.branches import NumberedBranch
 from tests.optimizer.chains import move, serial_chain
 from tests.optimizer.kinematics.six_joints import ACCURACY, FOUND, flange, inside
 from tests.selection import long_but
@@ -94,11 +97,29 @@ def test_the_curves_of_the_arm_nearby_are_near_those_of_the_arm() -> None:
         assert nearby is not None and nearby.mirrored == mirrored
         for q in rng.uniform(-1.5, 1.5, (5, 7)):
             T = chain.flange(q[None])[0]
-            starts = nearby.starts(T)
+            found, rest = nearby.loops(T)
+            starts = np.vstack([*found, rest])
             assert len(starts) and miss(pose_error(chain.flange(starts), T)).max() < 2e-3
         found = TracedArm.of(model)
         assert found is not None and found.self_motions(T)
     assert NearbyArm.of(Chain.of(CHAIN.model)) is None
+
+
+def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> None:
+    rng, chain = np.random.default_rng(59), Chain.of(GEN3.model)
+    nearby, count = NearbyArm.of(chain), 0
+    assert nearby is not None
+    for _ in range(4):
+        T = flange(GEN3, inside(GEN3, rng))
+        paths, good = followed(chain, nearby.loops(T)[0], T)
+        assert len(paths) == good.sum()
+        for path in paths:
+            start, _ = solved(chain, path.q[0][None], T)
+            (other,) = traced(chain, start, T)
+            curve = TracedCurve.of(chain, T, other, NumberedBranch(1))
+            assert other.closed and all(away(curve, q) < SHORT for q in path.q)
+            count += 1
+    assert count > 15
 
 
 def test_parts_of_curves_between_starts_make_loops_and_ways_to_an_end() -> None:
