@@ -184,7 +184,7 @@ class CandidateStatus(StrEnum):
 class CandidateReport:
     """A start and goal pair: its status and reason, its proven bound and the energy found [J], of the objective.
 
-    `start_target` and `goal_target` are indices as in `Branch.target`.
+    `start_target` and `goal_target` are indices as in `Branch.target`. `tried`: a motion was computed, found or not.
     """
 
     start: str
@@ -198,6 +198,7 @@ class CandidateReport:
     duration: float | None = None
     start_target: int = 0
     goal_target: int = 0
+    tried: bool = False
 
 
 BaselineName = Literal["trapezoid", "quintic", "ruckig", "ruckig_slowed", "controller_default"]

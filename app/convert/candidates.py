@@ -10,8 +10,6 @@ from app.convert.fields import fields
 from app.schemas.request import WhichCandidates
 from optimizer.solution import CandidateReport, CandidateStatus
 
-_COMPUTED = (CandidateStatus.SOLVED, CandidateStatus.FAILED)
-"""Of the candidates for which the optimiser computed a motion, or tried to."""
 MOST_IN_A_PROBLEM = 64
 """Candidates that an error document lists at most. A search can have thousands, most of them for the same reason."""
 _TELLING = (
@@ -28,7 +26,7 @@ def chosen(candidates: Sequence[CandidateReport], which: WhichCandidates) -> lis
     """The candidates that an answer lists, in their order."""
     if which == "none":
         return []
-    return [each for each in candidates if which == "all" or each.status in _COMPUTED]
+    return [each for each in candidates if which == "all" or each.tried]
 
 
 def candidate_counts(candidates: Sequence[CandidateReport]) -> dict[str, int]:

@@ -26,9 +26,9 @@ WhichCandidates = Literal["all", "computed", "none"]
 def which_candidates() -> Any:
     """The field `candidates` of a request."""
     return described(
-        "Candidates that the answer lists. `computed`: those for which a motion was computed, found or not (`solved` "
-        "and `failed`). `all`: also those that were ruled out or not reached, thousands for two poses. `none`: no "
-        "candidates. `candidate_counts` counts all of them in any case.",
+        "Candidates that the answer lists. `computed`: those for which a motion was computed, found or not (`solved`, "
+        "`failed`, and `pruned` on the way). `all`: also those that were ruled out or not reached, thousands for two "
+        "poses. `none`: no candidates. `candidate_counts` counts all of them in any case.",
         None,
         "all",
         default="computed",

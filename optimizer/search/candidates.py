@@ -108,6 +108,7 @@ class Candidate:
             duration=None if self.energy is None else self.duration,
             start_target=self.start.target,
             goal_target=self.goal.target,
+            tried=self.attempt is not None or self.status is CandidateStatus.FAILED,
         )
 
 

@@ -17,7 +17,7 @@ from optimizer import optimize, pareto
 from optimizer.collision import coal_distance
 from optimizer.collision.model import CollisionModel
 from optimizer.deadline import NEVER, Deadline, DeadlinePassed, checkpoint, watch, watched_time_left
-from optimizer.energy import kernel
+from optimizer.energy.kernel_functions import Evaluation
 from optimizer.exceptions import DeadlineExceeded
 from optimizer.problem.arm import Arm
 from optimizer.problem.problem import Problem
@@ -62,7 +62,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> WorkClock:
     """A clock that every expensive call of the library moves."""
     mine = WorkClock()
     prices: list[tuple[Any, str, Callable[..., float]]] = [
-        (kernel._Evaluation, "__call__", lambda self, *arguments: NODE * len(arguments[0])),
+        (Evaluation, "__call__", lambda self, *arguments: NODE * len(arguments[0])),
         (pin, "rneaInParallel", lambda threads, pool, q, *rest: INSTANT * q.shape[1]),
         (pin, "forwardKinematics", lambda *arguments: PLACEMENT),
         (coal_distance.coal, "distance", lambda *arguments: DISTANCE),
