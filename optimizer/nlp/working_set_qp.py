@@ -182,11 +182,10 @@ class WorkingSetQP:
         return d[k], j[k], grid
 
     def _add_broken(self, rows: QPRows, at: QPInputs, bounds: Array, x: Array) -> bool:
-        """Add the bounds that the step x breaks, else the peaks above a limit after it; whether any were added."""
-        broken = np.array([bounds[0] - x > BOUND_TOLERANCE, x - bounds[1] > BOUND_TOLERANCE]) & ~rows.bounded
-        if broken.any():
-            # no peaks yet: a step without bounds may be so long that it breaks every limit
-            rows.add_bounds(bounds, broken)
+        """Add all bounds if the step x breaks one, else the peaks above a limit after it; whether any were added."""
+        if not rows.bounded.all() and ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any():
+            # all of them, and no peaks yet: a step without bounds may be so long that it breaks every limit
+            rows.add_bounds(bounds, np.ones_like(rows.bounded))
             return True
         change = x[: self.count].reshape(at.free.shape).T / self.rates(at.T)[:, :, None]
         predicted = change @ self._grid_free.swapaxes(1, 2)
