@@ -1,8 +1,7 @@
 """What is near the curves of an arm that nearly has the form `SphericalShoulder`, from its base or from its flange on.
 
 Kinova's Gen3 is of this form from the flange on, but for 0.35 mm between the axes of its wrist; a calibrated Panda is
-from the base on. The curves of the simplest arm nearby (`joint_axes`) are known. They are near those of
-the arm itself.
+from the base on. The curves of the simplest arm nearby (`joint_axes`) are known, and near those of the arm itself.
 """
 
 from __future__ import annotations
