@@ -67,7 +67,7 @@ class Interpreted:
 class Compiled:
     """The functions in a library that was compiled from `kernel_source`, of an arm of nq joints.
 
-    The library is unloaded with the last user of this. Raises OSError if it cannot be loaded.
+    The library is unloaded when neither this nor any of its evaluations is left. Raises OSError if it cannot be loaded.
     """
 
     compiled = True
@@ -79,7 +79,7 @@ class Compiled:
 
     def evaluation(self, name: str, count: int) -> Evaluation:
         """See `Functions`."""
-        return _Called(getattr(self._library, name), *sizes(self._nq)[name], count)
+        return _Called(self, getattr(self._library, name), *sizes(self._nq)[name], count)
 
 
 class _Mapped(Evaluation):
@@ -96,11 +96,17 @@ class _Mapped(Evaluation):
 
 
 class _Called(Evaluation):
-    """A function of a library, which goes through the nodes itself."""
+    """A function of a library, which goes through the nodes itself. It keeps the library loaded."""
 
     def __init__(
-        self, function: Callable[..., object], given: tuple[int, ...], found: tuple[int, ...], count: int
+        self,
+        library: Compiled,
+        function: Callable[..., object],
+        given: tuple[int, ...],
+        found: tuple[int, ...],
+        count: int,
     ) -> None:
+        self._library = library
         *own, shared = given
         self.arguments = [*(np.zeros((count, size)) for size in own), np.zeros(shared)]
         self.results = [np.zeros((count, size)) for size in found]

@@ -43,6 +43,20 @@ def test_any_number_of_nodes_is_as_in_the_virtual_machine(lanes: int, tmp_path: 
                 assert (result == expected).all()
 
 
+def test_a_library_is_unloaded_with_its_last_evaluation(tmp_path: Path) -> None:
+    path = library([each for each in build(ROBOT) if each.name() == "torque"], 2, tmp_path)
+
+    def loaded() -> bool:
+        return str(path) in Path("/proc/self/maps").read_text()
+
+    evaluation = Compiled(path, ROBOT.nq).evaluation("torque", 3)
+    assert loaded()
+    (tau,) = evaluation(states(3, 3), np.ones(PARAMETERS))
+    assert np.isfinite(tau).all()
+    del evaluation
+    assert not loaded()
+
+
 def test_an_operation_that_is_not_known_is_refused() -> None:
     with SYMBOLICS:
         x, p = ca.SX.sym("x"), ca.SX.sym("p")
