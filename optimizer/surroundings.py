@@ -10,7 +10,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.bodies import Indices
-from optimizer.collision.clearance_proof import proven_clearance
+from optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
 from optimizer.collision.path_planner import MOST_STATES, PlannedPaths, PlanningEnd, plan_paths
 from optimizer.collision.state_validity import ValidityCheckers
@@ -22,9 +22,8 @@ from optimizer.problem.arm import Arm
 from optimizer.solution import Clearance
 from optimizer.trajectories.spline import Spline
 
-# samples of a motion at which distances are computed, and the distance [m] there that makes a proof unnecessary until
-# the certificate
-CONTACT_SAMPLES, CLEAR = 96, 0.02
+# samples of a motion at which distances are computed
+CONTACT_SAMPLES = 96
 # pairs that stay farther apart than this [m] throughout a motion get no clearance constraint
 ACTIVE = 0.15
 # clearance [m] beyond the margins below which an obstacle is likely to limit the optimum
@@ -48,14 +47,14 @@ class Surroundings:
     def worst_violation(self, spline: Spline) -> Clearance | None:
         """Clearance of a motion whose margins are violated or not proven: distance, pair and time.
 
-        None if all samples are at least CLEAR away, if the margins are proven, or if collisions are not checked.
+        None if the margins are proven, or if collisions are not checked.
         """
         if not self.arm.collisions:
             return None
-        distance = self._sampled_distances(spline, CLEAR)
-        least = float(distance.min(initial=np.inf))
-        if least >= CLEAR:
+        if is_proven_clear(self.model, spline):
             return None
+        distance = self.model.along(self._samples(spline), 0.0)
+        least = float(distance.min(initial=np.inf))
         if least < 0:
             k, pair = np.unravel_index(int(distance.argmin()), distance.shape)
             time = spline.duration * float(k) / (CONTACT_SAMPLES - 1)
@@ -67,7 +66,8 @@ class Surroundings:
         """Whether samples q (k, nq) [rad] of a motion keep all margins. About CONTACT_SAMPLES of them are checked."""
         if not self.arm.collisions:
             return True
-        return self.model.least_distance(q[:: max(len(q) // CONTACT_SAMPLES, 1)], 0.0) >= 0
+        checked = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
+        return float(self.model.along(checked, 0.0).min(initial=np.inf)) >= 0
 
     def worst_collisions(self, motions: Sequence[Array]) -> list[ClosestPair | None]:
         """The pair that violates its margin most over the samples q (k, nq) [rad] of each motion; None if none does.
@@ -77,10 +77,7 @@ class Surroundings:
         if not self.arm.collisions or not len(self.model.pairs):
             return [None] * len(motions)
         paths = {id(q): q[:: max(len(q) // CONTACT_SAMPLES, 1)] for q in motions}
-        frames = self.model.frames(np.concatenate(list(paths.values())))
-        distance = self.model.pair_distances(frames, within=0.0).distance
-        parts = np.split(distance, np.cumsum([len(q) for q in paths.values()])[:-1])
-        found = {key: self._worst(part) for key, part in zip(paths, parts, strict=True)}
+        found = {key: self._worst(self.model.along(q, within=0.0)) for key, q in paths.items()}
         return [found[id(q)] for q in motions]
 
     def _worst(self, distance: Array) -> ClosestPair | None:
@@ -95,11 +92,11 @@ class Surroundings:
         An obstacle is then likely to limit the optimum. About CONTACT_SAMPLES of them are checked.
         """
         checked = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
-        return self.arm.collisions and self.model.least_distance(checked, NEAR_CONTACT) < NEAR_CONTACT
+        return self.arm.collisions and float(self.model.along(checked, NEAR_CONTACT).min(initial=np.inf)) < NEAR_CONTACT
 
     def active_pairs(self, spline: Spline) -> Indices:
         """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a sample of the motion."""
-        return np.flatnonzero(self.model.pairs_within(self._sampled_frames(spline), ACTIVE))
+        return np.flatnonzero(self.model.pairs_within(self.model.frames(self._samples(spline)), ACTIVE))
 
     def with_clearance(self, pairs: Indices) -> PathConstraints:
         """The path constraints of the arm, and the clearance of `pairs` (k,) of the collision model."""
@@ -165,13 +162,9 @@ class Surroundings:
         """The first paths that were found, else the last planning, for all goals that differ by full turns."""
         return {}
 
-    def _sampled_distances(self, spline: Spline, within: float) -> Array:
-        """Signed distances (CONTACT_SAMPLES, pairs) [m] at equal steps of a motion, exact up to `within`."""
-        return self.model.pair_distances(self._sampled_frames(spline), within=within).distance
-
-    def _sampled_frames(self, spline: Spline) -> Array:
-        """Link frames (CONTACT_SAMPLES, nq + 1, 4, 4) at equal steps of a motion."""
-        return self.model.frames(spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES)))
+    def _samples(self, spline: Spline) -> Array:
+        """Samples q (CONTACT_SAMPLES, nq) [rad] at equal steps of a motion."""
+        return np.asarray(spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES)))
 
 
 def _key(q_start: Array, q_goal: Array) -> bytes:

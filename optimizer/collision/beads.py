@@ -13,7 +13,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.bodies import Body, Indices
-from optimizer.collision.many_points import into, placed
+from optimizer.collision.many_points import chosen, into, placed, pose_columns
 
 # beads of a body
 COUNT = 4
@@ -24,13 +24,13 @@ class Beads:
 
     def __init__(self, bodies: Sequence[Body], pairs: Indices) -> None:
         self._links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
-        self._centres = np.array([_centres(body) for body in bodies]).reshape(-1, COUNT, 3)
+        self._centres = np.array([_centres(body) for body in bodies]).reshape(-1, COUNT, 3).transpose(1, 2, 0).copy()
         self._radii = np.array([_radius(body) for body in bodies])
-        self._T_core = np.array([body.T_link_core for body in bodies]).reshape(-1, 4, 4)
+        self._T_core = pose_columns(np.array([body.T_link_core for body in bodies]).reshape(-1, 4, 4))
         # half sizes of boxes; cylinders have their radius for x and y
-        self._half_sizes = np.array([_half_size(body) for body in bodies]).reshape(-1, 3)
+        self._half_sizes = np.array([_half_size(body) for body in bodies]).reshape(-1, 3).T.copy()
         self._round = np.array([body.core.disc_radius > 0 for body in bodies], dtype=bool)
-        has_form = self._half_sizes[:, 2] >= 0
+        has_form = self._half_sizes[2] >= 0
         first, second = pairs.T
         # no beads cover a half-space
         unbounded = np.array([body.core.is_half_space for body in bodies], dtype=bool)
@@ -45,25 +45,27 @@ class Beads:
         do those whose cores may overlap.
         """
         result = np.full(len(pair), -np.inf)
-        chosen = np.flatnonzero(self._has_bound[pair])
-        if not chosen.size:
+        bounded = np.flatnonzero(self._has_bound[pair])
+        if not bounded.size:
             return result
-        configuration, pair = configuration[chosen], pair[chosen]
+        configuration, pair = configuration[bounded], pair[bounded]
         formed, beaded = self._formed[pair], self._beaded[pair]
-        points = placed(frames[configuration, self._links[beaded], None], self._centres[beaded])
+        T, links = pose_columns(frames), frames.shape[1]
+        points = placed(chosen(T, configuration * links + self._links[beaded]), chosen(self._centres, beaded))
         # obstacles are in the frame of the base, which most pairs need no step into
         moving = np.flatnonzero(self._links[formed] > 0)
-        T = frames[configuration[moving], self._links[formed[moving]]]
-        points[moving] = into(T[:, None], points[moving])
-        local = np.abs(into(self._T_core[formed][:, None], points))
-        is_round = self._round[formed]
-        if is_round.any():
-            local[is_round, :, 0] = np.hypot(local[is_round, :, 0], local[is_round, :, 1])
-            local[is_round, :, 1] = 0.0
-        outside = np.maximum(local - self._half_sizes[formed][:, None], 0.0)
-        distance = np.sqrt(np.einsum("kbi,kbi->kb", outside, outside)).min(axis=1)
-        bound = distance - self._radii[beaded]
-        result[chosen] = np.where(bound > 0, bound, -np.inf)
+        if moving.size:
+            T_moving = chosen(T, configuration[moving] * links + self._links[formed[moving]])
+            points[..., moving] = into(T_moving, points[..., moving])
+        local = np.abs(into(chosen(self._T_core, formed), points))
+        is_round = np.flatnonzero(self._round[formed])
+        if is_round.size:
+            local[:, 0, is_round] = np.hypot(local[:, 0, is_round], local[:, 1, is_round])
+            local[:, 1, is_round] = 0.0
+        outside = np.maximum(local - chosen(self._half_sizes, formed), 0.0)
+        square = (outside[:, 0] ** 2 + outside[:, 1] ** 2 + outside[:, 2] ** 2).min(axis=0)
+        bound = np.sqrt(square) - self._radii[beaded]
+        result[bounded] = np.where(bound > 0, bound, -np.inf)
         return result
 
 

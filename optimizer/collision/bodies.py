@@ -39,12 +39,12 @@ class Body:
         """The core's points (m, 3) [m] in the link frame."""
         return self.core.points @ self.T_link_core[:3, :3].T + self.T_link_core[:3, 3]
 
-    @property
+    @cached_property
     def ball_centre(self) -> Array:
         """Centre (3,) [m] of a ball that encloses the core, in the link frame."""
         return np.asarray((self.points.min(axis=0) + self.points.max(axis=0)) / 2)
 
-    @property
+    @cached_property
     def ball_radius(self) -> float:
         """Radius [m] of that ball; the core's own radius is not included."""
         return float(np.linalg.norm(self.points - self.ball_centre, axis=1).max()) + self.core.disc_radius
@@ -58,10 +58,10 @@ class Body:
 
 def bodies_of(arm: Arm) -> tuple[Body, ...]:
     """Bodies of an arm: the capsules of the robot, then tool and payload, then the obstacles of the scene."""
-    robot, last = arm.robot, arm.robot.nq
+    robot, last, names = arm.robot, arm.robot.nq, arm.robot.link_names
     T_last_flange = robot.T_last_flange
     links = [
-        Body(robot.link_names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
+        Body(names[capsule.link], capsule.link, Core(capsule.axis, capsule.radius), np.eye(4))
         for capsule in robot.capsules
     ]
     parts = [(TOOL, part) for part in arm.tool]

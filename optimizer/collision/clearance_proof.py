@@ -35,7 +35,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.collision.bodies import Indices
 from optimizer.collision.model import CollisionModel
 from optimizer.collision.pair_distance import WitnessPoints
@@ -111,34 +111,51 @@ def proven_clearance(model: CollisionModel, spline: Spline) -> Clearance | None:
     return _Proof(model, spline).run() if len(model.pairs) else None
 
 
-class _Proof:
-    """The proof for one motion. `least` [m] is the least distance sampled so far, of `closest`: pair and time [s]."""
+def is_proven_clear(model: CollisionModel, spline: Spline) -> bool:
+    """Whether the clearance is proven to be GAP or more: `proven_clearance` is then not negative.
 
-    def __init__(self, model: CollisionModel, spline: Spline) -> None:
-        self.model, self.geometry, self.spline = model, model.geometry, spline
+    It takes far fewer intervals than to know how great the clearance is. False may also mean that more are needed.
+    """
+    return not len(model.pairs) or _Proof(model, spline, wanted=GAP).bound() >= GAP
+
+
+class _Proof:
+    """The proof for one motion. `least` [m] is the least distance sampled so far, of `closest`: pair and time [s].
+
+    Without `wanted` [m] the bound comes near to the least distance; else the proof ends once the bound is as high, or
+    a sample is lower.
+    """
+
+    def __init__(self, model: CollisionModel, spline: Spline, wanted: float | None = None) -> None:
+        self.model, self.geometry, self.spline, self.wanted = model, model.geometry, spline, wanted
         self.curve = spline.curve
         self.levers = model.levers_between
         self.least = np.inf
         self.closest = (0, 0.0)
 
     def run(self) -> Clearance:
-        """Halves intervals until all are proven, or the limits on the effort are reached."""
+        """The proven clearance, with what is closest."""
+        proven = self.bound()
+        pair, t = self.closest
+        points = self.model.nearest_points(self.instants(np.array([t])).frames, pair)
+        return Clearance(proven, self.least, self.model.names(pair), t, points)
+
+    def bound(self) -> float:
+        """Lower bound [m]: halves intervals until all are proven, or the limits on the effort are reached."""
         instants, checks = self.initial_intervals()
         proven, checked = np.inf, 0
         for level in range(MOST_LEVELS):
             checked += len(checks.pair)
             bound = self.bounds(instants, checks)
-            enough = self.least - max(GAP, RELATIVE_GAP * abs(self.least))
-            is_last = level == MOST_LEVELS - 1 or checked > MOST_CHECKS
+            enough = self.least - max(GAP, RELATIVE_GAP * abs(self.least)) if self.wanted is None else self.wanted
+            is_last = level == MOST_LEVELS - 1 or checked > MOST_CHECKS or self.least < enough
             is_open = np.zeros(len(bound), dtype=bool) if is_last else bound < enough
             proven = min(proven, float(bound[~is_open].min(initial=np.inf)))
             if not is_open.any():
                 break
             instants, checks = self.halved(instants, self.expanded(instants, checks[np.flatnonzero(is_open)]))
         # rounding may put a bound that is exact above the sample
-        pair, t = self.closest
-        points = self.model.nearest_points(self.instants(np.array([t])).frames, pair)
-        return Clearance(min(proven, self.least), self.least, self.model.names(pair), t, points)
+        return min(proven, self.least)
 
     def initial_intervals(self) -> tuple[_Instants, _Checks]:
         """Intervals, each within a knot span, and the pairs that may be the closest there."""
@@ -153,17 +170,28 @@ class _Proof:
         self.sample_normals(instants, np.arange(n), ball_distances.argmin(axis=1), np.full(n, -1))
         v, _, h = self.rate_bounds(t[:-1], t[1:])
         travel = (v * h[:, None]) @ self.levers.T
-        is_open = (ball_distances[:-1] + ball_distances[1:] - travel) / 2 < self.least
-        is_needed = np.zeros((n, p), dtype=bool)
-        is_needed[:-1] |= is_open
-        is_needed[1:] |= is_open
-        instant, pair = np.nonzero(is_needed)
+        is_open = self.may_be_closest(ball_distances, travel)
+        instant, pair = np.nonzero(_at_ends(is_open))
+        beads = self.geometry.bead_distances(instants.frames, instant, pair)
+        distances = ball_distances
+        distances[instant, pair] = np.maximum(distances[instant, pair], beads)
+        is_open &= self.may_be_closest(distances, travel)
+        instant, pair = np.nonzero(_at_ends(is_open))
         found = self.sample_normals(instants, instant, pair, np.full(len(pair), -1))
         row = np.zeros((n, p), dtype=np.intp)
         row[instant, pair] = np.arange(len(pair))
         begin, pair = np.nonzero(is_open)
         part = np.full(len(pair), -1)
         return instants, _Checks(pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]])
+
+    def may_be_closest(self, bounds: Array, travel: Array) -> Mask:
+        """Which pairs (n - 1, p) may be nearer than what is known or wanted over the intervals between n instants.
+
+        `bounds` (n, p) [m] are lower bounds on their distances at the instants, which change over an interval by no
+        more than the `travel` (n - 1, p) [m].
+        """
+        limit = self.least if self.wanted is None else min(self.least, self.wanted)
+        return np.asarray((bounds[:-1] + bounds[1:] - travel) / 2 < limit)
 
     def expanded(self, instants: _Instants, checks: _Checks) -> _Checks:
         """The checks, with those of clouds over short intervals replaced by checks of the parts that may be nearest."""
@@ -270,6 +298,12 @@ class _Proof:
     def instants(self, t: Array) -> _Instants:
         """Link frames at times (k,) [s]."""
         return _Instants(t, self.model.frames(self.curve(t)))
+
+
+def _at_ends(intervals: Mask) -> Mask:
+    """Which pairs (n, p) are needed at n instants for those of the intervals (n - 1, p) between them."""
+    none = np.zeros_like(intervals[:1])
+    return np.asarray(np.concatenate([intervals, none]) | np.concatenate([none, intervals]))
 
 
 def _bernstein(powers: Array) -> Array:

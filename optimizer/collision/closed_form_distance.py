@@ -16,6 +16,9 @@ from optimizer.collision.many_points import cross
 
 # two cores nearer than this [m] touch: the direction from one to the other is only rounding
 TOUCHING = 1e-10
+# squared sine of the angle between two segments below which they count as parallel: if they nearly touch, the nearest
+# points may then be off by a ten-millionth of their lengths
+PARALLEL = 1e-15
 # squared length [m²] below which a vector has no direction
 NONE = 1e-24
 
@@ -23,30 +26,22 @@ NONE = 1e-24
 def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
     """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of segments a, b (k, 2, 3) [m].
 
-    Either both witness points are inside their segments, or one of them is an end: five candidates, all feasible. The
-    nearest of them is exact, also for parallel segments. If the segments cross, the distance is 0 and the normal is
-    the common perpendicular.
+    The point of a that is nearest to the line of b, clamped, then the point of b nearest to it, clamped, and the point
+    of a nearest to that: exact, also for parallel segments. If the segments cross, the distance is 0 and the normal
+    is the common perpendicular.
     """
     # (3, k): numpy runs along k
     a0, a1, b0, b1 = (np.ascontiguousarray(x.T) for x in (a[:, 0], a[:, 1], b[:, 0], b[:, 1]))
     u, v, w = a1 - a0, b1 - b0, a0 - b0
-    uu, vv, uv, uw, vw = ((x * y).sum(axis=0) for x, y in ((u, u), (v, v), (u, v), (u, w), (v, w)))
+    uu, vv, uv, uw, vw = (_products(x, y) for x, y in ((u, u), (v, v), (u, v), (u, w), (v, w)))
     denominator = uu * vv - uv * uv
-    inside = denominator > 1e-12 * uu * vv
-    s, t, rows = np.empty((5, len(a))), np.empty((5, len(a))), np.arange(len(a))
-    s[0] = (uv * vw - vv * uw) / np.where(inside, denominator, 1.0) * inside
-    s[1], s[2], s[3], s[4] = 0, 1, -uw, uv - uw
-    s[3:] /= np.maximum(uu, NONE)
-    np.clip(s, 0, 1, out=s)
-    t[0], t[1], t[2], t[3], t[4] = uv * s[0] + vw, vw, vw + uv, 0, 1
-    t[:3] /= np.maximum(vv, NONE)
-    np.clip(t, 0, 1, out=t)
-    # |w + s u - t v|²
-    square = s * (uu * s - 2 * uv * t + 2 * uw) + t * (vv * t - 2 * vw)
-    best = square.argmin(axis=0)
-    p, r = a0 + s[best, rows] * u, b0 + t[best, rows] * v
+    inside = denominator > PARALLEL * uu * vv
+    s = np.clip((uv * vw - vv * uw) / np.where(inside, denominator, 1.0) * inside, 0, 1)
+    t = np.clip((uv * s + vw) / np.maximum(vv, NONE), 0, 1)
+    s = np.clip((uv * t - uw) / np.maximum(uu, NONE), 0, 1)
+    p, r = a0 + s * u, b0 + t * v
     across = r - p
-    distance = np.sqrt((across * across).sum(axis=0))
+    distance = np.sqrt(_products(across, across))
     touching = distance < TOUCHING
     normal = across / np.where(touching, 1.0, distance)
     if touching.any():
@@ -60,28 +55,39 @@ def box_segment(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
     half_size (k, 3) [m]: half of the edges of boxes about the origin; b (k, 2, 3) [m]: segments in the boxes' frames.
     The derivative of half the squared distance along the segment is piecewise linear and increasing: its root is exact.
     """
-    p0, u = b[:, 0], b[:, 1] - b[:, 0]
-    safe = np.where(np.abs(u) > 1e-15, u, 1.0)
-    breaks = np.concatenate([(half_size - p0) / safe, (-half_size - p0) / safe], axis=1)
-    breaks = np.clip(np.where(np.tile(np.abs(u) > 1e-15, 2), breaks, 0.0), 0, 1)
-    s = np.sort(np.concatenate([np.zeros((len(b), 1)), breaks, np.ones((len(b), 1))], axis=1), axis=1)
-    points = p0[:, None] + s[..., None] * u[:, None]
-    slope = np.einsum("kmi,ki->km", points - np.clip(points, -half_size[:, None], half_size[:, None]), u)
-    rising = slope >= 0
-    after = np.where(rising.any(axis=1), rising.argmax(axis=1), s.shape[1] - 1)
-    before = np.maximum(after - 1, 0)
-    rows = np.arange(len(b))
-    s0, s1, g0, g1 = s[rows, before], s[rows, after], slope[rows, before], slope[rows, after]
+    # (3, k): numpy runs along k
+    p0, p1, high = (np.ascontiguousarray(x.T) for x in (b[:, 0], b[:, 1], half_size))
+    u, low = p1 - p0, -high
+    moves = np.abs(u) > 1e-15
+    safe = np.where(moves, u, 1.0)
+    # where the slope bends
+    s = np.zeros((8, len(b)))
+    s[1] = 1
+    s[2:5], s[5:] = (high - p0) / safe * moves, (low - p0) / safe * moves
+    np.clip(s, 0, 1, out=s)
+    falls = _slope(p0, u, high, s) < 0
+    ends = np.stack([np.where(falls, s, 0.0).max(axis=0), np.where(falls, 1.0, s).min(axis=0)])
+    g0, g1 = _slope(p0, u, high, ends)
     crossing = (g0 < 0) & (g1 > 0)
     fraction = np.where(crossing, -g0 / np.where(crossing, g1 - g0, 1.0), 1.0)
-    point = p0 + (s0 + fraction * (s1 - s0))[:, None] * u
-    across = point - np.clip(point, -half_size, half_size)
-    distance = np.sqrt(_dot(across, across))
+    point = p0 + (ends[0] + fraction * (ends[1] - ends[0])) * u
+    across = point - np.clip(point, low, high)
+    distance = np.sqrt(_products(across, across))
     touching = distance < TOUCHING
-    normal = across / np.where(touching, 1.0, distance)[:, None]
+    normal, point = (across / np.where(touching, 1.0, distance)).T, point.T
     if touching.any():
         distance[touching], normal[touching], point[touching] = _penetration(half_size[touching], b[touching])
     return distance, normal, point
+
+
+def _slope(p0: Array, u: Array, high: Array, s: Array) -> Array:
+    """Derivative (m, k) of half the squared distance of p0 + s u (3, k) from boxes of half sizes `high` (3, k), by s
+    (m, k)."""
+    slope = np.zeros_like(s)
+    for i in range(3):
+        x = p0[i] + s * u[i]
+        slope += (x - np.clip(x, -high[i], high[i])) * u[i]
+    return slope
 
 
 def _penetration(half_size: Array, b: Array) -> tuple[Array, Array, Array]:
@@ -159,6 +165,11 @@ def _crossing(triangles: Array, edge: Array, face: Array, b: Array, on_edges: Ar
     lowest = b[rows, ends[rows, best].argmin(axis=1)]
     point = np.concatenate([lowest[None], on_edges])[best % 4, rows]
     return depth[rows, best], directions[rows, best], point
+
+
+def _products(x: Array, y: Array) -> Array:
+    """Scalar products (k,) of vectors (3, k)."""
+    return np.asarray(x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
 
 
 def _dot(x: Array, y: Array) -> Array:

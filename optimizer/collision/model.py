@@ -19,6 +19,9 @@ from optimizer.collision.pair_distance import PairGeometry, WitnessPoints
 from optimizer.kinematics.forward import joint_placements, link_frames
 from optimizer.problem.arm import Arm
 
+# along a motion, the distances at every so many samples are computed first
+STRIDE = 6
+
 
 @dataclass(frozen=True)
 class ClosestPair:
@@ -119,6 +122,28 @@ class CollisionModel:
             chosen = bound <= within
             configuration, column = configuration[chosen], column[chosen]
         return distance, configuration, column
+
+    def along(self, q: Array, within: float, pairs: Indices | None = None) -> Array:
+        """Signed distances (n, p) [m] at consecutive samples q (n, nq) [rad] of a motion, exact up to `within` [m].
+
+        Those of every STRIDE-th sample bound the others from below, since a distance changes no faster than the levers
+        allow. Most of the others need not be computed.
+        """
+        pairs = np.arange(len(self.pairs)) if pairs is None else pairs
+        frames, rows, count = self.frames(q), np.arange(len(q)), len(q)
+        if count <= 2 * STRIDE or not len(pairs):
+            return self.pair_distances(frames, pairs, within).distance
+        levers = self.levers_between[pairs].T
+        chosen = np.append(rows[:-1:STRIDE], count - 1)
+        reach = float((np.abs(np.diff(q[chosen], axis=0)) @ levers).max()) / 2
+        result = np.empty((count, len(pairs)))
+        result[chosen] = self.pair_distances(frames[chosen], pairs, within + reach).distance
+        rest = np.delete(rows, chosen)
+        before = chosen[rest // STRIDE]
+        after = np.minimum(before + STRIDE, count - 1)
+        known = np.maximum(*(result[at] - np.abs(q[rest] - q[at]) @ levers for at in (before, after)))
+        result[rest] = self.pair_distances(frames[rest], pairs, within, known).distance
+        return result
 
     def pairs_within(self, frames: Array, within: float) -> Mask:
         """Which pairs (p,) are less than `within` [m] apart at any of n configurations.

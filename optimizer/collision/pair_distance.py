@@ -19,7 +19,7 @@ from optimizer.collision.bodies import Body, Indices
 from optimizer.collision.closed_form_distance import box_segment, segment_segment
 from optimizer.collision.cloud_pairs import CloudPairs
 from optimizer.collision.coal_distance import ConvexPairs
-from optimizer.collision.many_points import into, placed
+from optimizer.collision.many_points import chosen, into, placed, pose_columns, turned
 
 
 class PairKind(IntEnum):
@@ -66,7 +66,7 @@ class PairGeometry:
         most = max((len(body.points) for body in bodies), default=0)
         # cores with fewer points repeat their last point
         # the box around a patch of a cloud stands for the patch: its separations are lower bounds
-        self._points = np.array([np.pad(b.points, ((0, most - len(b.points)), (0, 0)), mode="edge") for b in bodies])
+        self._points = np.array([b.points[np.minimum(np.arange(most), len(b.points) - 1)] for b in bodies])
         self._counts = np.array([len(body.points) for body in bodies], dtype=np.intp)
         self._axes = np.array([body.T_link_core[:3, 2] for body in bodies])
         self._disc_radii = np.array([core.disc_radius for core in cores])
@@ -75,6 +75,9 @@ class PairGeometry:
         self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
         self._half_sizes = np.array([np.zeros(3) if core.half_size is None else core.half_size for core in cores])
         self._T_link_core = np.array([body.T_link_core for body in bodies])
+        # ends of segments (2, 3, bodies), and poses of cores (3, 4, bodies)
+        self._ends = np.array([b.points[[0, -1]] for b in bodies]).reshape(-1, 2, 3).transpose(1, 2, 0).copy()
+        self._cores = pose_columns(self._T_link_core.reshape(-1, 4, 4))
         self._radii = np.array([core.radius for core in cores])
         growth = self._radii + np.array([body.margin for body in bodies])
         self._growth = growth[pairs].sum(axis=1)
@@ -108,9 +111,12 @@ class PairGeometry:
         A ball cannot enclose a half-space: its pairs get -inf.
         """
         first, second = self.pairs[pairs].T
-        centres = placed(frames[:, self.links], self._ball_centres)
-        offset = centres[:, second] - centres[:, first]
-        distance = np.sqrt(np.einsum("npi,npi->np", offset, offset))
+        R, origin = frames[..., :3, :3], frames[..., :3, 3]
+        centres = (R[:, self.links] @ self._ball_centres[..., None])[..., 0] + origin[:, self.links]
+        square = 0.0
+        for x in centres.transpose(2, 0, 1):
+            square = square + (x[:, second] - x[:, first]) ** 2
+        distance = np.sqrt(square)
         distance -= self._ball_radii[first] + self._ball_radii[second] + self._growth[pairs]
         distance[:, self._half_space_first[pairs]] = -np.inf
         return np.asarray(distance)
@@ -200,11 +206,10 @@ class PairGeometry:
 
     def _segment_ends(self, frames: Array, configuration: Indices, *bodies: Indices) -> list[Array]:
         """Ends (k, 2, 3) [m] of segments in the base frame, of each of `bodies` (k,)."""
-        if len(configuration) * len(bodies) > len(frames) * len(self.links):
-            # each body is in many pairs: placed once per configuration, not once per pair
-            ends = placed(frames[:, self.links, None], self._points[:, :2])
-            return [ends[configuration, body] for body in bodies]
-        return [placed(frames[configuration, self.links[body], None], self._points[body, :2]) for body in bodies]
+        T = pose_columns(frames)
+        poses = [chosen(T, configuration * frames.shape[1] + self.links[body]) for body in bodies]
+        ends = [placed(pose, chosen(self._ends, body)) for pose, body in zip(poses, bodies, strict=True)]
+        return [each.transpose(2, 0, 1) for each in ends]
 
     def _segment_segment(
         self, frames: Array, configuration: Indices, first: Indices, second: Indices
@@ -215,10 +220,11 @@ class PairGeometry:
     def _box_segment(
         self, frames: Array, configuration: Indices, first: Indices, second: Indices
     ) -> tuple[Array, Array, Array]:
-        T = frames[configuration, self.links[first]] @ self._T_link_core[first]
-        R, (ends,) = T[:, :3, :3], self._segment_ends(frames, configuration, second)
-        distance, normal, point = box_segment(self._half_sizes[first], into(T[:, None], ends))
-        return distance, np.einsum("kij,kj->ki", R, normal), np.einsum("kij,kj->ki", R, point) + T[:, :3, 3]
+        T = pose_columns(frames[configuration, self.links[first]] @ self._T_link_core[first])
+        (ends,) = self._segment_ends(frames, configuration, second)
+        local = into(T, ends.transpose(1, 2, 0)).transpose(2, 0, 1)
+        distance, normal, point = box_segment(self._half_sizes[first], local)
+        return distance, turned(T, normal.T).T, placed(T, point.T).T
 
     def _segment_box(
         self, frames: Array, configuration: Indices, first: Indices, second: Indices

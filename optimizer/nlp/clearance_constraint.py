@@ -18,8 +18,10 @@ RESERVE = 2e-4
 # distance [m] over which a ratio falls from 1 to 0, and the distance above which only a bound of it is computed: the QP
 # leaves out ratios below a half
 SCALE, COUNTED = 0.1, 0.06
-# earlier distances are used as long as they leave open no more than this share of the distances
-FEW = 0.15
+# the ratio above which that of a motion that is checked is exact
+CHECKED = 0.98
+# where earlier distances leave open more than this share of the distances, those of the balls are computed too
+FEW = 0.1
 
 
 @dataclass
@@ -56,8 +58,8 @@ class ClearanceConstraint:
         return (CLEARANCE,) * len(self.pairs)
 
     def ratios(self, frames: Array, q: Array, v: Array) -> Array:
-        """Ratios (n, k)."""
-        return _ratio(self.model.pair_distances(frames, self.pairs, COUNTED).distance)
+        """Ratios (n, k) at consecutive samples of a motion, exact above CHECKED; the others are below it."""
+        return _ratio(self.model.along(q, RESERVE + (1 - CHECKED) * SCALE, self.pairs))
 
     def linearised(self, frames: Array, q: Array, v: Array, wanted: Mask | None = None) -> ConstraintRatios:
         """Ratios with gradients, which are zero for pairs above the distance COUNTED, and for those not `wanted`."""
@@ -74,9 +76,9 @@ class ClearanceConstraint:
     def _pair_distances(self, frames: Array, q: Array) -> PairDistances:
         """Distances at q (n, nq), of which those bounded away from COUNTED by earlier ones are not computed."""
         known = self._reference.bounds(q)
-        if known is not None and np.count_nonzero(known <= COUNTED) <= FEW * known.size:
-            return self.model.pair_distances(frames, self.pairs, COUNTED, known)
-        found = self.model.pair_distances(frames, self.pairs, COUNTED)
+        if known is not None and np.count_nonzero(known <= COUNTED) > FEW * known.size:
+            known = np.maximum(known, self.model.geometry.ball_distances(frames, self.pairs))
+        found = self.model.pair_distances(frames, self.pairs, COUNTED, known)
         self._reference.q, self._reference.distance = q, found.distance
         return found
 

@@ -13,9 +13,10 @@ from optimizer.deadline import NEVER
 from optimizer.kinematics.forward import joint_placements
 from optimizer.kinematics.path_constraints import PathConstraints
 from optimizer.methods.free_spline import FreeSpline
+from optimizer.methods.limit_repair import REPAIR_MARGIN
 from optimizer.methods.method import SolveResult, SolveStatus
 from optimizer.methods.sqp_method import COSTLIER, NO_BETTER
-from optimizer.nlp.clearance_constraint import COUNTED, RESERVE, SCALE, ClearanceConstraint
+from optimizer.nlp.clearance_constraint import CHECKED, COUNTED, RESERVE, SCALE, ClearanceConstraint
 from optimizer.nlp.working_set_qp import NEAR_PATH
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
@@ -123,20 +124,24 @@ def test_gradients_of_the_shares_are_those_of_finite_differences() -> None:
     assert near.sum() > 10
     for j in range(6):
         d = STEP * np.eye(6)[j]
-        by_q = (path.ratios(q + d, v) - path.ratios(q - d, v)) / (2 * STEP)
+        by_q = (path.linearised(q + d, v).value - path.linearised(q - d, v).value) / (2 * STEP)
         np.testing.assert_allclose(found.by_q[near][:, j], by_q[near], atol=GRADIENT_TOLERANCE / SCALE)
 
 
 def test_a_share_is_one_a_reserve_beyond_the_margin() -> None:
     model = CollisionModel(problem_with(HOME, GOAL, scene=Scene((low_post(),))).arm)
     q = np.linspace(HOME, GOAL, 25)
-    shares = every_pair(model).ratios(q, np.zeros_like(q))
     expected = 1 - (model.signed_distances(q)[0] - RESERVE) / SCALE
-    near = expected > COUNTED_SHARE
-    assert 10 < near.sum() < near.size
-    np.testing.assert_allclose(shares[near], expected[near])
-    # of the others only a bound is known, too low for the solver to look at them
-    assert (shares[~near] < NEAR_PATH).all() and (shares >= expected - 1e-12).all()
+    path, v = every_pair(model), np.zeros_like(q)
+    for shares, counted, low in (
+        (path.linearised(q, v).value, COUNTED_SHARE, NEAR_PATH),
+        (path.ratios(q, v), CHECKED, 1 - REPAIR_MARGIN),
+    ):
+        near = expected > counted
+        assert 2 < near.sum() < near.size
+        np.testing.assert_allclose(shares[near], expected[near])
+        # of the others only a bound is known: too low for the solver to look at them, or for a motion to be repaired
+        assert (shares[~near] < low).all() and (shares >= expected - 1e-12).all()
 
 
 @pytest.mark.parametrize("given", [{"tcp_speed": 0.5}, {"elbow_speed": 0.2}])

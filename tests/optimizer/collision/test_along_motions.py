@@ -1,0 +1,54 @@
+"""Distances along motions, which are computed from few samples, against those of every sample."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from models.robot import Array
+from optimizer.collision.clearance_proof import GAP, is_proven_clear, proven_clearance
+from optimizer.collision.model import STRIDE, CollisionModel
+from tests.optimizer.cells import LOADS, arm_in_cell, cell, positions, wander
+
+ROUNDING = 1e-9  # m
+WITHIN = (0.0, 0.03, 0.3)  # m
+
+
+def samples(kind: str, seed: int, count: int) -> Array:
+    """Samples q (count, nq) [rad] of a slow motion, of leaps from anywhere to anywhere, or of one that stands still."""
+    rng = np.random.default_rng(seed)
+    if kind == "leaps":
+        return rng.uniform(-3, 3, (count, 6))
+    if kind == "still":
+        return np.repeat(rng.uniform(-3, 3, (1, 6)), count, axis=0)
+    return positions(wander(seed), np.linspace(0, wander(seed).duration, count))
+
+
+@pytest.mark.parametrize("kind", ["motion", "leaps", "still"])
+@pytest.mark.parametrize("count", [1, 2 * STRIDE, 2 * STRIDE + 1, 3 * STRIDE + 1, 5 * STRIDE - 1, 97])
+def test_distances_along_a_motion(kind: str, count: int) -> None:
+    model = CollisionModel(arm_in_cell(LOADS[1]))
+    q = samples(kind, count, count)
+    exact = model.signed_distances(q)[0]
+    pairs = np.arange(0, len(model.pairs), 3)
+    for within in WITHIN:
+        found = model.along(q, within)
+        assert (found <= exact + ROUNDING).all(), "lower bounds"
+        is_near = exact <= within
+        assert is_near.any() or within < WITHIN[-1]
+        assert found[is_near] == pytest.approx(exact[is_near], abs=ROUNDING)
+        assert (found[~is_near] > within).all()
+        some = model.along(q, within, pairs)
+        assert (some <= exact[:, pairs] + ROUNDING).all() and ((some <= within) == is_near[:, pairs]).all()
+
+
+def test_what_is_proven_clear_is_certified() -> None:
+    """And what is not, has no proven clearance that is worth mentioning."""
+    clear = 0
+    for seed in range(60):
+        model = CollisionModel(arm_in_cell(LOADS[0], cell(seed)))
+        proof, is_clear = proven_clearance(model, wander(seed)), is_proven_clear(model, wander(seed))
+        assert proof is not None
+        clear += is_clear
+        assert proof.min_clearance >= 0 if is_clear else proof.min_clearance < 2 * GAP
+    assert 3 < clear < 57
