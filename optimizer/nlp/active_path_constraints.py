@@ -30,13 +30,16 @@ class PathConstraintValues:
 
 
 @dataclass(frozen=True)
-class ActivePathConstraints:
-    """Constraints near their bounds: path point and column (rows,), slack (rows,), gradients (rows, n) by (s, T)."""
+class NearPathConstraints:
+    """Constraints near their bounds: path point and column (rows,), ratio and slack (rows,)."""
 
     points: Index
     columns: Index
+    ratio: Array
     slack: Array
-    gradients: Array
+
+    def __getitem__(self, chosen: Index) -> NearPathConstraints:
+        return NearPathConstraints(self.points[chosen], self.columns[chosen], self.ratio[chosen], self.slack[chosen])
 
 
 @dataclass(frozen=True)
@@ -72,20 +75,32 @@ class PathConstraintRows:
         q, v = self.coordinates.to_joints(s), rising @ self.coordinates.directions.T / T
         return PathConstraintValues(q, v, self.constraints.linearised(q, v))
 
-    def active(self, values: PathConstraintValues, T: float, near: float) -> ActivePathConstraints:
+    def near(self, values: PathConstraintValues, near: float) -> NearPathConstraints:
         """The constraints whose ratio exceeds `near` times its bound."""
+        ratio = values.ratios.value
+        k, c = np.unravel_index(np.flatnonzero(ratio > near * self.bounds), ratio.shape)
+        found = ratio[k, c]
+        return NearPathConstraints(k, c, found, self.bounds[c] - found)
+
+    def gradients(self, values: PathConstraintValues, T: float, of: NearPathConstraints) -> Array:
+        """Gradients (rows, n) by (s, T) of some constraints."""
         if self.constraints is None:
-            none = np.zeros(0, dtype=np.intp)
-            return ActivePathConstraints(none, none, np.zeros(0), np.zeros((0, self.n)))
-        ratios = values.ratios
-        k, c = np.nonzero(ratios.value > near * self.bounds)
-        by_q, by_v = ratios.by_q[k, c], ratios.by_v[k, c]
+            return np.zeros((0, self.n))
+        k, c = of.points, of.columns
+        by_q, by_v = values.ratios.by_q[k, c], values.ratios.by_v[k, c]
         at, rising = self.at_path_free[:, k, :, None]
         P = self.coordinates.directions
         by_points = at * (by_q @ P)[:, None] + rising * (by_v @ P / T)[:, None]
         by_time = -np.einsum("rj,rj->r", by_v, values.v[k]) / T
-        gradients = np.hstack([by_points.reshape(len(k), self.n - 1), by_time[:, None]])
-        return ActivePathConstraints(k, c, self.bounds[c] - ratios.value[k, c], gradients)
+        return np.hstack([by_points.reshape(len(k), self.n - 1), by_time[:, None]])
+
+    def changes(self, values: PathConstraintValues, T: float, of: NearPathConstraints, ds: Array, dT: float) -> Array:
+        """Changes (rows,) of some ratios to first order: their gradients times a step ds (m, r), dT [s]."""
+        k, c = of.points, of.columns
+        dq, rising = self.at_path_free @ ds @ self.coordinates.directions.T
+        dv = (rising - values.v * dT) / T
+        ratios = values.ratios
+        return np.asarray((ratios.by_q[k, c] * dq[k]).sum(axis=1) + (ratios.by_v[k, c] * dv[k]).sum(axis=1))
 
     def hessian(self, values: PathConstraintValues, T: float, weights: Array) -> Array:
         """Hessian (n, n) of Σ weights · ratios, weights (M, c), by finite differences of the ratios' gradients."""

@@ -45,6 +45,7 @@ class QPRows:
 
     `hard` rows are never relaxed. `chosen` (3, r, M) marks the grid points with a kinematic row, `places` lists them,
     and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the lower and upper bounds with a row.
+    `passed` (point, column) lists the path constraints with a row, and `path` is the row of each.
     """
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
@@ -58,7 +59,8 @@ class QPRows:
         none = np.zeros(0, dtype=int)
         self.places: Places = (none, none, none)
         self.sides: tuple[Index, Index] = (none, none)
-        self.kinematic, self.bounds = none, none
+        self.passed: tuple[Index, Index] = (none, none)
+        self.kinematic, self.bounds, self.path = none, none, none
         self._identity = np.eye(whitening.shape[1])
 
     def add(
@@ -103,6 +105,11 @@ class QPRows:
         self.kinematic = np.concatenate([self.kinematic, self.add(gradients, most, active=active)])
         self.places = _joined(self.places, places)
         self.chosen[places] = True
+
+    def add_path(self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask) -> None:
+        """Add the rows of path constraints that have none yet; see `add`."""
+        self.path = np.concatenate([self.path, self.add(gradients, slack, active=active)])
+        self.passed = _joined(self.passed, passed)
 
     def add_bounds(self, bounds: Array, wanted: Mask) -> None:
         """Add the `wanted` (2, n) lower and upper bounds of variables, if they have no row yet."""

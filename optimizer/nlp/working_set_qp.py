@@ -2,20 +2,19 @@
 
 Speed, acceleration and jerk are limited at every point of a fine grid. Only their peaks, and the anchors of the basis,
 enter the QP when they come near a limit. If its step breaks a limit at another point, or a bound of a variable, this is
-added and the QP is solved again.
+added and the QP is solved again. Clearances are hundreds, and two or three of them hold a motion: they enter likewise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
 
 import numpy as np
 
 from models.robot import Array, Mask
 from optimizer.deadline import checkpoint
-from optimizer.nlp.active_path_constraints import ActivePathConstraints, Index, PathConstraintValues
+from optimizer.nlp.active_path_constraints import Index, NearPathConstraints, PathConstraintValues
 from optimizer.nlp.nonlinear_program import FEASIBILITY, Linearisation, NonlinearProgram
 from optimizer.nlp.qp_rows import Places, QPRows
 
@@ -23,6 +22,8 @@ from optimizer.nlp.qp_rows import Places, QPRows
 NEAR = 0.6
 NEAR_TORQUE = 0.5
 NEAR_PATH = 0.5
+# clearances enter above this ratio, or if they were active in the QP before; above NEAR_PATH once a step breaks them
+NEAR_CLEARANCE = 0.9
 # no coordinate of a control point moves further in one step [rad]
 STEP = 1.5
 # solves of a QP, each with the constraints that the step before would break. What the last one breaks enters the QP of
@@ -83,15 +84,6 @@ class _TorqueRows:
     slack: Array
 
 
-@dataclass(frozen=True)
-class _GoalRows:
-    """least ≤ gradients (c, n) · x ≤ most: how the goal may move."""
-
-    gradients: Array
-    least: Array
-    most: Array
-
-
 class WorkingSetQP:
     """The QPs of one run of the SQP; it keeps the constraints that were active, for the next one.
 
@@ -109,6 +101,7 @@ class WorkingSetQP:
         self._orders = np.arange(1, 4)
         self._active = np.zeros((3, program.r, basis.at_grid.shape[1]), dtype=bool)
         self._bounded = np.zeros((2, self.n), dtype=bool)
+        self._passed = np.zeros((len(basis.at_path[0]), len(program.path_bounds)), dtype=bool)
 
     def rates(self, T: float) -> Array:
         """Limits on the first to third derivative of s by τ, (3, r), for the duration T [s]."""
@@ -116,9 +109,12 @@ class WorkingSetQP:
 
     def solve(self, at: QPInputs, rounds: int) -> QPStep | None:
         """The step; None if even the relaxed QP has no solution."""
-        goal, torque = self._goal_rows(at.free), self._torque_rows(at)
-        path = self.p.path_rows.active(at.path_values, at.T, NEAR_PATH)
-        rows, bounds = self._rows(at, goal, torque, path), np.array(self._bounds(at.free, at.T))
+        torque = self._torque_rows(at)
+        rows, bounds = QPRows(at.whitening, at.ratio.shape), np.array(self._bounds(at.free, at.T))
+        self._add_goal(rows, at.free)
+        path = self._first_path_rows(rows, at)
+        limited = rows.add(torque.gradients, torque.slack)
+        self._add_kinematic(rows, at)
         rows.add_bounds(bounds, self._bounded)
         gradient, relaxed, attempt, last = at.gradient @ at.whitening, False, 0, rounds
         while True:
@@ -134,17 +130,22 @@ class WorkingSetQP:
                 relaxed = True
                 last = attempt + (RELAXED_ROUNDS if self.p.has_clearance else rounds)
                 rows.add_bounds(bounds, np.ones_like(rows.bounded))
+                path = self._add_path(rows, at, path, np.ones(len(path.slack), dtype=bool))
                 continue
             x = at.whitening @ y
-            if attempt >= last or not self._add_broken(rows, at, bounds, x):
+            if attempt >= last:
+                break
+            if self._adds_bounds(rows, bounds, x):
+                continue
+            adds_rates, (adds_path, path) = self._adds_rates(rows, at, x), self._adds_path(rows, at, path, x)
+            if not (adds_rates or adds_path):
                 break
         mu = np.maximum(multipliers, 0.0)
-        _, mu_path, mu_torque = _parts(mu, (len(goal.least), len(path.slack), len(torque.slack)))
         self._keep(rows, mu)
         pull = multipliers @ np.concatenate(rows.gradients) if self.p.held else np.zeros(self.n)
         return QPStep(
             _shortened(x, bounds), relaxed, rows.places, mu[rows.kinematic],
-            torque.nodes, torque.signs, mu_torque, (path.points, path.columns), mu_path, pull,
+            torque.nodes, torque.signs, mu[limited], rows.passed, mu[rows.path], pull,
         )  # fmt: skip
 
     def _keep(self, rows: QPRows, mu: Array) -> None:
@@ -152,23 +153,48 @@ class WorkingSetQP:
         for marks, places, numbers in (
             (self._active, rows.places, rows.kinematic),
             (self._bounded, rows.sides, rows.bounds),
+            (self._passed, rows.passed, rows.path),
         ):
             marks[...] = False
             marks[places] = mu[numbers] > 0
 
-    def _rows(self, at: QPInputs, goal: _GoalRows, torque: _TorqueRows, path: ActivePathConstraints) -> QPRows:
-        """The rows that the QP is first solved with, but for bounds: goal, path, torque, kinematic."""
+    def _first_path_rows(self, rows: QPRows, at: QPInputs) -> NearPathConstraints:
+        """Adds the path constraints that the QP is first solved with, and returns the others that are near."""
+        near = self.p.path_rows.near(at.path_values, NEAR_PATH)
+        at_once = np.ones(len(near.slack), dtype=bool)
+        if self.p.has_clearance:
+            at_once = (near.ratio > NEAR_CLEARANCE * (near.ratio + near.slack)) | self._passed[
+                near.points, near.columns
+            ]
+        return self._add_path(rows, at, near, at_once)
+
+    def _add_path(self, rows: QPRows, at: QPInputs, near: NearPathConstraints, wanted: Mask) -> NearPathConstraints:
+        """Adds those of the path constraints that are `wanted`, and returns the others."""
+        added = near[np.flatnonzero(wanted)]
+        passed = added.points, added.columns
+        gradients = self._scaled(self.p.path_rows.gradients(at.path_values, at.T, added))
+        rows.add_path(gradients, added.slack, passed, self._passed[passed])
+        return near[np.flatnonzero(~wanted)]
+
+    def _adds_path(
+        self, rows: QPRows, at: QPInputs, near: NearPathConstraints, x: Array
+    ) -> tuple[bool, NearPathConstraints]:
+        """Whether the step x breaks any of the path constraints without a row, which it then gets; and the others."""
+        if not len(near.slack):
+            return False, near
+        dT = float(x[-1]) * self.time_scale if self.free_time else 0.0
+        ds = x[: self.count].reshape(at.free.shape)
+        broken = self.p.path_rows.changes(at.path_values, at.T, near, ds, dT) > near.slack + FEASIBILITY / 4
+        return bool(broken.any()), self._add_path(rows, at, near, broken)
+
+    def _add_kinematic(self, rows: QPRows, at: QPInputs) -> None:
+        """Adds the limits on rates that the QP is first solved with."""
         chosen = self._active.copy()
         chosen[self._worst(at.ratio, np.full(3, NEAR))] = True
         places = _places(chosen)
         value = at.ratio[places]
-        rows = QPRows(at.whitening, at.ratio.shape)
-        rows.add(goal.gradients, goal.most, goal.least, hard=True)
-        rows.add(self._scaled(path.gradients), path.slack)
-        rows.add(torque.gradients, torque.slack)
         gradients = self._kinematic_rows(places, np.sign(value), at.T)
         rows.add_kinematic(gradients, 1 - np.abs(value), places, active=self._active[places])
-        return rows
 
     def _worst(self, ratio: Array, above: Array) -> Places:
         """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of its derivative (3,).
@@ -181,12 +207,18 @@ class WorkingSetQP:
         k, grid = np.nonzero((size > above[d, None]) & (self._anchors[d] | _peaks(size)))
         return d[k], j[k], grid
 
-    def _add_broken(self, rows: QPRows, at: QPInputs, bounds: Array, x: Array) -> bool:
-        """Add all bounds if the step x breaks one, else the peaks above a limit after it; whether any were added."""
-        if not rows.bounded.all() and ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any():
-            # all of them, and no peaks yet: a step without bounds may be so long that it breaks every limit
-            rows.add_bounds(bounds, np.ones_like(rows.bounded))
-            return True
+    def _adds_bounds(self, rows: QPRows, bounds: Array, x: Array) -> bool:
+        """Whether the step x breaks a bound without a row: then all get theirs.
+
+        A step without bounds may be so long that it breaks every limit.
+        """
+        if rows.bounded.all() or not ((bounds[0] - x > BOUND_TOLERANCE) | (x - bounds[1] > BOUND_TOLERANCE)).any():
+            return False
+        rows.add_bounds(bounds, np.ones_like(rows.bounded))
+        return True
+
+    def _adds_rates(self, rows: QPRows, at: QPInputs, x: Array) -> bool:
+        """Whether the step x breaks limits on rates without a row: then their peaks get theirs."""
         change = x[: self.count].reshape(at.free.shape).T / self.rates(at.T)[:, :, None]
         predicted = change @ self._grid_free.swapaxes(1, 2)
         predicted += at.ratio
@@ -245,21 +277,15 @@ class WorkingSetQP:
             upper = np.append(upper, min(p.t_max - T, T) / self.time_scale)
         return lower, upper
 
-    def _goal_rows(self, free: Array) -> _GoalRows:
-        """The goal constraints as bounds on the change of the goal; no rows if the goal is fixed."""
+    def _add_goal(self, rows: QPRows, free: Array) -> None:
+        """Adds the goal constraints as bounds on the change of the goal; no rows if the goal is fixed."""
         constraints = self.p.goal_constraints
         if constraints is None:
-            return _GoalRows(np.zeros((0, self.n)), np.zeros(0), np.zeros(0))
+            return
         A = np.zeros((len(constraints.rows), self.n))
         A[:, self.count - self.p.r : self.count] = constraints.rows
         moved = constraints.rows @ (free[-1] - self.p.coordinates.goal)
-        return _GoalRows(A, constraints.lower - moved, constraints.upper - moved)
-
-
-def _parts(mu: Array, counts: tuple[int, ...]) -> list[Array]:
-    """The first parts of mu, of these lengths."""
-    ends = list(accumulate(counts, initial=0))
-    return [mu[first:last] for first, last in pairwise(ends)]
+        rows.add(A, constraints.upper - moved, constraints.lower - moved, hard=True)
 
 
 def _shortened(x: Array, bounds: Array) -> Array:

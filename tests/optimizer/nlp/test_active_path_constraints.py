@@ -56,8 +56,8 @@ class Case:
     def gradients(self, x: Array) -> Array:
         """Gradients of every ratio (M · c, n), in the order of `values`."""
         T = float(x[-1])
-        active = self.rows.active(self.rows.values(self.all_points(x), T), T, near=-np.inf)
-        return active.gradients
+        values = self.rows.values(self.all_points(x), T)
+        return self.rows.gradients(values, T, self.rows.near(values, -np.inf))
 
 
 @pytest.fixture(params=["joints", "line"])
@@ -92,10 +92,20 @@ def test_only_ratios_near_their_bounds_are_active(case: Case) -> None:
     T = float(case.x[-1])
     values = case.rows.values(case.all_points(case.x), T)
     near = float(np.median(values.ratios.value))
-    active = case.rows.active(values, T, near)
+    found = case.rows.near(values, near)
     expected = np.argwhere(values.ratios.value > near)
-    assert np.stack([active.points, active.columns], axis=1).tolist() == expected.tolist()
-    assert active.slack == pytest.approx(1 - values.ratios.value[tuple(expected.T)])
+    assert np.stack([found.points, found.columns], axis=1).tolist() == expected.tolist()
+    assert found.ratio == pytest.approx(values.ratios.value[tuple(expected.T)])
+    assert found.slack == pytest.approx(1 - found.ratio)
+
+
+def test_changes_are_gradients_times_steps(case: Case) -> None:
+    T = float(case.x[-1])
+    values = case.rows.values(case.all_points(case.x), T)
+    found = case.rows.near(values, float(np.median(values.ratios.value)))
+    step = np.random.default_rng(8).normal(size=case.rows.n)
+    changes = case.rows.changes(values, T, found, step[:-1].reshape(-1, case.coordinates.r), float(step[-1]))
+    assert changes == pytest.approx(case.rows.gradients(values, T, found) @ step, rel=1e-9, abs=1e-9)
 
 
 def test_without_constraints_there_are_no_rows() -> None:
@@ -104,5 +114,5 @@ def test_without_constraints_there_are_no_rows() -> None:
     rows = PathConstraintRows(None, np.zeros(0), coordinates, none, none[..., SPACE.free])
     values = rows.values(np.zeros((SPACE.n, 6)), 1.0)
     assert values.ratios.value.shape == (0, 0)
-    assert rows.active(values, 1.0, 0.5).gradients.shape == (0, rows.n)
+    assert rows.gradients(values, 1.0, rows.near(values, 0.5)).shape == (0, rows.n)
     assert not rows.hessian(values, 1.0, np.zeros((0, 0))).any()
