@@ -184,12 +184,14 @@ class CollisionModel:
             return []
         frames = self.frames(np.asarray(q))
         # configurations that differ by full turns have the same frames: each set of frames is computed once
-        rounded = (np.round(frames[:, 1:, :3], 9) + 0.0).reshape(len(frames), -1)
-        _, distinct, which = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        rounded = np.round(frames[:, 1:, :3], 9) + 0.0
+        rows: dict[bytes, int] = {}
+        which = [rows.setdefault(each.tobytes(), len(rows)) for each in rounded]
+        distinct = np.unique(which, return_index=True)[1]
         distance = self.pair_distances(frames[distinct], within=within).distance
         closest = distance.argmin(axis=1)
         found = [ClosestPair(self.names(int(k)), float(d[k])) for k, d in zip(closest, distance, strict=True)]
-        return [found[k] for k in which.ravel()]
+        return [found[k] for k in which]
 
     def nearest_points(self, frames: Array, pair: int) -> tuple[list[float], list[float]]:
         """The nearest points [m] of a pair on the surfaces of its first and second body, without margins, at the frames

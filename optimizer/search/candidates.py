@@ -47,7 +47,7 @@ class Reason(Enum):
     NOT_CONFIRMED = "the certificate did not confirm it"
 
 
-@dataclass
+@dataclass(slots=True)
 class Candidate:
     """A start and goal configuration with the state of their search; `energy` [J] is the exact value of the objective.
 
@@ -97,18 +97,18 @@ class Candidate:
     def report(self) -> CandidateReport:
         """The candidate as the answer reports it."""
         return CandidateReport(
-            start=self.start.label,
-            goal=self.goal.label,
-            q_start=self.q_start,
-            q_goal=self.q_goal,
-            status=self.status,
-            reason=self.message,
-            lower_bound=self.lower_bound,
-            energy=self.energy,
-            duration=None if self.energy is None else self.duration,
-            start_target=self.start.target,
-            goal_target=self.goal.target,
-            tried=self.attempt is not None or self.status is CandidateStatus.FAILED,
+            self.start.label,
+            self.goal.label,
+            self.q_start,
+            self.q_goal,
+            self.status,
+            self.message,
+            self.lower_bound,
+            self.energy,
+            None if self.energy is None else self.duration,
+            self.start.target,
+            self.goal.target,
+            self.attempt is not None or self.status is CandidateStatus.FAILED,
         )
 
 
@@ -200,7 +200,9 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: S
         "goal": _Ends.of([each.goal for each in candidates]),
     }
     levels = np.array([sides[name].potential(prepared) for name in SIDES]).T
-    q_start, q_goal = (np.array([getattr(each, name) for each in candidates]) for name in ("q_start", "q_goal"))
+    # joining takes half the time of making an array of arrays
+    q_start = np.concatenate([each.q_start for each in candidates]).reshape(len(candidates), -1)
+    q_goal = np.concatenate([each.q_goal for each in candidates]).reshape(len(candidates), -1)
     hold = prepared.holding_power(q_goal) if prepared.problem.cycle else None
     bounds, shortest = lower_bounds(prepared, q_goal - q_start, levels[:, 1] - levels[:, 0], hold)
     if prepared.problem.objective == "mechanical":
@@ -230,9 +232,10 @@ class _Ends:
     @classmethod
     def of(cls, ends: Sequence[EndConfiguration]) -> _Ends:
         """From the end of each candidate."""
-        known = {id(end): end for end in ends}
-        row = {key: k for k, key in enumerate(known)}
-        return cls(list(known.values()), np.array([row[id(end)] for end in ends]))
+        _, first, rows = np.unique(list(map(id, ends)), return_index=True, return_inverse=True)
+        # in the order in which they come
+        order = np.argsort(first)
+        return cls([ends[k] for k in first[order].tolist()], np.argsort(order)[rows])
 
     @property
     def q(self) -> Array:
