@@ -13,7 +13,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.collision.bodies import Body, Indices
-from optimizer.collision.many_points import chosen, into, placed, pose_columns
+from optimizer.collision.many_points import into, picked, placed, pose_columns
 
 # beads of a body
 COUNT = 4
@@ -51,18 +51,18 @@ class Beads:
         configuration, pair = configuration[bounded], pair[bounded]
         formed, beaded = self._formed[pair], self._beaded[pair]
         T, links = pose_columns(frames), frames.shape[1]
-        points = placed(chosen(T, configuration * links + self._links[beaded]), chosen(self._centres, beaded))
+        points = placed(picked(T, configuration * links + self._links[beaded]), picked(self._centres, beaded))
         # obstacles are in the frame of the base, which most pairs need no step into
         moving = np.flatnonzero(self._links[formed] > 0)
         if moving.size:
-            T_moving = chosen(T, configuration[moving] * links + self._links[formed[moving]])
+            T_moving = picked(T, configuration[moving] * links + self._links[formed[moving]])
             points[..., moving] = into(T_moving, points[..., moving])
-        local = np.abs(into(chosen(self._T_core, formed), points))
+        local = np.abs(into(picked(self._T_core, formed), points))
         is_round = np.flatnonzero(self._round[formed])
         if is_round.size:
             local[:, 0, is_round] = np.hypot(local[:, 0, is_round], local[:, 1, is_round])
             local[:, 1, is_round] = 0.0
-        outside = np.maximum(local - chosen(self._half_sizes, formed), 0.0)
+        outside = np.maximum(local - picked(self._half_sizes, formed), 0.0)
         square = (outside[:, 0] ** 2 + outside[:, 1] ** 2 + outside[:, 2] ** 2).min(axis=0)
         bound = np.sqrt(square) - self._radii[beaded]
         result[bounded] = np.where(bound > 0, bound, -np.inf)

@@ -166,14 +166,13 @@ class _Proof:
         instants = self.instants(t)
         n, p = len(t), len(self.model.pairs)
         # those of half-spaces, which no ball encloses, are exact
-        ball_distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
-        self.sample_normals(instants, np.arange(n), ball_distances.argmin(axis=1), np.full(n, -1))
+        distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
+        self.sample_normals(instants, np.arange(n), distances.argmin(axis=1), np.full(n, -1))
         v, _, h = self.rate_bounds(t[:-1], t[1:])
         travel = (v * h[:, None]) @ self.levers.T
-        is_open = self.may_be_closest(ball_distances, travel)
+        is_open = self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
         beads = self.geometry.bead_distances(instants.frames, instant, pair)
-        distances = ball_distances
         distances[instant, pair] = np.maximum(distances[instant, pair], beads)
         is_open &= self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))

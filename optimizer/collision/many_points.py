@@ -17,7 +17,7 @@ def pose_columns(T: Array) -> Array:
     return np.ascontiguousarray(T[..., :3, :].reshape(-1, 12).T).reshape(3, 4, -1)
 
 
-def chosen(columns: Array, k: Indices) -> Array:
+def picked(columns: Array, k: Indices) -> Array:
     """Some of the columns (..., n)."""
     return columns.take(k, axis=-1)
 

@@ -19,7 +19,7 @@ from optimizer.collision.bodies import Body, Indices
 from optimizer.collision.closed_form_distance import box_segment, segment_segment
 from optimizer.collision.cloud_pairs import CloudPairs
 from optimizer.collision.coal_distance import ConvexPairs
-from optimizer.collision.many_points import chosen, into, placed, pose_columns, turned
+from optimizer.collision.many_points import into, picked, placed, pose_columns, turned
 
 
 class PairKind(IntEnum):
@@ -75,9 +75,8 @@ class PairGeometry:
         self.links: Indices = np.array([body.link for body in bodies], dtype=np.intp)
         self._half_sizes = np.array([np.zeros(3) if core.half_size is None else core.half_size for core in cores])
         self._T_link_core = np.array([body.T_link_core for body in bodies])
-        # ends of segments (2, 3, bodies), and poses of cores (3, 4, bodies)
+        # ends of segments (2, 3, bodies)
         self._ends = np.array([b.points[[0, -1]] for b in bodies]).reshape(-1, 2, 3).transpose(1, 2, 0).copy()
-        self._cores = pose_columns(self._T_link_core.reshape(-1, 4, 4))
         self._radii = np.array([core.radius for core in cores])
         growth = self._radii + np.array([body.margin for body in bodies])
         self._growth = growth[pairs].sum(axis=1)
@@ -207,8 +206,8 @@ class PairGeometry:
     def _segment_ends(self, frames: Array, configuration: Indices, *bodies: Indices) -> list[Array]:
         """Ends (k, 2, 3) [m] of segments in the base frame, of each of `bodies` (k,)."""
         T = pose_columns(frames)
-        poses = [chosen(T, configuration * frames.shape[1] + self.links[body]) for body in bodies]
-        ends = [placed(pose, chosen(self._ends, body)) for pose, body in zip(poses, bodies, strict=True)]
+        poses = [picked(T, configuration * frames.shape[1] + self.links[body]) for body in bodies]
+        ends = [placed(pose, picked(self._ends, body)) for pose, body in zip(poses, bodies, strict=True)]
         return [each.transpose(2, 0, 1) for each in ends]
 
     def _segment_segment(
