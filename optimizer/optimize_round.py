@@ -168,7 +168,7 @@ def _best_of(search: RoundSearch) -> _Found:
         return _in_time(search, asked.duration_max, None)
     nodes = search.run()
     # what passes has the round with rests instead
-    greedy = None if asked.passes else move_by_move(search)
+    greedy = move_by_move(search) if asked.compared and not asked.passes else None
     if greedy is not None and search.cost(greedy) < search.cost(nodes):
         # by what the search could not tell apart: motions that were not yet optimised to the end
         nodes = greedy
@@ -205,7 +205,7 @@ def _as_stopping(search: RoundSearch, rested: Rested, better: bool = True) -> _F
 
 def _baselines(search: RoundSearch, found: _Found, ours: Needed) -> list[RoundBaseline]:
     """The round in other ways, as far as they are known."""
-    if search.asked.passes:
+    if search.asked.passes or not search.asked.compared:
         return []
     nodes, timing = found.nodes, found.timing
     compared = [

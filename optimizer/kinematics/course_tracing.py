@@ -78,10 +78,30 @@ def traces(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:
     """
     if course.free_start and course.turning is None:
         return _evenly_turned(arm, course, q_start)
-    found = _traces(arm, [course], q_start)
-    if course.path.about is None or course.turning is not None:
-        return found
-    return [each if each.obstacle is None else with_turning(arm, course, each) for each in found]
+    return _turned_where_needed(arm, [course], _traces(arm, [course], q_start))
+
+
+def traces_of_each(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> list[Trace]:
+    """`traces` of courses whose ends are given in full, each from its own configuration q_start (n, nq) [rad].
+
+    Courses of one shape, which may be turned about the path's free axis, are followed together.
+    """
+    found, left = dict[int, Trace](), list(range(len(courses)))
+    while left:
+        own = [k for k in left if courses[k].has_shape_of(courses[left[0]])]
+        some = [courses[k] for k in own]
+        found |= zip(own, _turned_where_needed(arm, some, _traces(arm, some, q_start[own])), strict=True)
+        left = [k for k in left if k not in found]
+    return [found[k] for k in range(len(courses))]
+
+
+def _turned_where_needed(arm: Arm, courses: Sequence[ToolCourse], found: Sequence[Trace]) -> list[Trace]:
+    """What was found of one course or of one each, with a turning where that is allowed and nothing else leads on."""
+    own = list(courses) * len(found) if len(courses) == 1 else courses
+    return [
+        with_turning(arm, course, each) if each.obstacle and course.path.about and course.turning is None else each
+        for course, each in zip(own, found, strict=True)
+    ]
 
 
 def _evenly_turned(arm: Arm, course: ToolCourse, q_start: Array) -> list[Trace]:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.course_matching import matched
 from optimizer.kinematics.course_shapes import Shape, shape_of
 from optimizer.kinematics.orientation_tolerance import nearest_orientation
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
@@ -20,14 +21,10 @@ from optimizer.problem.tool_path import SAME_POSE, TURNING, ToolPath
 # poses of the course that a motion is compared with, on each piece of its shape at least, and the way between two [m]
 # at most
 COMPARED, STEP = 100, 0.002
-# a pose is looked for so many times as far ahead on the course as the motion and its tolerances reach
-AHEAD = 2.0
 # how much of the length of a course by distance its turns are counted as
 TURNS = 1e-3
 # fractions of a course that differ by less are the same
 SAME_FRACTION = 1e-9
-# m²: two poses of the course that are nearer are the same
-TINY = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +112,13 @@ class ToolCourse:
                 "nothing between them for path.speed.min.",
             )
 
+    def has_shape_of(self, other: ToolCourse) -> bool:
+        """Whether the pieces of both courses are as long, and they follow the same part of them."""
+        own, others = self.shape.pieces, other.shape.pieces
+        same = len(own) == len(others) and np.abs(own - others).max() <= SAME_FRACTION * own[-1]
+        section = (self.first, self.last) == (other.first, other.last)
+        return bool(same and section and self.by_distance is None and other.by_distance is None)
+
     def poses(self, fraction: Array) -> Array:
         """T_base_tcp (k, 4, 4) at fractions (k,) of the way."""
         fraction = np.clip(np.asarray(fraction, dtype=float), 0.0, 1.0)
@@ -150,10 +154,11 @@ class ToolCourse:
         """
         at = self.grid(COMPARED, STEP)
         known = self._embedded(self.poses(at))
-        best, left_out, rest = self._matched(at, known, self._embedded(T))
+        reach = self.path.position_tolerance + TURNING * self.path.rotation_tolerance
+        best, left_out, rest = matched(at, known, self._embedded(T), reach)
         position, rotation = self._apart(T, self.poses(best))
         position, rotation = position + left_out, rotation + left_out / TURNING
-        if rest > self.path.position_tolerance + TURNING * self.path.rotation_tolerance:
+        if rest > reach:
             return np.full_like(position, np.inf), np.full_like(rotation, np.inf)
         return position, rotation
 
@@ -175,36 +180,6 @@ class ToolCourse:
             for a, b in pairwise([0.0, *inside.tolist(), 1.0])
         ]
         return np.append(np.concatenate(pieces), 1.0)
-
-    def _matched(self, at: Array, known: Array, asked: Array) -> tuple[Array, Array, float]:
-        """Fractions (k,) of the way that are compared with a motion; what is left out before each (k,) [m], and after
-        the last [m].
-
-        `known` (m, d) are the poses at fractions `at` (m,), `asked` (k, d) those of the motion. Of the points that
-        are not too far ahead, the one is taken that is least off, with what it leaves out.
-        """
-        chords = np.diff(known, axis=0)
-        squares = (chords**2).sum(axis=1)
-        gone = np.concatenate([[0.0], np.cumsum(np.sqrt(squares))])
-        reach = AHEAD * (self.path.position_tolerance + TURNING * self.path.rotation_tolerance)
-        moved = np.linalg.norm(np.diff(asked, axis=0, prepend=asked[:1]), axis=1)
-        best, left_out = np.empty(len(asked)), np.empty(len(asked))
-        here, length, point = 0, 0.0, known[0]
-        for k, pose in enumerate(asked):
-            last = int(np.searchsorted(gone, length + AHEAD * moved[k] + reach))
-            cells = slice(max(here - 1, 0), min(last, len(chords)))
-            # where the course turns back, two of its points may be the same
-            share = np.clip(
-                ((pose - known[cells]) * chords[cells]).sum(axis=1) / np.maximum(squares[cells], TINY), 0.0, 1.0
-            )
-            points = known[cells] + share[:, None] * chords[cells]
-            lengths = gone[cells] + share * np.sqrt(squares[cells])
-            apart = ((points - point) ** 2).sum(axis=1)
-            skipped = np.sqrt(np.maximum((lengths - length) ** 2 - apart, 0.0)) / 2
-            nearest = int((np.linalg.norm(pose - points, axis=1) + skipped).argmin())
-            here, length, point = cells.start + nearest, float(lengths[nearest]), points[nearest]
-            best[k], left_out[k] = at[here] + share[nearest] * (at[here + 1] - at[here]), skipped[nearest]
-        return best, left_out, float(gone[-1] - length)
 
     def _apart(self, T: Array, others: Array) -> tuple[Array, Array]:
         """Distances (k,) [m] and angles (k,) [rad] between poses (k, 4, 4)."""

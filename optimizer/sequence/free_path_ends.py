@@ -25,6 +25,7 @@ from optimizer.problem.stops import Stop
 from optimizer.problem.targets import AnyOf
 from optimizer.problem.work_round import WorkRound
 from optimizer.sequence.known_motions import knowing, known_motions
+from optimizer.sequence.round_baselines import compared_again
 from optimizer.sequence.round_search import LEAST_TIME
 from optimizer.sequence.round_solution import Move, RoundSolution
 
@@ -55,19 +56,29 @@ def with_free_ends(asked: WorkRound, search: Search, clock: Clock) -> RoundSolut
             best = search(first)
         except NoReachableTarget as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
-        found_at = _found_at(best, tried)
+        found_at, compared = _found_at(best, tried), best.baselines
         for k, step in enumerate(STEPS):
             if end.left < LEAST_TIME:
                 break
             tried = {name: _near(free[name], angles, step) for name, angles in found_at.items()}
             # in too short a time there may be none
             with suppress(JoulepathError):
-                found = search(replace(_at(asked, tried), deadline=end.left / (len(STEPS) - k)))
+                near = replace(_at(asked, tried), deadline=end.left / (len(STEPS) - k))
+                found = search(replace(near, compared=not _is_compared_once(asked)))
                 if found.needed.of(asked.objective) < best.needed.of(asked.objective):
                     # the bound of the first round is that of all angles
                     best, found_at = replace(found, lower_bound=best.lower_bound), _found_at(found, tried)
+    if _is_compared_once(asked):
+        best = replace(best, baselines=[compared_again(asked, each, best.needed) for each in compared])
     places = {place for stop in free.values() for place in stop.places}
     return replace(best, moves=[_of_one_target(move, places) for move in best.moves])
+
+
+def _is_compared_once(asked: WorkRound) -> bool:
+    """Whether other ways to go round do not depend on the angles near the best ones: they are those at angles all
+    around."""
+    plain = asked.order is None and asked.any_time and not asked.passes
+    return plain and asked.arm.bus.mode != "storage"
 
 
 def _all_around(stop: Stop) -> list[Angles]:

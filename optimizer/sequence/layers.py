@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from models.robot import Array
 from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.course_tracing import Trace
 from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
@@ -29,7 +30,8 @@ MOST_NODES = 20_000
 class Layer:
     """Configurations `q` (n, nq) [rad] of one stop. Each is one of `ends`, `end` (n,) says which, and `turns` (n, nq)
     full turns away from this one's joint positions. `complete`: no branch of any pose may be missing. Where they are
-    some of those `around` an axis of the tool, all configurations of this pose count, known or not."""
+    some of those `around` an axis of the tool, all configurations of this pose count, known or not. `traces` are the ways
+    that lead to the `ends`, as the arm follows them, one for each; none where no way leads there."""
 
     name: str
     ends: list[EndConfiguration]
@@ -38,6 +40,7 @@ class Layer:
     turns: npt.NDArray[np.intp]
     complete: bool
     around: ConeOrientedPose | None = None
+    traces: tuple[Trace, ...] = ()
 
     @property
     def sampled(self) -> bool:

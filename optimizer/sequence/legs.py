@@ -17,6 +17,7 @@ import numpy.typing as npt
 from models.robot import Array, Mask
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
+from optimizer.kinematics.course_tracing import Trace
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LONGEST_DURATION
 from optimizer.problem.stops import PlannedMove
@@ -133,6 +134,19 @@ class Leg:
             problem = replace(self.prepared.problem, start=self.start.q[s], goal=self.goal.q[g])
             self._by_target[target] = PreparedProblem.of(problem)
         return self._by_target[target]
+
+    def trace_between(self, q_start: Array, q_goal: Array) -> Trace | None:
+        """The line or path from a node q_start to a node q_goal (nq,) [rad], as the arm follows it; None if none is
+        known."""
+        if self.prepared.problem.tool_path is None or not self.goal.traces:
+            return None
+        nodes = np.flatnonzero((self.start.q == q_start).all(axis=1) & (self.goal.q == q_goal).all(axis=1))
+        if not len(nodes):
+            return None
+        trace = self.goal.traces[self.goal.end[nodes[0]]]
+        # but for full turns, the way is the same from every node of an end
+        turned = np.round((q_start - trace.q[0]) / (2 * np.pi)) * (2 * np.pi)
+        return replace(trace, q=np.concatenate([q_start[None], trace.q[1:] + turned]))
 
     @property
     def least_costs(self) -> Array:

@@ -185,6 +185,12 @@ def controller_default(search: RoundSearch, start: int, ours: Needed) -> RoundBa
     return compared(search.asked, "controller_default", duration, Needed(known, work), held, ours)
 
 
+def compared_again(asked: WorkRound, known: RoundBaseline, ours: Needed) -> RoundBaseline:
+    """A known baseline beside another round of ours."""
+    again = compared(asked, known.name, known.duration, known.needed, known.within_limits, ours)
+    return replace(again, moves=known.moves)
+
+
 def compared(
     asked: WorkRound, name: RoundBaselineName, duration: float, theirs: Needed, held: bool, ours: Needed
 ) -> RoundBaseline:

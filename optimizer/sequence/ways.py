@@ -13,7 +13,7 @@ import numpy as np
 
 from models.robot import Array, Mask
 from optimizer.exceptions import InvalidProblem, PathAttempt, PathInfeasible
-from optimizer.kinematics.course_tracing import Trace, traces
+from optimizer.kinematics.course_tracing import Trace, traces_of_each
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.prepared_problem import PreparedProblem
@@ -125,15 +125,12 @@ def _followed(asked: WorkRound, way: _Way, ends: list[EndConfiguration]) -> tupl
 
     Those that reach the same target have the same course.
     """
-    found: dict[int, Trace] = {}
-    length = 0.0
-    for target in {end.target for end in ends}:
-        own = [k for k, end in enumerate(ends) if end.target == target]
-        q = np.array([ends[k].q for k in own])
-        course = way.course(tcp_pose(asked.arm, q[0]), target)
-        length = course.length
-        found |= dict(zip(own, traces(asked.arm, course, q), strict=True))
-    return [found[k] for k in range(len(ends))], length
+    courses = dict[int, ToolCourse]()
+    for end in ends:
+        if end.target not in courses:
+            courses[end.target] = way.course(tcp_pose(asked.arm, end.q), end.target)
+    own = [courses[end.target] for end in ends]
+    return traces_of_each(asked.arm, own, np.array([end.q for end in ends])), own[-1].length
 
 
 def _end_of(asked: WorkRound, origin: Layer, place: str, found: list[Trace]) -> Layer:
@@ -145,7 +142,7 @@ def _end_of(asked: WorkRound, origin: Layer, place: str, found: list[Trace]) -> 
     ]
     moved = (q - np.array([end.q for end in origin.ends]))[origin.end]
     complete = origin.complete and not origin.sampled
-    return replace(origin, name=f"stops/{place}", ends=ends, q=origin.q + moved, complete=complete)
+    return replace(origin, name=f"stops/{place}", ends=ends, q=origin.q + moved, complete=complete, traces=tuple(found))
 
 
 def _nodes_that_follow(
