@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from optimizer.energy.plant import Plant
 from optimizer.energy.sensitivity import waiting_sensitivity
 from optimizer.kinematics.course_tracing import Trace, joint_path, traces
 from optimizer.kinematics.least_speed import LeastSpeed
+from optimizer.kinematics.least_time import least_time
 from optimizer.kinematics.path_constraints import PathConstraints, path_constraints_of
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
@@ -82,6 +83,19 @@ class PreparedProblem(Plant):
     def least_speed(self) -> LeastSpeed | None:
         """The least speed on the tool path; None if there is none."""
         return None if self.course is None else LeastSpeed.of(self.arm, self.course)
+
+    @cached_property
+    def least_time(self) -> float:
+        """Least duration [s] that the tool path leaves to a motion; zero without one."""
+        return 0.0 if self.course is None else least_time(self.arm, self.course)
+
+    @property
+    def freed(self) -> Problem:
+        """The problem without its tool path, of motions that last as long as those along it: their bounds hold for
+        these."""
+        problem, least = self.problem, self.least_time
+        shortest = min(max(problem.duration_min or 0.0, least), problem.duration_max or np.inf)
+        return replace(problem, tool_path=None, duration_min=shortest if shortest > 0 else problem.duration_min)
 
     @cached_property
     def traces(self) -> dict[bytes, Trace]:

@@ -45,8 +45,8 @@ class WorkRound:
     The `objective` "mechanical" is the work of all moves. Slower moves do less, so it needs a `duration_max`; rests do
     none.
 
-    With `stopping` the arm rests at the stops that it would pass through, too: what passing is compared with. Where it is
-    not `compared`, other ways to go round are not looked for.
+    With `stopping` the arm rests at the stops that it would pass through, too: what passing is compared with. Where it
+    is not `compared`, other ways to go round are not looked for.
 
     Orientations are given in full. Raises InvalidProblem or OutsideLimits, with the field named.
     """

@@ -35,7 +35,8 @@ def lower_bounds(
 
     displacement (P, nq) [rad] is goal - start, potential_gain (P,) [J] the gain of potential energy, `hold` (P,) [W]
     the power that holding the goal draws, needed for a problem with a cycle. A candidate whose least duration exceeds
-    the longest allowed one has the bound inf.
+    the longest allowed one has the bound inf. Along a tool path no motion is shorter than the path leaves it time for
+    (`kinematics.least_time`).
 
     Waiting draws constant - power · T on each of its linear pieces (see `optimizer.energy.dwell`): there it is a
     constant and a power less for every second of the motion, and the least over the pieces is a bound for all
@@ -43,8 +44,9 @@ def lower_bounds(
     """
     problem = prepared.problem
     shortest = np.maximum(shortest_duration(displacement, problem.arm.active_limits), LEAST_DURATION)
-    t_min = np.maximum(shortest, problem.duration_min or 0.0)
-    t_max = np.full_like(t_min, LONGEST_DURATION if problem.duration_max is None else problem.duration_max)
+    most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    t_min = np.maximum(shortest, max(problem.duration_min or 0.0, min(prepared.least_time, most)))
+    t_max = np.full_like(t_min, most)
     if problem.objective == "mechanical":
         bound = mechanical(potential_gain)
     elif problem.cycle is None or hold is None:
@@ -68,7 +70,8 @@ def priced_bounds(
     """
     shortest = np.maximum(shortest_duration(displacement, prepared.arm.active_limits), LEAST_DURATION)
     t_max, waiting = np.full_like(shortest, longest), np.full_like(shortest, -price)
-    bound = _least_drawn(prepared, displacement, potential_gain, shortest, t_max, waiting)
+    t_min = np.maximum(shortest, min(prepared.least_time, longest))
+    bound = _least_drawn(prepared, displacement, potential_gain, t_min, t_max, waiting)
     return np.where(shortest > longest, np.inf, bound)
 
 

@@ -16,6 +16,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.targets import Target, members
 from optimizer.problem.work_round import START, WorkRound
@@ -30,8 +31,9 @@ MOST_NODES = 20_000
 class Layer:
     """Configurations `q` (n, nq) [rad] of one stop. Each is one of `ends`, `end` (n,) says which, and `turns` (n, nq)
     full turns away from this one's joint positions. `complete`: no branch of any pose may be missing. Where they are
-    some of those `around` an axis of the tool, all configurations of this pose count, known or not. `traces` are the ways
-    that lead to the `ends`, as the arm follows them, one for each; none where no way leads there."""
+    some of those `around` an axis of the tool, all configurations of this pose count, known or not; of a `given` one,
+    if the angle is given. `traces` are the ways that lead to the `ends`, as the arm follows them, one for each; none
+    where no way leads there."""
 
     name: str
     ends: list[EndConfiguration]
@@ -40,6 +42,7 @@ class Layer:
     turns: npt.NDArray[np.intp]
     complete: bool
     around: ConeOrientedPose | None = None
+    given: Pose | None = None
     traces: tuple[Trace, ...] = ()
 
     @property

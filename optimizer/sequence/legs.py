@@ -19,7 +19,7 @@ from optimizer.deadline import checkpoint
 from optimizer.exceptions import InvalidProblem
 from optimizer.kinematics.course_tracing import Trace
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.problem import LONGEST_DURATION
+from optimizer.problem.problem import LONGEST_DURATION, Problem
 from optimizer.problem.stops import PlannedMove
 from optimizer.search.lower_bound import priced_bounds
 from optimizer.search.priced_work import priced_work_bounds
@@ -135,18 +135,18 @@ class Leg:
             self._by_target[target] = PreparedProblem.of(problem)
         return self._by_target[target]
 
-    def trace_between(self, q_start: Array, q_goal: Array) -> Trace | None:
-        """The line or path from a node q_start to a node q_goal (nq,) [rad], as the arm follows it; None if none is
-        known."""
+    def traces_of(self, problem: Problem) -> dict[bytes, Trace]:
+        """The line or path of a pair's problem as the arm follows it, by the bytes of its start; none if not known."""
         if self.prepared.problem.tool_path is None or not self.goal.traces:
-            return None
+            return {}
+        q_start, q_goal = np.asarray(problem.start), np.asarray(problem.goal)
         nodes = np.flatnonzero((self.start.q == q_start).all(axis=1) & (self.goal.q == q_goal).all(axis=1))
         if not len(nodes):
-            return None
-        trace = self.goal.traces[self.goal.end[nodes[0]]]
+            return {}
+        trace = self.goal.traces[int(self.goal.end[nodes[0]])]
         # but for full turns, the way is the same from every node of an end
         turned = np.round((q_start - trace.q[0]) / (2 * np.pi)) * (2 * np.pi)
-        return replace(trace, q=np.concatenate([q_start[None], trace.q[1:] + turned]))
+        return {q_start.tobytes(): replace(trace, q=np.concatenate([q_start[None], trace.q[1:] + turned]))}
 
     @property
     def least_costs(self) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -20,6 +19,7 @@ from optimizer.search.free_goal_bound import family_bound
 from optimizer.search.lower_bound import LeastBound
 from optimizer.search.self_motion_bound import self_motion_bound
 from optimizer.sequence.chains import LeastChain
+from optimizer.sequence.free_ends_chain import FreeEndsChain
 from optimizer.sequence.layers import Layer
 from optimizer.sequence.legs import Leg
 from optimizer.sequence.passing_leg import PassingLeg
@@ -30,8 +30,12 @@ def proven_bound(asked: WorkRound, legs: Sequence[Leg], deadline: Deadline) -> f
     """Lower bound [J] on the objective of all rounds with rests at the stops.
 
     Where configurations are samples of infinitely many, or some may be missing, one more stands for all that are not
-    known, with a bound that holds for each of them.
+    known, with a bound that holds for each of them; where they are all around a pose, they are bounded together.
     """
+    single = [leg.direct if isinstance(leg, PassingLeg) and leg.direct is not None else leg for leg in legs]
+    chain = FreeEndsChain.of(asked, single)
+    if chain is not None:
+        return chain.least(deadline)
     return LeastChain(
         [bounded_costs(asked, *both, deadline) for both in zip(asked.moves, legs, strict=True)], asked.closed
     ).find()[0]
@@ -73,7 +77,7 @@ def _of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
 def _of_turned(leg: Leg, enough: float, deadline: Deadline) -> float:
     """Bound [J] on the motions of a leg of which an end is in any configuration of a pose that is turned about an
     axis."""
-    problem, start, goal = replace(leg.prepared.problem, tool_path=None), leg.start, leg.goal
+    problem, start, goal = leg.prepared.freed, leg.start, leg.goal
     if start.around is not None and goal.around is not None:
         return bound_between(PreparedProblem.of(problem), start.around, goal.around, deadline, enough)
     if goal.around is not None:

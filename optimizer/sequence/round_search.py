@@ -324,10 +324,7 @@ class RoundSearch(LazySearch):
     def _run(self, k: int, problem: Problem, known: Sequence[Spline] = ()) -> Run:
         """The search of a motion of leg `k`."""
         run = Run(problem, known, self.clock, like=self.legs[k].prepared)
-        start, goal = np.asarray(problem.start), np.asarray(problem.goal)
-        trace = self.legs[k].trace_between(start, goal)
-        if trace is not None:
-            run.incumbent.prepared.traces[start.tobytes()] = trace
+        run.incumbent.prepared.traces.update(self.legs[k].traces_of(problem))
         return run
 
     def _problem_of(self, k: int, s: int, g: int, time: float) -> Problem:

@@ -6,7 +6,7 @@ A way leads from each configuration to one other, so a node of one place has one
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +22,7 @@ from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, RETREAT, Stop
+from optimizer.problem.targets import Target, members
 from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.search.end_feasibility import check_configurations
@@ -94,9 +95,20 @@ def layers_of_stop(asked: WorkRound, k: int) -> list[Layer]:
     of_stop = [_only(layers[place], kept) for place in stop.places]
     if stop.path is None or not some:
         return of_stop
-    around = dict(zip((stop.entry, stop.name), stop.path.around or (None, None), strict=True))
-    named = zip(stop.places, of_stop, strict=True)
-    return [replace(layer, complete=False, around=around.get(place)) for place, layer in named]
+    ends = (stop.entry, stop.name)
+    around = dict(zip(ends, stop.path.around or (None, None), strict=True))
+    given = dict(zip(ends, (_only_pose(members(stop.target)), _only_pose(stop.path.goals)), strict=True))
+    return [
+        replace(layer, complete=False, around=around.get(place), given=given.get(place))
+        for place, layer in zip(stop.places, of_stop, strict=True)
+    ]
+
+
+def _only_pose(poses: Sequence[Target]) -> Pose | None:
+    """The pose that all of them are; None if they differ."""
+    first, *others = poses
+    same = isinstance(first, Pose) and all(isinstance(each, Pose) and (each.T == first.T).all() for each in others)
+    return first if isinstance(first, Pose) and same and others else None
 
 
 def _nearest_to_middle(asked: WorkRound, at: Layer, kept: Mask) -> Mask:

@@ -1,0 +1,80 @@
+"""Boxes for a pose that is turned about the tool's axis: they hold every configuration that reaches it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.tcp import flange_pose, tcp_pose
+from optimizer.kinematics.turned_pose_boxes import BRANCHES, TurnedPose
+from optimizer.problem.arm import Arm
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.pose import Pose
+
+# rad: what a solution of the closed form may be off, next to a singularity
+EXACT = 1e-9
+
+
+def _singular(rng: np.random.Generator, kind: str) -> Array:
+    """A configuration (6,) [rad] on a singularity, or next to one."""
+    q = rng.uniform(-np.pi, np.pi, 6)
+    if kind == "shoulder":
+        # the last axis' origin as near to the first axis as it can be
+        q[1:4] = [-np.pi / 2, 0.0, rng.choice([0.0, np.pi])]
+    if kind != "any":
+        q[{"elbow": 2, "wrist": 4, "beside the wrist": 4, "shoulder": 2}[kind]] = 1e-6 * (kind == "beside the wrist")
+    return q
+
+
+@pytest.mark.parametrize("kind", ["any", "elbow", "wrist", "beside the wrist", "shoulder"])
+@pytest.mark.parametrize("robot", ["ur5e", "ur10e"])
+def test_no_configuration_is_outside_the_boxes(robot: str, kind: str) -> None:
+    """Wherever the tool is, and however its axis lies."""
+    for seed in range(6):
+        rng = np.random.default_rng([seed, len(kind)])
+        aligned = seed % 2 == 0
+        quaternion = [0, 0, 0, 1] if aligned else Rotation.random(random_state=seed).as_quat()
+        T_flange_tcp = Pose.from_quaternion(rng.uniform(-0.2, 0.2, 3), quaternion).T
+        arm = Arm(robot=load_robot(robot), T_flange_tcp=T_flange_tcp)
+        q = _singular(rng, kind)
+        T, axis = tcp_pose(arm, q), np.array([0.0, 0.0, 1.0]) if aligned else rng.normal(size=3)
+        given = Pose(T)
+        pose = ConeOrientedPose.about(given, axis)
+        turned = TurnedPose.of(arm, pose, given)
+        assert turned is not None
+        angles = np.append(rng.uniform(-np.pi, np.pi, 12), 0.0)
+        width = float(rng.choice([0.3, 0.05, 1e-3]))
+        # the angle is anywhere in its cell, on its edge as well
+        cells = angles + width * np.append(rng.uniform(-1, 1, 11), [1.0, -1.0])
+        reached = 0
+        for angle, cell in zip(angles, cells, strict=True):
+            centre, half, held = turned.boxes(np.full(BRANCHES, cell), np.full(BRANCHES, width), np.arange(BRANCHES))
+            at = T.copy()
+            at[:3, :3] = T[:3, :3] @ Rotation.from_rotvec(angle * pose.axis).as_matrix()
+            solutions, _ = turned.form.solve(flange_pose(at, arm.T_flange_tcp))
+            for found in [*solutions, *([q] if angle == 0.0 else [])]:
+                inside = held & (np.abs(wrapped(found - centre)) <= half + EXACT).all(axis=1)
+                assert inside.any()
+                reached += 1
+        assert reached
+
+
+def test_small_cells_have_small_boxes() -> None:
+    """Away from singularities, boxes shrink with the cell."""
+    arm = Arm(robot=load_robot("ur5e"), T_flange_tcp=Pose.from_quaternion([0.15, 0.0, 0.1], [0, 0, 0, 1]).T)
+    given = Pose.from_quaternion([0.5, -0.2, 0.2], [0.0, 1.0, 0.0, 0.0])
+    turned = TurnedPose.of(arm, ConeOrientedPose.about(given, np.array([0.0, 0.0, 1.0])), given)
+    assert turned is not None
+    for width in (1e-2, 1e-3, 1e-4):
+        _, half, held = turned.boxes(np.zeros(BRANCHES), np.full(BRANCHES, width), np.arange(BRANCHES))
+        assert held.any() and half[held].max() < 20 * width
+
+
+def test_other_arms_and_freedoms_have_none() -> None:
+    arm = Arm(robot=load_robot("ur5e"))
+    assert TurnedPose.of(arm, ConeOrientedPose(np.array([0.4, 0.0, 0.3]), half_angle=0.2)) is None
+    assert TurnedPose.of(Arm(robot=load_robot("iiwa14")), ConeOrientedPose(np.zeros(3), half_angle=0.0)) is None
