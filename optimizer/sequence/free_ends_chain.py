@@ -92,11 +92,10 @@ class FreeEndsChain:
         for k, layer in enumerate([legs[0].start, *(leg.goal for leg in legs)]):
             if layer.complete and not layer.sampled:
                 continue
-            prepared = [leg.prepared for leg in legs[max(k - 1, 0) : k + 1]]
-            if k == 0:
-                return None
             nearest = not asked.windings and _is_start_of_path(asked, layer) and _is_nearest(asked, layer)
-            cover = CoveredLayer.of(layer, prepared, nearest)
+            # of the move to it, and of that from it if there is one
+            prepared = [leg.prepared for leg in legs[max(k - 1, 0) : k + 1]]
+            cover = CoveredLayer.of(layer, prepared, nearest) if k > 0 else None
             if cover is None:
                 return None
             covered[k] = cover
@@ -146,9 +145,8 @@ class FreeEndsChain:
                 fresh = (slice(None), new) if axis else new
                 self.told[leg][fresh] = False
                 start, goal = self._sides(leg)
-                if len(cost) == len(start.box) and cost.shape[1] == len(goal.box):
-                    quick = self._quick(leg, *((start, goal.some(new)) if axis else (start.some(new), goal)))
-                    cost[fresh] = np.maximum(cost[fresh], quick)
+                quick = self._quick(leg, *((start, goal.some(new)) if axis else (start.some(new), goal)))
+                cost[fresh] = np.maximum(cost[fresh], quick)
                 continue
             rows, columns = (np.arange(len(cost)), new) if axis else (new, np.arange(cost.shape[1]))
             s, g = (each.ravel() for each in np.meshgrid(rows, columns, indexing="ij"))

@@ -67,7 +67,8 @@ def with_free_ends(asked: WorkRound, search: Search, clock: Clock) -> RoundSolut
                 found = search(replace(near, compared=not _is_compared_once(asked)))
                 if found.needed.of(asked.objective) < best.needed.of(asked.objective):
                     # the bound of the first round is that of all angles
-                    best, found_at = replace(found, lower_bound=best.lower_bound), _found_at(found, tried)
+                    bound = min(best.lower_bound, found.needed.of(asked.objective))
+                    best, found_at = replace(found, lower_bound=bound), _found_at(found, tried)
     if _is_compared_once(asked):
         best = replace(best, baselines=[compared_again(asked, each, best.needed) for each in compared])
     places = {place for stop in free.values() for place in stop.places}
