@@ -9,8 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from models.robot import Array
-from optimizer.kinematics.forward import joint_placements, link_frames
-from optimizer.kinematics.jacobians import geometric_jacobian
+from optimizer.kinematics.forward import joint_placements
 
 # sine of an angle below which its axis is taken from the sine alone
 _TINY = 1e-12
@@ -70,9 +69,38 @@ class Chain:
 
     def flange_and_jacobian(self, q: Array) -> tuple[Array, Array]:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad], and its geometric Jacobian (n, 6, nq)."""
-        frames = link_frames(self.placements, q)
-        T = frames[:, -1] @ self.T_last_flange
-        return T, geometric_jacobian(frames, T[:, :3, 3])
+        n, nq = q.shape
+        c, s = np.cos(q.T), np.sin(q.T)
+        # component by component, all configurations in a row: long products in place of many small ones. Of each joint
+        # y, -x, x, y, z and its place seen from the joint before; the third and the fourth are then turned
+        carriers, to_flange = self._carriers
+        parts = np.empty((nq, 6, 3, n))
+        rows = parts.reshape(nq, 6, 3 * n)
+        parts[0] = carriers[0][:, :, None]
+        for k in range(nq):
+            if k:
+                np.matmul(carriers[k], rows[k - 1, 2:5], out=rows[k])
+            turned, aside = parts[k, 2:4], parts[k, :2]
+            turned *= c[k]
+            aside *= s[k]
+            turned += aside
+        last = (to_flange @ rows[-1, 2:5]).reshape(4, 3, n)
+        place = np.cumsum(parts[:, 5], axis=0)
+        flange = place[-1] + last[3]
+        axis, arm = parts[:, 4], flange - place
+        J, T = np.empty((n, 6, nq)), np.empty((n, 4, 4))
+        by_row, (x, y, z), (u, v, w) = J.transpose(1, 2, 0), axis.transpose(1, 0, 2), arm.transpose(1, 0, 2)
+        by_row[0], by_row[1], by_row[2] = y * w - z * v, z * u - x * w, x * v - y * u
+        by_row[3:] = axis.transpose(1, 0, 2)
+        T[:, :3, :3], T[:, :3, 3], T[:, 3] = last[:3].transpose(2, 1, 0), flange.T, (0.0, 0.0, 0.0, 1.0)
+        return T, J
+
+    @cached_property
+    def _carriers(self) -> tuple[Array, Array]:
+        """For each joint, y, -x, x, y, z and the origin of its placement as rows (nq, 6, 3); x, y, z and the origin of
+        the flange on the last link (4, 3)."""
+        x, y, z, origin = self.placements[:, :3].transpose(2, 0, 1)
+        return np.stack([y, -x, x, y, z, origin], axis=1), self.T_last_flange[:3].T.copy()
 
 
 def pose_error(T_reached: Array, T: Array) -> Array:

@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.robot import Array, Mask
+from optimizer.kinematics.across_curve import step_across
 from optimizer.kinematics.angles import nearest_turn, wrapped
-from optimizer.kinematics.chain import Chain, pose_error
+from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.hermite import hermite
 
 # steps [rad]: the first, the longest, and one below which the curve ends; factors after a good and a bad one
-FIRST, LONGEST, LEAST, LONGER, SHORTER = 0.15, 0.4, 1e-3, 1.6, 0.4
+FIRST, LONGEST, LEAST, LONGER, SHORTER = 0.15, 0.4, 1e-5, 1.6, 0.4
+# distance [rad] at which the end of a path and the start of the next are one point
+ONE = 1e-3
 # a step is bad if its second correction is longer [rad], its first one longer than this share of it, or its ends'
 # tangents have a lesser cosine; it is good if they have a greater one
 CORRECTED, ASIDE, BENT, STRAIGHT = 1e-5, 0.3, 0.85, 0.97
@@ -30,32 +33,42 @@ CORRECTIONS, STEPS = 2, 400
 PASSED, ALIKE, BESIDE = 2e-3, 0.9, 0.6
 # steps before a curve may be back at its start
 AWAY = 3
-# added to the diagonal of a system that may be singular
-TINY = 1e-14
 
 Rows = NDArray[np.intp]
 
 
-@dataclass(eq=False)
+@dataclass(frozen=True, eq=False)
 class TracedPath:
-    """A curve from its start on: configurations (nq,) [rad] without full turns left out, unit tangents (nq,) there.
+    """Configurations q (m, nq) [rad] along a curve, without full turns left out, and unit tangents (m, nq) there.
 
     `closed`: the last configuration is the first one but for full turns.
     """
 
+    q: Array
+    tangents: Array
+    closed: bool
+
+
+@dataclass(eq=False)
+class _Way:
+    """A path as it grows: `TracedPath`, point by point."""
+
     q: list[Array]
     tangents: list[Array]
     closed: bool = False
+
+    def finished(self) -> TracedPath:
+        return TracedPath(np.array(self.q), np.array(self.tangents), self.closed)
 
     def turned(self) -> None:
         """Go on from the other end."""
         self.q.reverse()
         self.tangents = [-each for each in reversed(self.tangents)]
 
-    def joined(self, other: TracedPath) -> None:
+    def joined(self, other: _Way) -> None:
         """Go on along a path whose start is next."""
         shift = nearest_turn(other.q[0], self.q[-1]) - other.q[0]
-        if np.abs(other.q[0] + shift - self.q[-1]).max() < LEAST:
+        if np.abs(other.q[0] + shift - self.q[-1]).max() < ONE:
             self.q.pop()
             self.tangents.pop()
         self.q += [each + shift for each in other.q]
@@ -81,7 +94,7 @@ class _Tracing:
         side = np.linalg.slogdet(np.concatenate([jacobian, null[:, None]], axis=1))[0]
         self.first = null * side[:, None]
         self.waves = np.hstack([np.cos(starts), np.sin(starts)])
-        self.paths = [TracedPath([q], [t]) for q, t in zip(starts, self.first, strict=True)]
+        self.paths = [_Way([q], [t]) for q, t in zip(starts, self.first, strict=True)]
         self.q, self.tangent = starts.copy(), self.first.copy()
         self.bend, self.step = np.zeros_like(starts), np.full(len(starts), FIRST)
         self.alive, self.follows = np.ones(len(starts), dtype=bool), np.full(len(starts), -1)
@@ -91,7 +104,7 @@ class _Tracing:
         loops, chains = cycles(self.follows.tolist())
         found = [self.whole(rows) for rows in loops]
         for path in found:
-            path.q[-1], path.tangents[-1] = path.q[0] + _turns(path.q[-1] - path.q[0]), path.tangents[0]
+            path.q[-1], path.tangents[-1] = path.q[0] + turns(path.q[-1] - path.q[0]), path.tangents[0]
             path.closed = True
         # a curve that ends goes on in the other direction from where the first of its parts began
         for rows in chains:
@@ -102,16 +115,16 @@ class _Tracing:
             self.bend[row], self.step[row], self.alive[row] = 0.0, FIRST, True
             found.append(path)
         self.follow(False)
-        return found
+        return [path.finished() for path in found]
 
-    def whole(self, rows: list[int]) -> TracedPath:
+    def whole(self, rows: list[int]) -> _Way:
         """The paths of rows, one after the other; of a loop, up to the start of the first row again."""
         first = self.paths[rows[0]]
-        path = TracedPath(list(first.q), list(first.tangents))
+        path = _Way(list(first.q), list(first.tangents))
         for row in rows[1:]:
             path.joined(self.paths[row])
         if self.follows[rows[-1]] == rows[0]:
-            path.joined(TracedPath([self.starts[rows[0]]], [self.first[rows[0]]]))
+            path.joined(_Way([self.starts[rows[0]]], [self.first[rows[0]]]))
         return path
 
     def follow(self, to_starts: bool) -> None:
@@ -136,17 +149,12 @@ class _Tracing:
         """Where a step leads (n, nq), the tangents there (n, nq), and whether it is near the curve (n,)."""
         before, step = self.tangent[rows], self.step[rows]
         q = self.q[rows] + step[:, None] * (before + step[:, None] / 2 * self.bend[rows])
-        sides = np.zeros((len(rows), self.chain.nq, 2))
-        sides[:, -1, 1] = 1.0
         moved = []
         for _ in range(CORRECTIONS):
-            T_reached, jacobian = self.chain.flange_and_jacobian(q)
-            sides[:, :-1, 0] = pose_error(T_reached, self.T)
-            system = np.concatenate([jacobian, before[:, None]], axis=1) + TINY * np.eye(self.chain.nq)
-            found = np.linalg.solve(system, sides)
-            q = q + found[:, :, 0]
-            moved.append(np.linalg.norm(found[:, :, 0], axis=1))
-        tangent = found[:, :, 1] / np.linalg.norm(found[:, :, 1], axis=1)[:, None]
+            move, tangent = step_across(self.chain, q, before, self.T)
+            q = q + move
+            moved.append(np.linalg.norm(move, axis=1))
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
         return q, tangent, (moved[0] < ASIDE * step) & (moved[-1] < CORRECTED)
 
     def advance(self, rows: Rows, q: Array, tangent: Array, cosine: Array) -> None:
@@ -204,6 +212,6 @@ def cycles(follows: list[int]) -> tuple[list[list[int]], list[list[int]]]:
     return loops, list(longest.values())
 
 
-def _turns(angles: Array) -> Array:
+def turns(angles: Array) -> Array:
     """The full turns [rad] nearest to angles [rad]."""
     return angles - wrapped(angles)

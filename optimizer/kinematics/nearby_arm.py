@@ -13,21 +13,17 @@ import numpy as np
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.nearby_loops import STEPS, loops
-from optimizer.kinematics.redundant_arm import RedundantArm
-from optimizer.kinematics.redundant_curve import RedundantCurve
+from optimizer.kinematics.nearby_loops import loops
+from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.kinematics.spherical_shoulder import SphericalShoulder
-
-# starts on each curve of the arm nearby: two of them make a loop, mostly
-STARTS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class NearbyArm:
-    """The closed form of the arm nearby; `mirrored` if it is of this form from the flange on. `axes` are its own, from
-    the flange on if it is mirrored."""
+    """The form of the arm nearby; `mirrored` if it is of this form from the flange on. `axes` are its own, from the
+    flange on if it is mirrored."""
 
-    arm: RedundantArm
+    form: SphericalShoulder
     mirrored: bool
     axes: JointAxes
 
@@ -38,20 +34,19 @@ class NearbyArm:
         for mirrored, each in ((False, simple), (True, simple.mirrored())):
             form = SphericalShoulder.of_chain(each)
             if form is not None:
-                return cls(RedundantArm(form), mirrored, JointAxes.of(each))
+                return cls(form, mirrored, JointAxes.of(each))
         return None
 
-    def loops(self, T: Array) -> tuple[list[Array], Array]:
-        """Points (m, 7) [rad] along loops on which the arm nearby holds its flange at T (4, 4): see `nearby_loops`; and
-        configurations (n, 7) spread over the curves that are in none."""
-        motions = self.arm.self_motions(np.asarray(np.linalg.inv(T)) if self.mirrored else T)
-        found, rest = loops([each for each in motions if isinstance(each, RedundantCurve)])
-        q = np.vstack([np.zeros((0, 7)), *(spread_over(each) for each in rest)])
-        # from the flange on, the joints come in the other order and turn the other way
-        return ([-each[:, ::-1] for each in found], -q[:, ::-1]) if self.mirrored else (found, q)
-
-
-def spread_over(points: Array) -> Array:
-    """Starts (n, nq) among the points (m, nq) along curves of the arm nearby: STARTS on each."""
-    count = STARTS * max(len(points) // STEPS, 1)
-    return np.asarray(points[((np.arange(count) + 0.5) * len(points) / count).astype(int)])
+    def loops(self, T: Array, finer: int = 1) -> tuple[list[Array], list[Array]]:
+        """Points (m, 7) [rad] along loops on which the arm nearby holds its flange at T (4, 4), and along curves that
+        are in none: see `nearby_loops`. There are so many times more points of all if they are to be `finer`."""
+        pose = RedundantPose(self.form, np.asarray(np.linalg.inv(T)) if self.mirrored else T)
+        found, rest = loops(pose, finer)
+        # on the left shoulder, the third axis leans to the other side
+        scale, shift = np.ones(7), np.zeros(7)
+        scale[1], shift[:3] = -1.0, (np.pi, -2 * self.form.lean_at_zero, np.pi)
+        if self.mirrored:
+            # from the flange on, the joints come in the other order and turn the other way
+            found, rest = [-q[:, ::-1] for q in found], [-q[:, ::-1] for q in rest]
+            scale, shift = scale[::-1], -shift[::-1]
+        return [*found, *(scale * q + shift for q in found)], [*rest, *(scale * q + shift for q in rest)]

@@ -13,113 +13,166 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.robot import Array, Mask
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain, pose_error
-from optimizer.kinematics.curve_tracing import ASIDE, BENT, LONGEST, TINY, TracedPath
-from optimizer.kinematics.redundant_curve import RedundantCurve, members
+from optimizer.kinematics.across_curve import step_across
+from optimizer.kinematics.angles import nearest_turn, wrapped
+from optimizer.kinematics.chain import Chain
+from optimizer.kinematics.curve_tracing import BENT, LONGEST, TracedPath, turns
+from optimizer.kinematics.redundant_curve import CurveStack
+from optimizer.kinematics.redundant_pose import RedundantPose
 
-# steps along each curve of the arm nearby, twice as many once around
-STEPS = 32
+# steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of these make a loop
+STEPS, STARTS = 16, 4
 # length [rad] of a step from which on a curve gets so many times the points, of which those are kept that are so far
 # apart [rad]
-UNEVEN, DENSER, EVEN = 0.6, 16, 0.25
+UNEVEN, DENSER, EVEN = 0.6, 4, 0.3
+# the last angle all around [rad]
+WHOLE = (-np.pi, np.pi)
 # distance [rad] of two ends of curves that are one point, and of a third that is not
 JOINED, APART = 1e-4, 1e-2
-# longest step of Newton's method [rad] that needs no other
-SHORT = 0.01
+# longest step of Newton's method [rad] that needs no other, and farthest way [rad] of a point to the curve
+SHORT, MOVED = 0.01, 0.05
 
 
-def loops(curves: Sequence[RedundantCurve]) -> tuple[list[Array], list[Array]]:
-    """Points (m, 7) [rad] along loops of curves of one pose, each from its first point once around, without full turns
-    left out; and points (n, 7) along curves that are in none, because more than two meet at an end, or one does."""
-    points = _points(curves)
-    whole = [k for k, each in enumerate(curves) if each.whole]
-    found, rest = [points[k] for k in whole], list[Array]()
-    ends = np.array([points[k // 2][-(k % 2)] for k in range(2 * len(points))]).reshape(-1, 7)
+def loops(pose: RedundantPose, finer: int) -> tuple[list[Array], list[Array]]:
+    """Points (m, 7) [rad] along loops of curves of a pose on the right shoulder, each from its first point once around,
+    without full turns left out; and along curves that are in none, because more than two meet at an end, or one does.
+    There are so many times more points if they are to be `finer`."""
+    curves = right_curves(pose)
+    if curves is None:
+        return [], []
+    points, ends = _points(curves, finer)
+    found, rest = [points[k] for k in np.flatnonzero(curves.whole).tolist()], list[Array]()
     meets = _meeting(ends)
-    left = [k for k in range(len(curves)) if k not in whole]
+    left = np.flatnonzero(~curves.whole).tolist()
     while left:
         way, end = list[int](), 2 * left[0] + 1
         while end // 2 in left:
             left.remove(end // 2)
             way.append(end)
-            end = int(meets[end]) ^ 1 if meets[end] >= 0 else -1
+            end = meets[end] ^ 1 if meets[end] >= 0 else -1
         # the way ends where it began, at the other end of its first curve
         parts = [points[k // 2] if k % 2 else points[k // 2][::-1] for k in way]
         if end == way[0]:
-            found.append(np.vstack([*(each[:-1] for each in parts), parts[0][:1]]))
+            found.append(_joined(parts))
         else:
             rest += parts
-    return [np.unwrap(each, axis=0) for each in found], rest
+    return found, rest
 
 
-def _points(curves: Sequence[RedundantCurve]) -> list[Array]:
-    """Points (m, 7) [rad] along each of the curves from end to end."""
-    if not curves:
-        return []
-    steps = [2 * STEPS if each.whole else STEPS for each in curves]
-    points = members(curves, [np.linspace(*each.arcs[0], n + 1) for each, n in zip(curves, steps, strict=True)])
-    uneven = [k for k, each in enumerate(points) if _lengths(each).max() > UNEVEN]
-    if uneven:
-        dense = [np.linspace(*curves[k].arcs[0], DENSER * steps[k] + 1) for k in uneven]
-        for k, each in zip(uneven, members([curves[k] for k in uneven], dense), strict=True):
-            # the first point after every EVEN
-            past = np.floor(np.append(0.0, np.cumsum(_lengths(each))) / EVEN)
-            points[k] = np.vstack([each[:1], each[1:-1][np.diff(past[:-1]) > 0], each[-1:]])
-    return points
+def spread_over(points: Array) -> Array:
+    """Starts (n, nq) among the points (m, nq) along curves of the arm nearby."""
+    count = STARTS * max(len(points) // STEPS, 1)
+    return np.asarray(points[((np.arange(count) + 0.5) * len(points) / count).astype(int)])
 
 
-def _lengths(points: Array) -> Array:
-    """Lengths (m - 1,) [rad] of the steps between points (m, 7)."""
-    return np.asarray(np.linalg.norm(wrapped(np.diff(points, axis=0)), axis=1))
+def _points(curves: CurveStack, finer: int) -> tuple[list[Array], Array]:
+    """Points (m, 7) [rad] along each of the curves from end to end, without full turns left out, and the configurations
+    at the first and the last of them, (2n, 7)."""
+    count = len(curves.whole)
+    # a whole turn has twice the range
+    steps = (2 if curves.whole.any() else 1) * STEPS * finer
+    points = _along(curves, np.arange(count), steps)
+    ends = points[:, [0, -1]].reshape(-1, 7)
+    unwound, length = _unwound(points)
+    found = list(unwound)
+    uneven = np.flatnonzero(length.max(axis=1) > UNEVEN)
+    if len(uneven):
+        unwound, length = _unwound(_along(curves, uneven, DENSER * steps))
+        # the first point after every EVEN, and both ends
+        past = np.floor(np.cumsum(length, axis=1) * (finer / EVEN))
+        kept = np.ones(unwound.shape[:2], dtype=bool)
+        kept[:, 1:-1] = past[:, :-1] > np.hstack([np.zeros((len(uneven), 1)), past[:, :-2]])
+        for k, points, chosen in zip(uneven.tolist(), unwound, kept, strict=True):
+            found[k] = points[chosen]
+    return found, ends
 
 
-def _meeting(ends: Array) -> NDArray[np.intp]:
+def _along(curves: CurveStack, rows: NDArray[np.intp], steps: int) -> Array:
+    """Configurations (n, steps + 1, 7) [rad] along curves of rows (n,), from end to end."""
+    share = np.arange(steps + 1) / steps
+    u = np.where(curves.whole[rows, None], np.pi * (2 * share - 1), np.pi * share)
+    each = np.repeat(rows, steps + 1)
+    q7 = curves.last_angle(u.ravel(), each)
+    return curves.pose.configurations(q7, curves.sheet[each]).reshape(len(rows), steps + 1, 7)
+
+
+def _unwound(points: Array) -> tuple[Array, Array]:
+    """Points (n, m, 7) [rad] along curves with the full turns that are left out between one and the next, and the
+    lengths (n, m - 1) of the steps between."""
+    steps = wrapped(points[:, 1:] - points[:, :-1])
+    unwound = points.copy()
+    np.cumsum(steps, axis=1, out=unwound[:, 1:])
+    unwound[:, 1:] += points[:, :1]
+    return unwound, np.sqrt((steps * steps).sum(axis=2))
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    """Points (m, 7) [rad] along a loop, of those along parts of which each ends where the next one begins."""
+    found, end = [parts[0][:-1]], parts[0][-1]
+    for each in parts[1:]:
+        shift = nearest_turn(each[0], end) - each[0]
+        found.append(each[:-1] + shift)
+        end = each[-1] + shift
+    return np.vstack([*found, end])
+
+
+def right_curves(pose: RedundantPose) -> CurveStack | None:
+    """The curves of a pose on the right shoulder; None if there are none."""
+    each = [(interval, elbow) for elbow in (1.0, -1.0) for interval in pose.intervals(elbow) for _ in range(2)]
+    if not each:
+        return None
+    interval = np.array([ends for ends, _ in each]).T
+    sheet = np.array([[1.0, elbow, (1.0, -1.0)[k % 2]] for k, (_, elbow) in enumerate(each)])
+    return CurveStack(pose, interval, np.array([ends == WHOLE for ends, _ in each]), sheet)
+
+
+def _meeting(ends: Array) -> list[int]:
     """The end (n,) that each of ends (n, 7) [rad] meets, -1 if it meets none or several."""
-    away = np.abs(wrapped(ends[:, None] - ends)).max(axis=2, initial=0.0)
+    if len(ends) < 2:
+        return [-1] * len(ends)
+    away = np.abs(wrapped(ends[:, None] - ends)).max(axis=2)
     np.fill_diagonal(away, np.inf)
     alone = ((away < JOINED).sum(axis=1) == 1) & ((away < APART).sum(axis=1) == 1)
-    return np.where(alone, away.argmin(axis=1), -1) if len(ends) > 1 else np.full(len(ends), -1)
+    met: list[int] = np.where(alone, away.argmin(axis=1), -1).tolist()
+    return met
 
 
 def followed(chain: Chain, loops: Sequence[Array], T: Array) -> tuple[list[TracedPath], Mask]:
     """The curves that hold the flange at T (4, 4) along loops (m, 7) [rad], and which of the loops (n,) have one."""
     if not loops:
         return [], np.zeros(0, dtype=bool)
-    starts = np.cumsum([0, *(len(each) - 1 for each in loops)])
-    q = np.vstack([each[:-1] for each in loops])
-    turn = np.array([each[-1] - each[0] for each in loops])
-    ahead = np.vstack([each[1:] - each[:-1] for each in loops])
-    before = np.vstack([np.roll(each[1:] - each[:-1], 1, axis=0) for each in loops])
-    along = ahead + before
-    q, tangent, moved = _onto(chain, q, along / np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None], T)
-    paths, good = list[TracedPath](), np.zeros(len(loops), dtype=bool)
-    for k in range(len(loops)):
-        own = slice(starts[k], starts[k + 1])
-        nodes, tangents = np.vstack([q[own], q[own][:1] + turn[k]]), np.vstack([tangent[own], tangent[own][:1]])
-        steps = np.diff(nodes, axis=0)
-        length = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)
-        cosine = np.minimum((tangents[1:] * tangents[:-1]).sum(axis=1), (tangents[1:] * steps).sum(axis=1) / length)
-        good[k] = length.max() < 2 * LONGEST and cosine.min() > BENT and (moved[own] < ASIDE * length).all()
-        if good[k]:
-            paths.append(TracedPath(list(nodes), list(tangents), closed=True))
-    return paths, good
+    counts = [len(each) for each in loops]
+    first = np.cumsum([0, *counts[:-1]])
+    final = first + counts - 1
+    points = np.vstack(loops)
+    along = np.empty_like(points)
+    along[1:-1] = points[2:] - points[:-2]
+    along[first] = along[final] = points[first + 1] - points[first] + points[final] - points[final - 1]
+    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
+    q, tangent, moved = _onto(chain, points, along, T)
+    # once around, a loop is where it began, but for full turns
+    q[final], tangent[final] = q[first] + turns(points[final] - points[first]), tangent[first]
+    steps = q[1:] - q[:-1]
+    length = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)
+    cosine = np.minimum((tangent[1:] * tangent[:-1]).sum(axis=1), (tangent[1:] * steps).sum(axis=1) / length)
+    fine = (length < 2 * LONGEST) & (cosine > BENT) & (moved[:-1] < MOVED)
+    # from one loop to the next there is no step
+    fine[final[:-1]] = True
+    good = np.logical_and.reduceat(fine, first)
+    parts = [slice(start, end + 1) for start, end in zip(first.tolist(), final.tolist(), strict=True)]
+    kept = [part for part, each in zip(parts, good.tolist(), strict=True) if each]
+    return [TracedPath(q[part], tangent[part], closed=True) for part in kept], np.asarray(good)
 
 
 def _onto(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array, Array]:
     """Points near q (n, nq) [rad] of the curves that hold the flange at T (4, 4), unit tangents there, and how far
     [rad] they are (n,); from q across the directions `along` (n, nq)."""
-    first, tangent, rows = q, along.copy(), np.arange(len(q))
-    q = q.copy()
-    for _ in range(2):
-        T_reached, jacobian = chain.flange_and_jacobian(q[rows])
-        sides = np.zeros((len(rows), chain.nq, 2))
-        sides[:, :-1, 0], sides[:, -1, 1] = pose_error(T_reached, T), 1.0
-        system = np.concatenate([jacobian, along[rows, None]], axis=1) + TINY * np.eye(chain.nq)
-        found = np.linalg.solve(system, sides)
-        q[rows] += found[:, :, 0]
-        tangent[rows] = found[:, :, 1] / np.linalg.norm(found[:, :, 1], axis=1)[:, None]
-        rows = rows[np.linalg.norm(found[:, :, 0], axis=1) > SHORT]
-        if not len(rows):
-            break
-    return q, tangent, np.asarray(np.linalg.norm(q - first, axis=1))
+    move, tangent = step_across(chain, q, along, T)
+    reached = q + move
+    moved = np.linalg.norm(move, axis=1)
+    rows: NDArray[np.intp] = np.flatnonzero(moved > SHORT)
+    if len(rows):
+        again, tangent[rows] = step_across(chain, reached[rows], along[rows], T)
+        reached[rows] += again
+        moved[rows] = np.linalg.norm(reached[rows] - q[rows], axis=1)
+    return reached, tangent / np.linalg.norm(tangent, axis=1)[:, None], moved

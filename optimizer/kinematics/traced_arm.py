@@ -9,6 +9,7 @@ the joint ranges does (`seed_table`). Newton's method leads starts onto curves, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -20,12 +21,13 @@ from optimizer.exceptions import SingularPose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.curve_tracing import TracedPath, traced
-from optimizer.kinematics.nearby_arm import NearbyArm, spread_over
-from optimizer.kinematics.nearby_loops import followed
+from optimizer.kinematics.nearby_arm import NearbyArm
+from optimizer.kinematics.nearby_loops import followed, spread_over
 from optimizer.kinematics.newton import solved
 from optimizer.kinematics.seed_table import SeedTable
 from optimizer.kinematics.traced_curve import TracedCurve
 from optimizer.kinematics.traced_limits import within
+from optimizer.kinematics.traced_stack import TracedStack
 from optimizer.problem.branches import BranchLabel, NumberedBranch
 
 JOINTS = 7
@@ -37,10 +39,10 @@ NEARLY, NEAREST, AROUND, SPREAD = 1e-5, 8, 40, 0.1
 ON_EDGE = 1e-6
 # smallest singular value below which no curve is followed: configurations may go off in several directions
 SINGULAR = 1e-4
+# how many times the points of loops along which the curves are not found
+FINER = 4
 # poses whose curves are kept
 KEPT = 32
-# phases [rad] of the waves that order curves: one for each joint, so that mirrored curves differ
-PHASES = np.arange(1.0, JOINTS + 1)
 
 
 class TracedArm:
@@ -107,50 +109,56 @@ class TracedArm:
 
     def _beside_nearby(self, T: Array) -> tuple[list[TracedPath], Array]:
         """The curves along those of the arm nearby with the flange at T (4, 4), and starts (n, 7) near the others."""
+        none = np.zeros((0, JOINTS))
         if self._nearby is None:
-            return [], np.zeros((0, JOINTS))
-        loops, starts = self._nearby.loops(T)
+            return [], none
+        loops, rest = self._nearby.loops(T)
         paths, good = followed(self._chain, loops, T)
-        left = [spread_over(each[:-1]) for each, done in zip(loops, good.tolist(), strict=True) if not done]
-        return paths, np.vstack([starts, *left])
+        left = np.flatnonzero(~good).tolist()
+        if left:
+            # where curves bend, or come near to each other, the points may have been too far apart
+            finer = self._nearby.loops(T, FINER)[0]
+            more, good = followed(self._chain, [finer[k] for k in left], T)
+            paths += more
+            left = [k for k, found in zip(left, good.tolist(), strict=True) if not found]
+        return paths, np.vstack([none, *map(spread_over, rest), *(spread_over(loops[k][:-1]) for k in left)])
 
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
         checkpoint()
         paths, starts = self._beside_nearby(T)
+        if len(starts) or not paths:
+            paths += self._through(starts, T, bool(paths))
+        return self._different(paths, T)
+
+    def _through(self, starts: Array, T: Array, others: bool) -> list[TracedPath]:
+        """The curves with the flange at T (4, 4) that starts (n, 7) lead to, and if there are no others, those that the
+        table's starts lead to."""
         q, missed = solved(self._chain, starts, T, STEPS)
-        if not paths and not (missed < SOLVED).any():
+        if not others and not (missed < SOLVED).any():
             starts = self._seeds.starts(T)
             q, missed = solved(self._chain, starts, T, STEPS)
         q, missed = self._with_near(q, missed, T)
-        if not paths and not (missed < SOLVED).any():
+        if not others and not (missed < SOLVED).any():
             q, missed = solved(self._chain, starts[:FEW], T, MOST_STEPS)
         # what Newton's method nearly reaches after many steps is on a singularity
-        q = q[missed < (SOLVED if paths or (missed < SOLVED).any() else ON_EDGE)]
+        q = q[missed < (SOLVED if others or (missed < SOLVED).any() else ON_EDGE)]
         smallest = np.linalg.svd(self._chain.flange_and_jacobian(q)[1], compute_uv=False)[:, -1]
         regular = smallest > SINGULAR
-        if len(q) and not paths and not regular.any():
+        if len(q) and not others and not regular.any():
             raise SingularPose("goal", float(smallest.min()))
-        paths = sorted([*paths, *traced(self._chain, q[regular], T)], key=_place)
-        found: list[TracedCurve] = []
-        for path in paths:
+        return traced(self._chain, q[regular], T)
+
+    def _different(self, paths: Sequence[TracedPath], T: Array) -> list[TracedCurve]:
+        """The curves along paths, in their order, each once."""
+        if not paths:
+            return []
+        stack, found = TracedStack.of(paths), list[TracedCurve]()
+        places, near = stack.places_and_near()
+        for row in np.argsort(places, kind="stable").tolist():
             # where a curve bends, one start may pass another unseen
-            if not any(each.passes(path.q[0]) for each in found):
-                found.append(TracedCurve.of(self._chain, T, path, NumberedBranch(len(found) + 1)))
+            if not any(near[row, each.row] and each.passes(paths[row].q[0]) for each in found):
+                half = float(stack.half[row])
+                label = NumberedBranch(len(found) + 1)
+                found.append(TracedCurve(self._chain, T, stack, row, label, [(-half, half)]))
         return found
-
-
-def _place(path: TracedPath) -> float:
-    """A number that tells where a curve is, but not where its start is: curves are ordered by it.
-
-    It is the mean of a sum of waves along the curve, which full turns do not change.
-    """
-    q, tangents = np.array(path.q), np.array(path.tangents)
-    wave = np.sin(q + PHASES).sum(axis=1)
-    if len(q) == 1:
-        return float(wave[0])
-    slope = (np.cos(q + PHASES) * tangents).sum(axis=1)
-    length = np.linalg.norm(np.diff(q, axis=0), axis=1)
-    # the trapezoidal rule with its end correction
-    parts = length / 2 * (wave[1:] + wave[:-1]) - length**2 / 12 * np.diff(slope)
-    return float(parts.sum() / length.sum())

@@ -1,4 +1,9 @@
-"""A self-motion that is known by points along it: cubics between them, which Newton's method leads onto the curve."""
+"""A self-motion that is known by points along it: cubics between them, which Newton's method leads onto the curve.
+
+A member is the configuration of the curve across from the cubic: in the plane through its point at right angles to the
+direction there, which goes evenly from one tangent to the next. So the parameter of a member is found without
+kinematics, from the cubic alone.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models.robot import Array
-from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.chain import Chain, miss, pose_error
+from optimizer.kinematics.across_curve import onto
+from optimizer.kinematics.angles import nearest_turn, wrapped
+from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.curve_tracing import TracedPath
-from optimizer.kinematics.hermite import hermite
+from optimizer.kinematics.traced_stack import Rows, TracedStack
 from optimizer.problem.branches import BranchLabel
 
-# half the range of the parameter of a curve with two ends: no full turn, whose ends would be one
-OPEN = 3.0
-# Newton steps onto the curve, the error [m, rad] that needs no more, and what is added to J Jᵀ there
-CORRECTIONS, EXACT, DAMPING = 4, 1e-14, 1e-18
-# steps that find the member nearest to a configuration, the distance [rad] that needs no more, and the difference of
-# parameters for its derivative
-NEAREST, FOUND, STEP = 6, 1e-10, 1e-6
 # distance [rad] from the cubics within which a member is, and from the curve at which a configuration is one
 BESIDE, SAME = 0.05, 1e-5
 # rounding of an angle on a limit [rad]
@@ -32,29 +30,34 @@ FASTER = 1.5
 
 @dataclass(frozen=True, eq=False)
 class TracedCurve:
-    """`SelfMotion` by configurations `nodes` (m, nq) [rad] with unit `tangents` (m, nq) at parameters `knots` (m,).
+    """`SelfMotion` that holds the flange at T (4, 4), number `row` of the curves of this pose.
 
-    The parameter goes evenly with the length of the curve: from -π to π once around, or from -OPEN to OPEN.
-    `arcs` are the intervals of it that are meant: all of it, or what is within limits.
+    `arcs` are the intervals of its parameter that are meant: all of it, or what is within limits.
     """
 
     chain: Chain
     T: Array
-    nodes: Array
-    tangents: Array
-    knots: Array
-    closed: bool
+    stack: TracedStack
+    row: int
     label: BranchLabel
     arcs: list[tuple[float, float]]
 
     @classmethod
     def of(cls, chain: Chain, T: Array, path: TracedPath, label: BranchLabel) -> TracedCurve:
-        """The whole curve, which holds the flange at T (4, 4)."""
-        nodes = np.array(path.q)
-        length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(nodes, axis=0), axis=1)))
-        half = np.pi if path.closed else OPEN if len(nodes) > 1 else 0.0
-        knots = half * (2 * length / max(length[-1], 1e-300) - 1)
-        return cls(chain, T, nodes, np.array(path.tangents), knots, path.closed, label, [(-half, half)])
+        """The whole curve along a path."""
+        stack = TracedStack.of([path])
+        half = float(stack.half[0])
+        return cls(chain, T, stack, 0, label, [(-half, half)])
+
+    @property
+    def nodes(self) -> Array:
+        """The points (m, nq) [rad] that it is known by, without full turns left out."""
+        return self.stack.nodes[self._part]
+
+    @property
+    def closed(self) -> bool:
+        """Whether it ends where it begins, but for full turns."""
+        return bool(self.stack.half[self.row] == np.pi)
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -63,77 +66,18 @@ class TracedCurve:
 
     def at(self, parameter: Array) -> Array:
         """The configurations (n, nq) [rad] at parameters (n,) on the arcs."""
-        return self.onto(self.nearly(np.asarray(parameter, dtype=float)))
-
-    def onto(self, q: Array) -> Array:
-        """Configurations (n, nq) [rad] that hold the pose, nearest to such as nearly do."""
-        q = q.copy()
-        rows = np.arange(len(q))
-        for _ in range(CORRECTIONS):
-            T_reached, jacobian = self.chain.flange_and_jacobian(q[rows])
-            error = pose_error(T_reached, self.T)
-            off = miss(error) > EXACT
-            rows, error, jacobian = rows[off], error[off], jacobian[off]
-            if not len(rows):
-                break
-            across = jacobian.transpose(0, 2, 1)
-            square = jacobian @ across + DAMPING * np.eye(6)
-            q[rows] += (across @ np.linalg.solve(square, error[:, :, None]))[:, :, 0]
-        return np.clip(wrapped(q), -np.pi, np.pi)
-
-    def nearly(self, u: Array) -> Array:
-        """The curve (n, nq) [rad] at parameters (n,), without Newton's method."""
-        if len(self.knots) == 1:
-            return np.repeat(self.nodes, len(u), axis=0)
-        if self.closed:
-            u = wrapped(u)
-        k = np.clip(np.searchsorted(self.knots, u, side="right") - 1, 0, len(self.knots) - 2)
-        share = (u - self.knots[k]) / (self.knots[k + 1] - self.knots[k])
-        return self._on_piece(k, share)
-
-    def _on_piece(self, k: NDArray[np.intp], share: Array) -> Array:
-        """Points (n, nq) [rad] at shares (n,) of pieces k (n,) of the curve."""
-        q0, q1 = self.nodes[k], self.nodes[k + 1]
-        way = np.linalg.norm(q1 - q0, axis=1)[:, None]
-        return hermite(share, q0, q1, way * self.tangents[k], way * self.tangents[k + 1])
+        return members([self], [np.asarray(parameter, dtype=float)])[0]
 
     def parameter(self, q: Array) -> float:
         """The parameter of the member nearest to q (nq,) [rad], nearly."""
-        u = self._nearest(q)
-        best, least = u, np.inf
-        for _ in range(NEAREST):
-            before, here, after = self.at(np.array([u - STEP, u, u + STEP]))
-            gap = wrapped(q - here)
-            away = float(np.abs(gap).max())
-            if away < least:
-                best, least = u, away
-            tangent = wrapped(after - before) / (2 * STEP)
-            if away < FOUND or not tangent.any():
-                break
-            u = self.clipped(u + float(tangent @ gap) / float(tangent @ tangent))
-        return best
+        return self.clipped(self._nearest(q)[0])
 
     def passes(self, q: Array) -> bool:
         """Whether a configuration (nq,) [rad] that holds the pose is a member."""
-        if len(self.nodes) > 1:
-            steps, away = np.diff(self.nodes, axis=0), wrapped(q - self.nodes)
-            if np.sqrt((away * away).sum(axis=1).min()) > np.sqrt((steps * steps).sum(axis=1).max()) + BESIDE:
-                return False
-        nearly = self.nearly(np.array([self._nearest(q)]))[0]
-        if np.abs(wrapped(nearly - q)).max() > BESIDE:
+        parameter, away = self._nearest(q)
+        if away > BESIDE:
             return False
-        return bool(np.abs(wrapped(self.at(np.array([self.parameter(q)]))[0] - q)).max() < SAME)
-
-    def _nearest(self, q: Array) -> float:
-        """The parameter of the point between nodes nearest to q (nq,), without Newton's method."""
-        if len(self.knots) == 1:
-            return 0.0
-        away = wrapped(q - self.nodes[:-1])
-        chord = np.diff(self.nodes, axis=0)
-        share = np.clip((away * chord).sum(axis=1) / (chord * chord).sum(axis=1), 0.0, 1.0)
-        pieces = np.arange(len(chord))
-        k = int(np.abs(wrapped(self._on_piece(pieces, share) - q)).max(axis=1).argmin())
-        return self.clipped(float(self.knots[k] + share[k] * (self.knots[k + 1] - self.knots[k])))
+        return bool(np.abs(wrapped(self.at(np.array([self.clipped(parameter)]))[0] - q)).max() < SAME)
 
     def clipped(self, parameter: float) -> float:
         """The nearest parameter on an arc."""
@@ -141,9 +85,9 @@ class TracedCurve:
         for lower, upper in self.arcs:
             middle = (lower + upper) / 2
             near = parameter + 2 * np.pi * round((middle - parameter) / (2 * np.pi)) if self.closed else parameter
-            on_arc = float(np.clip(near, lower, upper))
+            on_arc = min(max(near, lower), upper)
             found.append((abs(near - on_arc), on_arc))
-        return min(found)[1]
+        return float(min(found)[1])
 
     def boxes(self, parameter: Array, half: Array) -> tuple[Array, Array]:
         """See `SelfMotion`; by the greatest rate of each joint between nodes.
@@ -151,13 +95,45 @@ class TracedCurve:
         No bound rests on this alone: where curves may be missed, bounds cover all configurations.
         """
         centre = self.at(np.asarray(parameter, dtype=float))
-        if len(self.knots) == 1:
+        if len(self.nodes) == 1:
             return centre, np.full_like(centre, ROUNDING)
-        rates = np.abs(np.diff(self.nodes, axis=0) / np.diff(self.knots)[:, None]).max(axis=0)
+        rates = np.abs(np.diff(self.nodes, axis=0) / np.diff(self.stack.knots[self._part])[:, None]).max(axis=0)
         return centre, np.minimum(FASTER * np.asarray(half, dtype=float)[:, None] * rates + ROUNDING, np.pi)
+
+    @property
+    def _part(self) -> slice:
+        """The rows of its points."""
+        return slice(int(self.stack.first[self.row]), int(self.stack.last[self.row]) + 1)
+
+    def _nearest(self, q: Array) -> tuple[float, float]:
+        """The parameter of the point between nodes across from q (nq,), and how far [rad] it is from q, or more."""
+        stack, part = self.stack, self._part
+        k: Rows = np.arange(part.start, max(part.stop - 1, part.start + 1))
+        unwound = nearest_turn(q, stack.nodes[k])
+        ways = np.maximum(stack.ways[k], ROUNDING)
+        share = ((unwound - stack.nodes[k]) * stack.tangents[k]).sum(axis=1) / ways
+        chosen = np.abs(stack.at(k, np.minimum(np.maximum(share, 0.0), 1.0)) - unwound).max(axis=1).argsort()[:3]
+        k, unwound = k[chosen], unwound[chosen]
+        share = stack.in_line(k, np.minimum(np.maximum(share[chosen], 0.0), 1.0), unwound)
+        # next to a point, rounding may have it beyond the ends of both ways: it is little beyond either
+        beyond = np.abs(share - np.minimum(np.maximum(share, 0.0), 1.0)) * ways[chosen]
+        away = np.abs(stack.at(k, share) - unwound).max(axis=1) + beyond
+        best = int(away.argmin())
+        after = min(int(k[best]) + 1, part.stop - 1)
+        low, high = stack.knots[k[best]], stack.knots[after]
+        return float(low + share[best] * (high - low)), float(away[best])
 
 
 def members(curves: Sequence[TracedCurve], parameters: Sequence[Array]) -> list[Array]:
     """The configurations (n, nq) [rad] of each of the curves of one pose at its parameters (n,)."""
-    near = [curve.nearly(at) for curve, at in zip(curves, parameters, strict=True)]
-    return np.split(curves[0].onto(np.vstack(near)), np.cumsum([len(each) for each in near])[:-1])
+    one, counts = curves[0], [len(at) for at in parameters]
+    rows = np.repeat([curve.row for curve in curves], counts)
+    k, share = one.stack.pieces(np.concatenate(parameters), rows)
+    return np.split(on_curve(one, k, share), np.cumsum(counts)[:-1])
+
+
+def on_curve(one: TracedCurve, k: Rows, share: Array) -> Array:
+    """The members (n, nq) [rad] across from the cubics at shares (n,) of the ways from points k (n,) to the next ones.
+    `one` is any curve of the pose."""
+    q = onto(one.chain, one.stack.at(k, share), one.stack.along(k, share), one.T)
+    return np.clip(wrapped(q), -np.pi, np.pi)

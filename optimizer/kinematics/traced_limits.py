@@ -1,4 +1,7 @@
-"""Where the curves of `traced_curve` that hold one pose are within position limits, all curves at once."""
+"""Where the curves of `traced_curve` that hold one pose are within position limits, all curves at once.
+
+A cubic is within the hull of its four control points: most are inside all limits, or outside one, by that alone.
+"""
 
 from __future__ import annotations
 
@@ -6,77 +9,97 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from models.robot import Array, Mask
+from optimizer.kinematics.across_curve import LAST, TINY, nearly_error
 from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.hermite import hermite
-from optimizer.kinematics.traced_curve import TracedCurve
+from optimizer.kinematics.traced_curve import TracedCurve, on_curve
+from optimizer.kinematics.traced_stack import Rows, TracedStack
 
-# parts of each piece between whose ends a curve is held against limits, and steps that find where it crosses them
-PARTS, CROSSINGS = 4, 16
-# steps of the curve itself from where its cubics cross, and the difference of shares for their slope
-FROM_CUBICS, STEP = 5, 1e-5
+# parts of a piece that may cross limits, between whose ends it is held against them
+PARTS = 8
+# steps of Newton's method to where a curve crosses limits, and steps that find what it does not
+STEPS, CROSSINGS = 5, 16
+# longest step there, and distance [rad] from the cubics within which a curve is
+NEAR = 0.05
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class _Range:
+    """The joints that have limits, the middles (m,) of their ranges and half their widths (m,) [rad]."""
+
+    joints: Rows
+    middle: Array
+    half: Array
+
+    @classmethod
+    def of(cls, q_min: Array, q_max: Array) -> _Range:
+        """Of limits (nq,) [rad]; a joint that may turn all around has none."""
+        joints = np.flatnonzero(q_max - q_min < 2 * np.pi)
+        return cls(joints, ((q_min + q_max) / 2)[joints], ((q_max - q_min) / 2)[joints])
+
+    def excess(self, q: Array) -> Array:
+        """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
+        away = np.abs(wrapped(q[:, self.joints] - self.middle)) - self.half
+        return np.asarray(away.max(axis=1, initial=-np.pi))
 
 
 def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
     """The curves of one pose, cut to where they are within limits (nq,) [rad] but for full turns; without those that
     are nowhere."""
-    points = [curve for curve in curves if len(curve.knots) == 1]
-    outside = {id(each) for each in points if _excess(each.nodes, q_min, q_max)[0] > 0}
-    lines = [curve for curve in curves if len(curve.knots) > 1]
-    cut = dict(zip(map(id, lines), _cut(lines, q_min, q_max), strict=True)) if lines else {}
-    kept = ((curve, cut.get(id(curve), curve.arcs)) for curve in curves if id(curve) not in outside)
-    return [curve if arcs == curve.arcs else replace(curve, arcs=arcs) for curve, arcs in kept if arcs]
+    limits = _Range.of(q_min, q_max)
+    if not curves or not len(limits.joints):
+        return list(curves)
+    cut = _cut(curves, limits)
+    return [
+        curve if arcs == curve.arcs else replace(curve, arcs=arcs)
+        for curve, arcs in zip(curves, cut, strict=True)
+        if arcs
+    ]
 
 
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """The cubics (m,) between the nodes of curves: ends and slopes (m, nq), and the parameters `knots` (2, m) there."""
-
-    q0: Array
-    q1: Array
-    slope0: Array
-    slope1: Array
-    knots: Array
-
-    @classmethod
-    def of(cls, curves: Sequence[TracedCurve]) -> _Pieces:
-        """Those of all curves, one curve after the other."""
-        q0, q1, t0, t1 = (
-            np.vstack([getattr(curve, name)[part] for curve in curves])
-            for name in ("nodes", "tangents")
-            for part in (slice(None, -1), slice(1, None))
-        )
-        way = np.linalg.norm(q1 - q0, axis=1)[:, None]
-        knots = np.hstack([np.stack([curve.knots[:-1], curve.knots[1:]]) for curve in curves])
-        return cls(q0, q1, way * t0, way * t1, knots)
-
-    def at(self, k: NDArray[np.intp], share: Array) -> Array:
-        """Points (n, nq) [rad] at shares (n,) of pieces k (n,)."""
-        return hermite(share, self.q0[k], self.q1[k], self.slope0[k], self.slope1[k])
-
-
-def _cut(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[list[tuple[float, float]]]:
+def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float, float]]]:
     """The arcs of each curve within limits."""
-    pieces = _Pieces.of(curves)
-    count = len(pieces.q0)
-    share = np.linspace(0.0, 1.0, PARTS + 1)
-    sampled = pieces.at(np.repeat(np.arange(count), PARTS + 1), np.tile(share, count))
-    inside = (_excess(sampled, q_min, q_max) <= 0).reshape(count, PARTS + 1)
-    piece, part = np.nonzero(inside[:, 1:] != inside[:, :-1])
-    ends = np.zeros(0)
-    if len(piece):
-        at = _crossings(curves[0], pieces, piece, share[[part, part + 1]], inside[piece, part], q_min, q_max)
-        low, high = pieces.knots[:, piece]
-        ends = low + at * (high - low)
-    last = np.cumsum([len(curve.knots) - 1 for curve in curves])
-    crossed = np.split(ends, np.searchsorted(piece, last)[:-1])
-    starts_inside, ends_inside = inside[np.append(0, last[:-1]), 0], inside[last - 1, -1]
-    each = zip(curves, crossed, starts_inside.tolist(), ends_inside.tolist(), strict=True)
-    return [_arcs(curve, own.tolist(), first, final) for curve, own, first, final in each]
+    stack = curves[0].stack
+    inside, undecided = _by_hull(stack, limits)
+    at, piece = np.zeros(0), np.zeros(0, dtype=np.intp)
+    if len(undecided):
+        share = np.linspace(0.0, 1.0, PARTS + 1)
+        sampled = stack.at(np.repeat(undecided, PARTS + 1), np.tile(share, len(undecided)))
+        excess = limits.excess(sampled).reshape(len(undecided), PARTS + 1)
+        held = excess <= 0
+        row, part = np.nonzero(held[:, 1:] != held[:, :-1])
+        piece = undecided[row]
+        if len(piece):
+            parts = np.array([part, part + 1])
+            at = _crossings(curves[0], limits, piece, share[parts], excess[row, parts])
+    gap = stack.knots[np.minimum(piece + 1, len(inside) - 1)] - stack.knots[piece]
+    ends = stack.knots[piece] + at * gap
+    crossed = np.split(ends, np.searchsorted(piece, stack.last[:-1]))
+    first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
+    return [_arcs(each, crossed[each.row].tolist(), first[each.row], last[each.row]) for each in curves]
+
+
+def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
+    """Which nodes (n,) are inside limits, and the rows of those nodes after which the cubic may cross one."""
+    q, tangents = stack.nodes[:, limits.joints], stack.tangents[:, limits.joints]
+    points = np.empty((4, len(q) - 1, len(limits.joints)))
+    points[0] = wrapped(q[:-1] - limits.middle)
+    # the other ones without full turns left out
+    third = stack.ways[:-1, None] / 3
+    points[1], points[3] = points[0] + third * tangents[:-1], points[0] + (q[1:] - q[:-1])
+    points[2] = points[3] - third * tangents[1:]
+    least, most = points.min(axis=0), points.max(axis=0)
+    held = ((least >= -limits.half) & (most <= limits.half)).all(axis=1)
+    beyond = 2 * np.pi - limits.half
+    outside = ((least > limits.half) & (most < beyond)) | ((most < -limits.half) & (least > -beyond))
+    inside: Mask = np.asarray((np.abs(wrapped(q - limits.middle)) <= limits.half).all(axis=1))
+    # of nodes on a limit, rounding may have it that hull and node differ
+    crossing = ~(held & inside[:-1] & inside[1:]) & ~(outside.any(axis=1) & ~inside[:-1] & ~inside[1:])
+    crossing[stack.last[:-1]] = False
+    return inside, np.flatnonzero(crossing)
 
 
 def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> list[tuple[float, float]]:
@@ -84,9 +107,9 @@ def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> lis
     if not ends:
         return curve.arcs if first else []
     if first:
-        ends.insert(0, float(curve.knots[0]))
+        ends.insert(0, curve.arcs[0][0])
     if last:
-        ends.append(float(curve.knots[-1]))
+        ends.append(curve.arcs[0][1])
     arcs = list(zip(ends[::2], ends[1::2], strict=True))
     if curve.closed and first and last:
         # the arc goes on behind the curve's own start
@@ -95,29 +118,47 @@ def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> lis
     return arcs
 
 
-def _crossings(
-    curve: TracedCurve, pieces: _Pieces, k: NDArray[np.intp], share: Array, inside: Mask, q_min: Array, q_max: Array
-) -> Array:
-    """Shares (n,) of pieces k (n,) at which they cross limits, between those given (2, n); `inside` (n,): at the first
-    of these they are in. `curve` is any one of the pose."""
-    # what is aimed at is inside, by half of what rounding is given
+def _crossings(one: TracedCurve, limits: _Range, k: Rows, share: Array, excess: Array) -> Array:
+    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, between those given (2, n), at
+    which the cubics exceed them by so much (2, n). `one` is any curve of the pose."""
+    stack = one.stack
+    # a chord crosses limits next to where the curve does
+    at = share[0] - excess[0] * (share[1] - share[0]) / (excess[1] - excess[0])
+    q, exact = _on_limits(one, limits, stack.at(k, at))
+    at = stack.in_line(k, at, q)
+    exact &= (at >= 0) & (at <= 1) & (np.abs(stack.at(k, at) - q).max(axis=1) < NEAR)
+    rest = np.flatnonzero(~exact)
+    if len(rest):
+        # what is aimed at is inside, by half of what rounding is given
+        at[rest] = _zeros(
+            lambda share: limits.excess(on_curve(one, k[rest], share)) + ROUNDING / 2,
+            share[:, rest],
+            excess[0, rest] <= 0,
+        )
+    return at
 
-    def nearly(share: Array) -> Array:
-        return _excess(pieces.at(k, share), q_min, q_max) + ROUNDING / 2
 
-    def beyond(share: Array) -> Array:
-        return _excess(curve.onto(pieces.at(k, share)), q_min, q_max) + ROUNDING / 2
-
-    # the cubics cross limits next to where the curve does, at nearly the same rate
-    at = _zeros(nearly, share, inside)
-    slope = (nearly(at + STEP) - nearly(at - STEP)) / (2 * STEP)
-    for _ in range(FROM_CUBICS):
-        f = beyond(at)
-        exact = np.abs(f) < ROUNDING / 2
-        if exact.all():
-            return at
-        at = np.where(exact, at, np.clip(at - f / np.where(slope == 0, 1.0, slope), *share))
-    return np.where(exact, at, _zeros(beyond, share, inside))
+def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]:
+    """The configurations (n, nq) [rad] of the curves next to q (n, nq) with a joint on its limit, and which are found
+    (n,)."""
+    n, nq = q.shape
+    rows = np.arange(n)
+    own = wrapped(q[:, limits.joints] - limits.middle)
+    binding = (np.abs(own) - limits.half).argmax(axis=1)
+    joint, side = limits.joints[binding], np.sign(own[rows, binding])
+    target = q[rows, joint] + side * (limits.half[binding] - ROUNDING / 2) - own[rows, binding]
+    for _ in range(STEPS):
+        reached, jacobian = one.chain.flange_and_jacobian(q)
+        system, sides = TINY * np.tile(np.eye(nq), (n, 1, 1)), np.empty((n, nq, 1))
+        system[:, :-1] += jacobian
+        system[rows, -1, joint] += 1.0
+        sides[:, :-1, 0], sides[:, -1, 0] = nearly_error(reached, one.T), target - q[rows, joint]
+        move = np.linalg.solve(system, sides)[:, :, 0]
+        q = q + np.clip(move, -NEAR, NEAR)
+        last = np.abs(move).max(axis=1)
+        if last.max() < LAST:
+            break
+    return q, (last < LAST) & (limits.excess(q) <= 0)
 
 
 def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Array:
@@ -129,7 +170,7 @@ def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Arra
     for _ in range(CROSSINGS):
         # regula falsi after Illinois: the end that stays counts half
         span = np.where(f_high == f_low, 1.0, f_high - f_low)
-        at = np.clip(low - f_low * (high - low) / span, low, high)
+        at = np.minimum(np.maximum(low - f_low * (high - low) / span, low), high)
         f = beyond(at)
         found = np.where(np.isnan(found) & (np.abs(f) < ROUNDING / 2), at, found)
         if not np.isnan(found).any():
@@ -139,10 +180,3 @@ def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Arra
         f_low = np.where(is_low, f, f_low / 2)
         low, high = np.where(is_low, at, low), np.where(is_low, high, at)
     return np.asarray(np.where(np.isnan(found), np.where(inside, low, high), found))
-
-
-def _excess(q: Array, q_min: Array, q_max: Array) -> Array:
-    """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
-    away = np.abs(wrapped(q - (q_min + q_max) / 2)) - (q_max - q_min) / 2
-    # a joint that may turn all around has no limits
-    return np.asarray(np.where(q_max - q_min >= 2 * np.pi, -np.pi, away).max(axis=1))

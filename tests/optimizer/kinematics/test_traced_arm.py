@@ -33,6 +33,31 @@ GEN3, CHAIN, PANDA = load_robot("gen3"), serial_chain(7), load_robot("panda")
 LIMIT = 1e-8
 # share of the members of a closed form that are on the curves found: of a pose next to a singularity some are not
 COVERED = 0.99
+# configurations [rad] next to which the curve of their pose bends by a right angle
+BENT_CURVES = (
+    np.array(
+        [
+            3.256659238593,
+            1.948959883509,
+            -2.422764709346,
+            -0.018044398995,
+            -1.67515131775,
+            -1.234699211912,
+            2.060620294338,
+        ]
+    ),
+    np.array(
+        [
+            -0.126385570041,
+            -1.919812342287,
+            -5.725919272076,
+            0.013887084391,
+            5.415236936654,
+            1.99441613167,
+            -5.766354239582,
+        ]
+    ),
+)
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
 
@@ -98,7 +123,7 @@ def test_the_curves_of_the_arm_nearby_are_near_those_of_the_arm() -> None:
         for q in rng.uniform(-1.5, 1.5, (5, 7)):
             T = chain.flange(q[None])[0]
             found, rest = nearby.loops(T)
-            starts = np.vstack([*found, rest])
+            starts = np.vstack([*found, *rest])
             assert len(starts) and miss(pose_error(chain.flange(starts), T)).max() < 2e-3
         found = TracedArm.of(model)
         assert found is not None and found.self_motions(T)
@@ -158,6 +183,14 @@ def test_what_limits_cut_off_is_outside(robot: Robot, arm: TracedArm) -> None:
     assert cut > 0
 
 
+def test_the_parameter_of_a_member_is_found_again(robot: Robot, arm: TracedArm) -> None:
+    rng = np.random.default_rng(60)
+    for curve in arm.self_motions(flange(robot, inside(robot, rng))):
+        for u in rng.uniform(*curve.arcs[0], 4):
+            found = curve.at(np.array([u, curve.parameter(curve.at(np.array([u]))[0])]))
+            assert np.abs(wrapped(found[1] - found[0])).max() < LIMIT
+
+
 def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
     rng = np.random.default_rng(54)
     for curve in arm.self_motions(flange(robot, inside(robot, rng))):
@@ -197,6 +230,15 @@ def test_most_nearly_straight_arms_are_found() -> None:
         missed += not found
         assert k > 0 or found
     assert missed <= 1
+
+
+def test_a_curve_that_bends_within_a_thousandth_goes_on() -> None:
+    """The curves of two nearly straight arms ended there once, 1e-4 before these configurations."""
+    arm = TracedArm.of(GEN3.model)
+    assert arm is not None
+    for q in BENT_CURVES:
+        curves = arm.self_motions(flange(GEN3, q))
+        assert min(away(each, q) for each in curves) < FOUND and all(each.closed for each in curves)
 
 
 def test_out_of_reach_no_distance_is_claimed() -> None:
