@@ -37,8 +37,11 @@ ROUNDS, RADIUS, LEAST_RADIUS = 8, 0.6, 0.01
 # relative decrease of the energy below which no further round follows, and that a step to a proposal must promise: the
 # motion to it is solved again
 GAIN, PROGRESS = 2e-4, 5e-4
-# relative decrease of the energy that is worth another solve
-LEAST_GAIN = 1e-4
+# relative decrease of the energy that is worth another solve, and share of the promised decrease below which the
+# manifold bends too much within the trust region
+LEAST_GAIN, KEPT = 1e-4, 0.1
+# a goal that moves by less is where it should be [rad]
+LEAST_MOVE = 1e-3
 # shares of the way to a proposed goal that are tried
 SHARES = (1.0, 0.9, 0.5)
 REFINED_GOAL = "converged; goal orientation refined from a sampled orientation"
@@ -74,31 +77,37 @@ def refine_goal(incumbent: Incumbent, candidate: Candidate, rounds: int = ROUNDS
             break
         try:
             with watch(incumbent.deadline):
-                fresh = _moved(incumbent, best, radius)
+                fresh, promised = _moved(incumbent, best, radius)
         except DeadlinePassed:
             break
-        if fresh is None or (fresh.energy or 0.0) >= (best.energy or 0.0):
-            radius /= 4
-            continue
-        gain = (best.energy or 0.0) - (fresh.energy or 0.0)
-        best = fresh
-        if gain < GAIN * abs(best.energy or 0.0):
+        before = best.energy or 0.0
+        gain = 0.0 if fresh is None else before - (fresh.energy or 0.0)
+        if fresh is not None and gain > 0:
+            best = fresh
+        if gain < GAIN * abs(before) and before - promised < GAIN * abs(before):
             break
+        if gain < KEPT * (before - promised):
+            radius /= 4
     return best
 
 
-def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> Candidate | None:
-    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved; None if it has no motion."""
+def _moved(incumbent: Incumbent, candidate: Candidate, radius: float) -> tuple[Candidate | None, float]:
+    """The candidate with its goal moved by at most `radius` [rad] in each joint, solved, None if it has no motion; and
+    the energy [J] that was promised to first order, -inf if the first order has no motion either."""
     guess, promised = _proposal(incumbent, candidate, radius)
-    if guess is None or promised > (1 - LEAST_GAIN) * (candidate.energy or 0.0):
-        return None
+    if guess is None:
+        return None, -np.inf
+    if promised > (1 - LEAST_GAIN) * (candidate.energy or 0.0):
+        return None, promised
+    if np.abs(guess.points[-1] - candidate.q_goal).max() < LEAST_MOVE:
+        return None, candidate.energy or 0.0
     for share in SHARES:
         # where the set bends, its configuration next to the proposed one may be outside of a limit that this one is on
         asked = candidate.q_goal + share * (guess.points[-1] - candidate.q_goal)
         found = _nearest_goal(incumbent, candidate, asked)
         if found is not None:
-            return _solved(incumbent, candidate, *found, guess)
-    return None
+            return _solved(incumbent, candidate, *found, guess), promised
+    return None, promised
 
 
 def _nearest_goal(incumbent: Incumbent, candidate: Candidate, q: Array) -> tuple[EndConfiguration, Array] | None:

@@ -26,6 +26,7 @@ from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_others
+from optimizer.search.near_goals import activate_near_goals
 from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
@@ -67,6 +68,7 @@ class Run:
         prepared = PreparedProblem.of(problem) if like is None else like.sharing(problem)
         self.incumbent = Incumbent(prepared, Deadline.after(problem.deadline, clock), tell=tell)
         self.unreachable: list[UnreachableTarget] = []
+        self.moved = self.lost = False
 
     def prepare(self) -> None:
         """Find the candidates, and give each its lower bound. Raises the errors of `optimize` that need no search."""
@@ -181,15 +183,38 @@ class Run:
                 most_solved,
                 incumbent.tell_tried,
             )
-            if incumbent.best() is not None or incumbent.deadline.passed or not self.activate():
+            solved = incumbent.best() is not None and not self.has_lost_a_goal()
+            if solved or incumbent.deadline.passed or not self.activate():
                 break
+
+    def has_lost_a_goal(self) -> bool:
+        """Whether, for the first time, no motion was found to one of the best goals of free orientation.
+
+        Where torque hardly suffices, there may be one to a goal beside it.
+        """
+        lost = any(
+            each.status is CandidateStatus.FAILED and each.attempt is not None and each.attempt.collision is None
+            for each in self.incumbent.candidates
+            if each.goal.tolerance is not None
+        )
+        first, self.lost = lost and not self.lost, self.lost or lost
+        return first
 
     def activate(self) -> bool:
         """Activate deferred candidates; false if there are none."""
-        incumbent = self.incumbent
-        if any(slides(incumbent.prepared, each) for each in incumbent.candidates):
-            return activate_seeds(incumbent.prepared, incumbent.candidates)
-        return activate_deferred(incumbent.candidates)
+        prepared, candidates = self.incumbent.prepared, self.incumbent.candidates
+        if not self.moved and self.problem.tool_path is None:
+            self.moved = True
+            if activate_near_goals(prepared, candidates):
+                self.activate_samples([each for each in candidates if each.goal.tolerance is None])
+                return True
+        return self.activate_samples(candidates)
+
+    def activate_samples(self, candidates: list[Candidate]) -> bool:
+        """Activate deferred ones of these candidates; false if there are none."""
+        if any(slides(self.incumbent.prepared, each) for each in candidates):
+            return activate_seeds(self.incumbent.prepared, candidates)
+        return activate_deferred(candidates)
 
     def without_storage(self) -> tuple[Candidate, SolveResult, Energy] | None:
         """The best motion on the same bus without its energy storage, valued with it; None if time is too short.

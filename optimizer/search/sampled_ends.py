@@ -13,13 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from models.robot import Array
-from optimizer.exceptions import JoulepathError, SingularPose
+from optimizer.exceptions import JoulepathError
 from optimizer.kinematics.angles import nearest_turn
+from optimizer.kinematics.goal_manifold import GoalManifold
 from optimizer.kinematics.inverse import required_inverse_kinematics
-from optimizer.kinematics.orientation_tolerance import nearest_orientation
-from optimizer.kinematics.tcp import flange_pose, tcp_pose
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.search.candidates import Candidate, Reason, bound
 from optimizer.search.ends import SIDES, EndConfiguration, label_of
 from optimizer.solution import CandidateStatus
@@ -32,21 +30,30 @@ MOST_REFINED = 4
 SAME = 1e-6
 
 
-def activate_deferred(candidates: Sequence[Candidate]) -> bool:
-    """Activate the deferred samples of least lower bound; false if there are none."""
+def activate_deferred(candidates: Sequence[Candidate], batch: int = BATCH, most_alike: int = ALIKE) -> bool:
+    """Activate the deferred samples of least lower bound; false if there are none.
+
+    At most `batch` of them, so that at most `most_alike` of a pair of branches are active then, unless all are.
+    """
     alike: Counter[tuple[str, str, int]] = Counter()
+    if most_alike < ALIKE:
+        alike.update(_kind(each) for each in candidates if not each.deferred)
     opened = 0
     for candidate in sorted((e for e in candidates if e.deferred), key=lambda e: (e.lower_bound, e.shortest)):
-        kind = (candidate.start.label, candidate.goal.label, candidate.goal.target)
-        if candidate.status is not CandidateStatus.UNVISITED or alike[kind] == ALIKE:
+        if candidate.status is not CandidateStatus.UNVISITED or alike[_kind(candidate)] >= most_alike:
             continue
-        alike[kind] += 1
+        alike[_kind(candidate)] += 1
         candidate.deferred = False
         candidate.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
         opened += 1
-        if opened == BATCH:
+        if opened == batch:
             break
     return opened > 0
+
+
+def _kind(candidate: Candidate) -> tuple[str, str, int]:
+    """The pair of branches that a candidate is of, and its target."""
+    return candidate.start.label, candidate.goal.label, candidate.goal.target
 
 
 def between(
@@ -98,7 +105,7 @@ def with_ends(prepared: PreparedProblem, candidate: Candidate, q_start: Array, q
 
     An end that is no sample stays where it is.
     """
-    start, goal = _moved(prepared, candidate.start, q_start), _moved(prepared, candidate.goal, q_goal)
+    start, goal = moved_end(prepared, candidate.start, q_start), moved_end(prepared, candidate.goal, q_goal)
     fresh = Candidate(start, goal, q_start, q_goal)
     try:
         sampled = [name for name in SIDES if getattr(candidate, name).sampled]
@@ -110,30 +117,22 @@ def with_ends(prepared: PreparedProblem, candidate: Candidate, q_start: Array, q
 
 def nearest_configuration(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> Array | None:
     """The configuration (nq,) of a sampled end's target that is nearest to q (nq,), if any is within the limits."""
-    limits, found = prepared.problem.arm.active_limits, list[Array]()
-    if end.self_motion is not None:
-        principal = [end.self_motion.at(np.array([end.self_motion.parameter(q)]))[0]]
-    else:
-        assert end.tolerance is not None
-        principal = _branches_of(prepared, end.tolerance, q)
-    for branch in principal:
-        near = nearest_turn(branch, q)
-        if ((near >= limits.q_min) & (near <= limits.q_max)).all():
-            found.append(near)
-    return min(found, key=lambda near: _distance(near, q), default=None)
-
-
-def _branches_of(prepared: PreparedProblem, pose: ConeOrientedPose, q: Array) -> list[Array]:
-    """The branches, in [-pi, pi], of the pose with the allowed orientation nearest to that at q (nq,)."""
     arm = prepared.problem.arm
-    T_base_tcp = pose.with_orientation(nearest_orientation(pose, tcp_pose(arm, q)[:3, :3])).T
-    kinematics = required_inverse_kinematics(arm.robot, "goal")
-    try:
-        branches = kinematics.branches(flange_pose(T_base_tcp, arm.T_flange_tcp))
-    except SingularPose:
-        return []
+    if end.self_motion is None:
+        assert end.tolerance is not None
+        (found,), (reached,) = GoalManifold.of(arm, end.tolerance).put(q[None])
+        return np.asarray(found) if reached and on_branch(prepared, found) else None
+    near = nearest_turn(end.self_motion.at(np.array([end.self_motion.parameter(q)]))[0], q)
+    inside = (near >= arm.active_limits.q_min) & (near <= arm.active_limits.q_max)
+    return near if inside.all() else None
+
+
+def on_branch(prepared: PreparedProblem, q: Array) -> bool:
+    """Whether a configuration (nq,) [rad] is on a branch that the problem allows."""
     wanted = prepared.problem.branch
-    return [each.q for each in branches if wanted is None or wanted.allows(each.label, each.singular)]
+    if wanted is None:
+        return True
+    return wanted.allows(required_inverse_kinematics(prepared.arm.robot, "goal").label(q))
 
 
 def _reaches(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> bool:
@@ -144,7 +143,7 @@ def _reaches(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> bool
     return nearest is not None and _distance(nearest, q) < SAME
 
 
-def _moved(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> EndConfiguration:
+def moved_end(prepared: PreparedProblem, end: EndConfiguration, q: Array) -> EndConfiguration:
     """The end at another configuration (nq,) of its target."""
     if not end.sampled:
         return end

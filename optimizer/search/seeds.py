@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from models.robot import Array, Mask
+from optimizer.energy.dwell import brake_power, waits
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from optimizer.search.candidates import Candidate, Reason
@@ -45,7 +46,7 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     energy = estimates(prepared, known)
     least = _least(known, energy)
     order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]
-    near, count = (NEAR_IN_WORK, MOST_SEEDS_FOR_WORK) if _is_work(prepared.problem) else (NEAR, MOST_SEEDS)
+    near, count = how_near(prepared.problem)
     # an energy is negative where the supply takes more back than it gives
     most = energy[order[0]] + (near - 1) * abs(energy[order[0]])
     chosen = [k for k in order if energy[k] <= most][:count]
@@ -56,28 +57,53 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
 
 
 def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
-    """Objectives (n,) [J] of quintics on straight lines, of the best of a few durations, raised where a torque is too
-    high."""
+    """Objectives (n,) [J] of quintics between the ends of candidates: see `estimates_between`."""
     q_start, q_goal = (np.array([getattr(each, name) for each in candidates]) for name in ("q_start", "q_goal"))
+    return estimates_between(prepared, q_start, q_goal, np.array([each.shortest for each in candidates]))
+
+
+def estimates_between(prepared: PreparedProblem, q_start: Array, q_goal: Array, shortest: Array) -> Array:
+    """Objectives (n,) [J] of quintics on straight lines between configurations (n, nq) [rad], of the best of a few
+    durations by the `shortest` ones (n,) [s], raised where a torque is too high."""
     (at, rate, acceleration), weights = _quintic()
-    way, best = (q_goal - q_start)[:, None], np.full(len(candidates), np.inf)
-    q = q_start[:, None] + way * at
-    for durations in _durations(prepared.problem, np.array([each.shortest for each in candidates])):
+    way, count = (q_goal - q_start)[:, None], len(q_start)
+    best, q = np.full(count, np.inf), q_start[:, None] + way * at
+    for durations in _durations(prepared.problem, shortest):
         T = durations[:, None, None]
         y = np.concatenate([q, way * rate / T, way * acceleration / T**2], axis=2)
         cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
-        beyond = np.abs(tau / prepared.arm.active_limits.tau_max).max(axis=1).reshape(len(candidates), -1).max(axis=1)
-        energy = durations * (cost.reshape(len(candidates), -1) @ weights)
-        best = np.minimum(best, energy + np.abs(energy) * np.maximum(beyond - 1, 0.0))
+        beyond = np.abs(tau / prepared.arm.active_limits.tau_max).max(axis=1).reshape(count, -1).max(axis=1)
+        energy = durations * (cost.reshape(count, -1) @ weights)
+        energy += np.abs(energy) * np.maximum(beyond - 1, 0.0)
+        best = np.minimum(best, energy + _waiting(prepared, q_goal, durations))
     return best
 
 
+def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Array:
+    """Energies (n,) [J] of waiting at goals (n, nq) [rad] until the cycle ends, after motions of durations (n,) [s]."""
+    problem = prepared.problem
+    if problem.cycle is None or _is_work(problem):
+        return np.zeros(len(durations))
+    by_motors, by_brakes = np.array([waits(problem.cycle, T) for T in durations.tolist()]).T
+    return np.asarray(prepared.holding_power(q_goal) * by_motors + brake_power(problem.cycle, prepared.arm) * by_brakes)
+
+
 def _durations(problem: Problem, shortest: Array) -> list[Array]:
-    """The durations (n,) [s] that are tried, within those that are allowed; for work the longest one, too."""
+    """The durations (n,) [s] that are tried, within those that are allowed; for work and in a cycle the longest one,
+    too."""
     least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
     most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
+    if problem.cycle is not None:
+        most = min(most, problem.cycle.time)
+    if least == most:
+        return [np.full_like(shortest, most)]
     tried = [np.clip(scale * shortest, least, most) for scale in TIME_SCALES]
-    return [*tried, np.full_like(shortest, most)] if _is_work(problem) else tried
+    return [*tried, np.full_like(shortest, most)] if _is_work(problem) or problem.cycle is not None else tried
+
+
+def how_near(problem: Problem) -> tuple[float, int]:
+    """At most this ratio of the least estimate do seeds need, and so many are solved at a time."""
+    return (NEAR_IN_WORK, MOST_SEEDS_FOR_WORK) if _is_work(problem) else (NEAR, MOST_SEEDS)
 
 
 def _is_work(problem: Problem) -> bool:
