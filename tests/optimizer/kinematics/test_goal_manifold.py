@@ -1,0 +1,117 @@
+"""Configurations that reach a pose of free orientation: put on their manifold, and moved over it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.kinematics.goal_manifold import GoalManifold
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.problem.arm import Arm
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.pose import Pose
+
+# m, rad: far below what the certificate allows
+REACHED = 1e-9
+# displacement [rad] from the manifold, and how much farther than this Newton's method may end
+ASIDE, FARTHER = 0.03, 4.0
+# least share of configurations, from anywhere, that the way over the manifold leads back onto it
+MOSTLY = 0.9
+# relative: quadratic steps end next to where a sum of distances has its corner
+FLAT = 0.02
+ROBOTS = ("panda", "xarm7", "gen3", "ur5e")
+
+
+def poses(arm: Arm, q: Array) -> list[ConeOrientedPose]:
+    """Poses that q (nq,) reaches: turned about an axis, within a cone, on the edge of one, of any orientation."""
+    T, axis = tcp_pose(arm, q), np.array([0.3, -0.2, 1.0])
+    pointing = T[:3, :3] @ axis / np.linalg.norm(axis)
+    across = np.cross(pointing, [1.0, 0.0, 0.0])
+    beside = np.cos(0.4) * pointing + np.sin(0.4) * across / np.linalg.norm(across)
+    return [
+        ConeOrientedPose.about(Pose(T), axis),
+        ConeOrientedPose(T[:3, 3], axis, pointing, 0.5),
+        ConeOrientedPose(T[:3, 3], axis, beside, 0.4),
+        ConeOrientedPose(T[:3, 3]),
+    ]
+
+
+def misses(arm: Arm, pose: ConeOrientedPose, q: Array) -> Array:
+    """By how much [m, rad] configurations (n, nq) miss a pose: by the forward kinematics and the arc cosine."""
+    T = tcp_pose(arm, q)
+    cosine = np.einsum("nij,j,i->n", T[:, :3, :3], pose.axis, pose.direction)
+    sine = np.linalg.norm(np.cross(T[:, :3, :3] @ pose.axis, pose.direction), axis=1)
+    beyond = np.maximum(np.arctan2(sine, cosine) - pose.half_angle, 0.0)
+    return np.asarray(np.maximum(np.linalg.norm(T[:, :3, 3] - pose.position, axis=1), beyond))
+
+
+def inner(arm: Arm, rng: np.random.Generator) -> Array:
+    limits = arm.active_limits
+    return np.asarray(rng.uniform(*np.clip([0.8 * limits.q_min, 0.8 * limits.q_max], -2.5, 2.5)))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_is_near_the_manifold_is_put_on_it_nearby(name: str) -> None:
+    """Not on another member of the self-motion: a proposal of first order would be lost."""
+    arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(5)
+    for q in [inner(arm, rng) for _ in range(5)]:
+        for pose in poses(arm, q):
+            beside = q + rng.uniform(-ASIDE, ASIDE, (20, len(q)))
+            found, reached = GoalManifold.of(arm, pose).put(beside)
+            assert reached.mean() > MOSTLY
+            assert misses(arm, pose, found[reached]).max() < REACHED
+            assert np.median(np.abs(found - beside).max(axis=1)) < FARTHER * ASIDE
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_is_said_to_reach_the_pose_does_within_the_limits(name: str) -> None:
+    """From anywhere, singular configurations and those on limits among them."""
+    arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(6)
+    limits = arm.active_limits
+    anywhere = rng.uniform(limits.q_min, limits.q_max, (40, arm.robot.nq))
+    anywhere[:5], anywhere[5:10], anywhere[10:15] = 0.0, limits.q_min, limits.q_max
+    weights = rng.uniform(0.1, 10.0, arm.robot.nq)
+    for pose in poses(arm, inner(arm, rng)):
+        manifold = GoalManifold.of(arm, pose)
+        to = inner(arm, rng)
+        for found, reached in (manifold.put(anywhere), manifold.nearest(anywhere, np.tile(to, (40, 1)), weights)):
+            assert np.isfinite(found).all()
+            assert (found >= limits.q_min).all() and (found <= limits.q_max).all()
+            assert misses(arm, pose, found[reached]).max(initial=0.0) < REACHED
+
+
+@pytest.mark.parametrize("name", ["xarm7", "ur5e"])
+def test_the_way_is_shortest_around(name: str) -> None:
+    """No configuration of the manifold beside has a much shorter way."""
+    arm, rng = Arm(robot=load_robot(name)), np.random.default_rng(7)
+    weights = arm.friction_law.coulomb
+    for pose in poses(arm, inner(arm, rng)):
+        manifold, to = GoalManifold.of(arm, pose), inner(arm, rng)
+        begun, reached = manifold.put(to + rng.normal(scale=0.5, size=(12, len(to))))
+        begun = begun[reached]
+        came, reached = manifold.nearest(begun, np.tile(to, (len(begun), 1)), weights)
+        assert reached.mean() > MOSTLY
+        for q in came[reached]:
+            beside, held = manifold.put(q + rng.normal(scale=0.02, size=(40, len(q))))
+            assert np.abs(q - to) @ weights <= (np.abs(beside[held] - to) @ weights).min() * (1 + FLAT)
+
+
+def test_a_joint_that_may_not_go_on_leaves_the_way_to_the_others() -> None:
+    """A range that ends halfway on a joint's way: it stays on its limit, and the others still come nearer."""
+    arm, weights = Arm(robot=load_robot("panda")), np.ones(7)
+    q = np.array([0.2, 0.3, -0.1, -1.8, 0.2, 1.9, 0.4])
+    pose, to = poses(arm, q)[0], q + np.array([0.6, 0.2, 0.4, -0.2, 0.5, 0.0, -0.5])
+    free, reached = GoalManifold.of(arm, pose).nearest(q[None], to[None], weights)
+    joint = int(np.abs(free[0] - q)[:6].argmax())
+    ends = {"q_min": arm.active_limits.q_min.copy(), "q_max": arm.active_limits.q_max.copy()}
+    side = "q_min" if free[0, joint] < q[joint] else "q_max"
+    ends[side][joint] = (q[joint] + free[0, joint]) / 2
+    narrow = replace(arm, limits=replace(arm.active_limits, **ends))
+    found, held = GoalManifold.of(narrow, pose).nearest(q[None], to[None], weights)
+    assert reached.all() and held.all() and found[0, joint] == pytest.approx(ends[side][joint], abs=REACHED)
+    assert np.abs(free[0] - to).sum() < np.abs(found[0] - to).sum() < np.abs(q - to).sum()
+    assert misses(arm, pose, found).max() < REACHED

@@ -1,0 +1,145 @@
+"""Goals of free orientation: no more energy than to goals beside the start, or where another goal was proposed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from models.robot import Array
+from optimizer.kinematics.tcp import tcp_pose
+from optimizer.optimize import optimize
+from optimizer.problem.arm import Arm
+from optimizer.problem.branches import BranchFilter
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.pose import Pose
+from optimizer.problem.problem import Problem
+from optimizer.problem.targets import AnyOf
+from optimizer.search.candidates import Candidate
+from optimizer.search.ends import label_of
+from optimizer.search.near_goals import APART, MOST, OTHERS, activate_near_goals
+from optimizer.search.run import Run
+from optimizer.search.sampled_ends import nearest_configuration
+from optimizer.search.seeds import estimates
+from optimizer.trajectories.time_scalings import quintic_spline
+from tests.selection import long_but
+
+# s: no search comes near it, however busy the machine
+AMPLE = 300.0
+# relative: two searches that end at the tolerance of their solves
+SAME = 2e-3
+# rad: how far a task leads, in each joint
+STEP = 0.5
+# rad: a proposal beside a goal, and how much farther its projection may be
+BESIDE, FARTHER = 0.05, 4.0
+# relative: an estimate is a quadrature of a few points, of smoothed friction and corners
+FEW_POINTS = 1e-2
+
+
+def task(name: str, seed: int, kind: str, **given: Any) -> tuple[Problem, Array]:
+    """A problem with a goal of free orientation, and a configuration near the start that reaches it."""
+    arm, rng = Arm(robot=load_robot(name), collisions=False), np.random.default_rng([17, seed])
+    limits = arm.active_limits
+    start = rng.uniform(*np.clip([0.7 * limits.q_min, 0.7 * limits.q_max], -2.5, 2.5))
+    goal = np.clip(start + rng.uniform(-STEP, STEP, len(start)), limits.q_min, limits.q_max)
+    T, axis = tcp_pose(arm, goal), np.array([0.0, 0.0, 1.0])
+    poses = {
+        "about": ConeOrientedPose.about(Pose(T), axis),
+        "cone": ConeOrientedPose(T[:3, 3], axis, T[:3, 2], 0.4),
+        "free": ConeOrientedPose(T[:3, 3]),
+    }
+    return Problem(arm=arm, start=start, goal=poses[kind], deadline=AMPLE, **given), goal
+
+
+def explored(problem: Problem) -> Candidate:
+    """The best candidate before refinement and bounds, which take most of the time of a search."""
+    run = Run(problem)
+    run.prepare()
+    run.explore()
+    best = run.incumbent.best()
+    assert best is not None
+    return best
+
+
+CASES = [(name, kind, seed) for seed in range(3) for name in ("xarm7", "panda", "gen3") for kind in ("about", "cone")]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "seed"),
+    long_but((("xarm7", "about", 0),), [*CASES, ("ur5e", "free", 0), ("iiwa14", "free", 1)]),
+)
+def test_a_goal_needs_no_more_than_a_configuration_of_it_beside_the_start(name: str, kind: str, seed: int) -> None:
+    problem, goal = task(name, seed, kind)
+    known = optimize(replace(problem, goal=goal)).energy.electrical.total
+    answer = optimize(problem)
+    assert answer.certificate.valid
+    assert answer.lower_bound <= answer.energy.electrical.total <= known * (1 + SAME)
+
+
+def test_what_is_activated_is_different_and_may_be_solved() -> None:
+    problem, _ = task("xarm7", 3, "cone")
+    run = Run(problem)
+    run.prepare()
+    incumbent = run.incumbent
+    before = len(incumbent.candidates)
+    assert activate_near_goals(incumbent.prepared, incumbent.candidates)
+    active = [each for each in incumbent.candidates if not each.deferred and each.holdable]
+    fresh = incumbent.candidates[before:]
+    assert 0 < len(fresh) <= MOST and len(active) <= MOST + OTHERS
+    for k, each in enumerate(fresh):
+        assert each.goal.tolerance is problem.goal and each.lower_bound > 0 and each.shortest > 0
+        for other in fresh[:k]:
+            assert np.abs(each.q_goal - other.q_goal).max() > APART
+    # the place of the shortest way is nearer than all samples
+    coulomb = problem.arm.friction_law.coulomb
+    ways = [np.abs(each.q_goal - each.q_start) @ coulomb for each in incumbent.candidates]
+    assert min(ways[before:]) < min(ways[:before])
+
+
+def test_without_a_free_orientation_nothing_is_activated() -> None:
+    problem, goal = task("panda", 0, "about")
+    run = Run(replace(problem, goal=Pose(tcp_pose(problem.arm, goal))))
+    run.prepare()
+    assert not activate_near_goals(run.incumbent.prepared, run.incumbent.candidates)
+
+
+def test_a_full_pose_among_free_ones_is_searched_too() -> None:
+    """A goal far away of free orientation, and a pose next door that is held on self-motions."""
+    problem, goal = task("panda", 2, "about")
+    far, _ = task("panda", 5, "about")
+    both = AnyOf((far.goal, Pose(tcp_pose(problem.arm, goal))))  # type: ignore[arg-type]
+    best = explored(replace(problem, goal=both))
+    assert best.goal.target == 1 and best.goal.self_motion is not None
+
+
+@pytest.mark.parametrize("name", ["xarm7", "iiwa14"])
+def test_a_proposed_goal_is_put_back_beside(name: str) -> None:
+    """A seven-joint arm holds each orientation on curves: the nearest member counts, not one of a few samples."""
+    problem, goal = task(name, 4, "about")
+    run, rng = Run(problem), np.random.default_rng(9)
+    run.prepare()
+    end = next(each.goal for each in run.incumbent.candidates)
+    for _ in range(5):
+        asked = goal + rng.uniform(-BESIDE, BESIDE, len(goal))
+        found = nearest_configuration(run.incumbent.prepared, end, asked)
+        assert found is not None and np.abs(found - asked).max() < FARTHER * BESIDE
+
+
+def test_a_branch_that_is_asked_for_is_kept() -> None:
+    problem, goal = task("xarm7", 0, "about")
+    elbow: Any = label_of(problem.arm.robot, goal).split("/")[1]
+    assert explored(replace(problem, branch=BranchFilter(elbow=elbow))).goal.label.split("/")[1] == elbow
+
+
+def test_estimates_count_what_waiting_at_a_goal_draws() -> None:
+    problem, _ = task("panda", 1, "about", cycle=Cycle(time=4.0, hold="motors"), duration_min=2.0, duration_max=2.0)
+    run = Run(problem)
+    run.prepare()
+    some = [each for each in run.incumbent.candidates if each.holdable][:20:4]
+    motions = [quintic_spline(each.q_start, each.q_goal, 2.0) for each in some]
+    energy = [run.incumbent.prepared.energy(motion).electrical.total for motion in motions]
+    np.testing.assert_allclose(estimates(run.incumbent.prepared, some), energy, rtol=FEW_POINTS)
