@@ -27,6 +27,7 @@ from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_others
 from optimizer.search.near_goals import activate_near_goals
+from optimizer.search.other_starts import start_beside
 from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
@@ -139,6 +140,7 @@ class Run:
             incumbent.tell_candidates()
             incumbent.tell_best()
         while (best := incumbent.best()) is not None:
+            best = start_beside(incumbent, best)
             refine(incumbent, best)
             best = incumbent.best() or best
             table = compare_with_baselines(incumbent, best)

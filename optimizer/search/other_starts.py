@@ -1,0 +1,80 @@
+"""Another start for ends that slide: postures a step to each side of the one found.
+
+A motion has several local optima, of energies that differ by some tenths of a percent, by which limits it touches and
+when. An end that slides takes the motion along, so that both stay in the one from which they began. A motion solved by
+itself to a posture beside may be in a better one; from there both ends slide again.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+from optimizer.energy.plant import has_corners
+from optimizer.kinematics.held_pose import HeldPose
+from optimizer.methods.duration_intervals import duration_intervals
+from optimizer.methods.free_spline import COARSE, FreeSpline
+from optimizer.methods.method import Method, SolveResult
+from optimizer.methods.sqp_method import above
+from optimizer.nlp.sqp import PROGRESS
+from optimizer.search.attempts import improve, in_time, settled, solver_of
+from optimizer.search.candidates import Candidate
+from optimizer.search.ends import SIDES
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.sampled_ends import with_ends
+from optimizer.search.sliding import slides
+from optimizer.trajectories.spline import sampled
+
+# length of the step along a curve [rad]
+STEP = 0.15
+# a solve is given up only if it is not expected to come below this multiple of the energy that it must come below: its
+# first steps promise less than it finds
+MARGIN = 1.003
+
+
+def start_beside(incumbent: Incumbent, best: Candidate) -> Candidate:
+    """The best solved candidate, or one that needs less, found from a posture beside; it is added to the candidates.
+
+    Only motions of as few control points as the first solve has are compared, and only where no joint's power has a
+    corner of its own: those are started again by `sharpening`.
+    """
+    prepared = incumbent.prepared
+    cornered = has_corners(incumbent.problem.objective, prepared.arm)
+    if cornered or not slides(prepared, best) or not incumbent.method.may_refine(best.spline):
+        return best
+    first = best
+    for side in SIDES:
+        if getattr(first, side).self_motion is None:
+            continue
+        q = {"start": first.q_start, "goal": first.q_goal}
+        curve = HeldPose.of(prepared.arm, q[side])
+        for step in (STEP, -STEP):
+            beside = curve.put(q[side] + step * curve.tangent(q[side]))
+            if beside is None or incumbent.deadline.passed:
+                continue
+            ends = q | {side: beside}
+            fresh = with_ends(prepared, first, ends["start"], ends["goal"])
+            if fresh is not None and _solved(incumbent, fresh, best.energy or 0.0):
+                incumbent.candidates.append(fresh)
+                best = fresh
+    return best
+
+
+def _solved(incumbent: Incumbent, candidate: Candidate, below: float) -> bool:
+    """Solve a candidate as it is, and then with its ends sliding, if it needs less energy than `below` [J]; whether it
+    does."""
+    for interval in duration_intervals(incumbent.prepared, candidate.q_goal):
+        solver = solver_of(incumbent, candidate, interval)
+        solver.best_known = above(below, MARGIN)
+        result = in_time(incumbent, solver.solve)
+        if result.spline is None or incumbent.prepared.cost_of(result.spline) >= below:
+            continue
+        settled(incumbent, candidate, result, result.reason)
+        improve(incumbent, candidate, partial(_again, result))
+        return True
+    return False
+
+
+def _again(found: SolveResult, solver: Method) -> SolveResult:
+    """Solve from a motion that was found with its ends fixed."""
+    assert isinstance(solver, FreeSpline) and found.spline is not None
+    return solver.solve_evenly(*sampled(found.spline), COARSE, PROGRESS)
