@@ -88,7 +88,8 @@ def traces_of_each(arm: Arm, courses: Sequence[ToolCourse], q_start: Array) -> l
     """
     found, left = dict[int, Trace](), list(range(len(courses)))
     while left:
-        own = [k for k in left if courses[k].has_shape_of(courses[left[0]])]
+        first = courses[left[0]]
+        own = [k for k in left if courses[k] is first or courses[k].has_shape_of(first)]
         some = [courses[k] for k in own]
         found |= zip(own, _turned_where_needed(arm, some, _traces(arm, some, q_start[own])), strict=True)
         left = [k for k in left if k not in found]
