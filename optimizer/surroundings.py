@@ -77,7 +77,9 @@ class Surroundings:
         if not self.arm.collisions or not len(self.model.pairs):
             return [None] * len(motions)
         paths = {id(q): q[:: max(len(q) // CONTACT_SAMPLES, 1)] for q in motions}
-        found = {key: self._worst(self.model.along(q, within=0.0)) for key, q in paths.items()}
+        distance = self.model.along(np.concatenate(list(paths.values())), within=0.0)
+        parts = np.split(distance, np.cumsum([len(q) for q in paths.values()])[:-1])
+        found = {key: self._worst(part) for key, part in zip(paths, parts, strict=True)}
         return [found[id(q)] for q in motions]
 
     def _worst(self, distance: Array) -> ClosestPair | None:

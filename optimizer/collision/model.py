@@ -127,7 +127,7 @@ class CollisionModel:
         """Signed distances (n, p) [m] at consecutive samples q (n, nq) [rad] of a motion, exact up to `within` [m].
 
         Those of every STRIDE-th sample bound the others from below, since a distance changes no faster than the levers
-        allow. Most of the others need not be computed.
+        allow. Most of the others need not be computed. Several motions may follow one another.
         """
         pairs = np.arange(len(self.pairs)) if pairs is None else pairs
         frames, rows, count = self.frames(q), np.arange(len(q)), len(q)
@@ -135,7 +135,8 @@ class CollisionModel:
             return self.pair_distances(frames, pairs, within).distance
         levers = self.levers_between[pairs].T
         chosen = np.append(rows[:-1:STRIDE], count - 1)
-        reach = float((np.abs(np.diff(q[chosen], axis=0)) @ levers).max()) / 2
+        # half of the way between two of them: the median, since the leap from one motion to the next says nothing
+        reach = float(np.median((np.abs(np.diff(q[chosen], axis=0)) @ levers).max(axis=1))) / 2
         result = np.empty((count, len(pairs)))
         result[chosen] = self.pair_distances(frames[chosen], pairs, within + reach).distance
         rest = np.delete(rows, chosen)
