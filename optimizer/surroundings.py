@@ -66,8 +66,7 @@ class Surroundings:
         """Whether samples q (k, nq) [rad] of a motion keep all margins. About CONTACT_SAMPLES of them are checked."""
         if not self.arm.collisions:
             return True
-        checked = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
-        return float(self.model.along(checked, 0.0).min(initial=np.inf)) >= 0
+        return self._least_distance(q, 0.0) >= 0
 
     def worst_collisions(self, motions: Sequence[Array]) -> list[ClosestPair | None]:
         """The pair that violates its margin most over the samples q (k, nq) [rad] of each motion; None if none does.
@@ -76,7 +75,7 @@ class Surroundings:
         """
         if not self.arm.collisions or not len(self.model.pairs):
             return [None] * len(motions)
-        paths = {id(q): q[:: max(len(q) // CONTACT_SAMPLES, 1)] for q in motions}
+        paths = {id(q): _thinned(q) for q in motions}
         distance = self.model.along(np.concatenate(list(paths.values())), within=0.0)
         parts = np.split(distance, np.cumsum([len(q) for q in paths.values()])[:-1])
         found = {key: self._worst(part) for key, part in zip(paths, parts, strict=True)}
@@ -93,8 +92,7 @@ class Surroundings:
 
         An obstacle is then likely to limit the optimum. About CONTACT_SAMPLES of them are checked.
         """
-        checked = q[:: max(len(q) // CONTACT_SAMPLES, 1)]
-        return self.arm.collisions and float(self.model.along(checked, NEAR_CONTACT).min(initial=np.inf)) < NEAR_CONTACT
+        return self.arm.collisions and self._least_distance(q, NEAR_CONTACT) < NEAR_CONTACT
 
     def active_pairs(self, spline: Spline) -> Indices:
         """Indices (k,) of the pairs that need a clearance constraint: closer than ACTIVE at a sample of the motion."""
@@ -164,9 +162,19 @@ class Surroundings:
         """The first paths that were found, else the last planning, for all goals that differ by full turns."""
         return {}
 
+    def _least_distance(self, q: Array, within: float) -> float:
+        """The least signed distance [m] over some of the samples q (k, nq) of a motion; if above `within` [m], a lower
+        bound above it."""
+        return float(self.model.along(_thinned(q), within).min(initial=np.inf))
+
     def _samples(self, spline: Spline) -> Array:
         """Samples q (CONTACT_SAMPLES, nq) [rad] at equal steps of a motion."""
         return np.asarray(spline.curve(np.linspace(0.0, spline.duration, CONTACT_SAMPLES)))
+
+
+def _thinned(q: Array) -> Array:
+    """About CONTACT_SAMPLES of the samples q (k, nq)."""
+    return q[:: max(len(q) // CONTACT_SAMPLES, 1)]
 
 
 def _key(q_start: Array, q_goal: Array) -> bytes:

@@ -27,8 +27,8 @@ def segment_segment(a: Array, b: Array) -> tuple[Array, Array, Array, Array]:
     """Distance (k,) [m], normal (k, 3) from a to b, and witness points (k, 3) [m] of segments a, b (k, 2, 3) [m].
 
     The point of a that is nearest to the line of b, clamped, then the point of b nearest to it, clamped, and the point
-    of a nearest to that: exact, also for parallel segments. If the segments cross, the distance is 0 and the normal
-    is the common perpendicular.
+    of a nearest to that: exact, also for parallel segments, but for those that are nearly so (see PARALLEL). If the
+    segments cross, the distance is 0 and the normal is the common perpendicular.
     """
     # (3, k): numpy runs along k
     a0, a1, b0, b1 = (np.ascontiguousarray(x.T) for x in (a[:, 0], a[:, 1], b[:, 0], b[:, 1]))

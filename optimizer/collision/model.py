@@ -133,18 +133,21 @@ class CollisionModel:
         frames, rows, count = self.frames(q), np.arange(len(q)), len(q)
         if count <= 2 * STRIDE or not len(pairs):
             return self.pair_distances(frames, pairs, within).distance
-        levers = self.levers_between[pairs].T
         chosen = np.append(rows[:-1:STRIDE], count - 1)
         # half of the way between two of them: the median, since the leap from one motion to the next says nothing
-        reach = float(np.median((np.abs(np.diff(q[chosen], axis=0)) @ levers).max(axis=1))) / 2
+        reach = float(np.median(self.changes(np.diff(q[chosen], axis=0), pairs).max(axis=1))) / 2
         result = np.empty((count, len(pairs)))
         result[chosen] = self.pair_distances(frames[chosen], pairs, within + reach).distance
         rest = np.delete(rows, chosen)
         before = chosen[rest // STRIDE]
         after = np.minimum(before + STRIDE, count - 1)
-        known = np.maximum(*(result[at] - np.abs(q[rest] - q[at]) @ levers for at in (before, after)))
+        known = np.maximum(*(result[at] - self.changes(q[rest] - q[at], pairs) for at in (before, after)))
         result[rest] = self.pair_distances(frames[rest], pairs, within, known).distance
         return result
+
+    def changes(self, move: Array, pairs: Indices) -> Array:
+        """Greatest changes (n, p) [m] of the distances of `pairs` (p,) when the joints move by `move` (n, nq) [rad]."""
+        return np.asarray(np.abs(move) @ self.levers_between[pairs].T)
 
     def pairs_within(self, frames: Array, within: float) -> Mask:
         """Which pairs (p,) are less than `within` [m] apart at any of n configurations.

@@ -82,8 +82,8 @@ def _points(curves: CurveStack, finer: int) -> tuple[list[Array], Array]:
         past = np.floor(np.cumsum(length, axis=1) * (finer / EVEN))
         kept = np.ones(unwound.shape[:2], dtype=bool)
         kept[:, 1:-1] = past[:, :-1] > np.hstack([np.zeros((len(uneven), 1)), past[:, :-2]])
-        for k, points, chosen in zip(uneven.tolist(), unwound, kept, strict=True):
-            found[k] = points[chosen]
+        for k, each, chosen in zip(uneven.tolist(), unwound, kept, strict=True):
+            found[k] = each[chosen]
     return found, ends
 
 

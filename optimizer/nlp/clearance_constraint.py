@@ -25,21 +25,11 @@ FEW = 0.1
 
 
 @dataclass
-class _Reference:
-    """Lower bounds on distances (n, p) [m] at configurations q (n, nq) [rad], from which those nearby are bounded.
+class _Known:
+    """Lower bounds on distances (n, p) [m] at configurations q (n, nq) [rad], from which those nearby are bounded."""
 
-    When a joint turns by dq, a distance changes by at most `levers` (p, nq) times |dq|.
-    """
-
-    levers: Array
-    q: Array | None = None
-    distance: Array | None = None
-
-    def bounds(self, q: Array) -> Array | None:
-        """Lower bounds (n, p) [m] at other configurations; None before there is a reference."""
-        if self.q is None or self.distance is None or self.q.shape != q.shape:
-            return None
-        return self.distance - np.abs(q - self.q) @ self.levers.T
+    q: Array
+    distance: Array
 
 
 @dataclass(frozen=True)
@@ -75,16 +65,19 @@ class ClearanceConstraint:
 
     def _pair_distances(self, frames: Array, q: Array) -> PairDistances:
         """Distances at q (n, nq), of which those bounded away from COUNTED by earlier ones are not computed."""
-        known = self._reference.bounds(q)
-        if known is not None and np.count_nonzero(known <= COUNTED) > FEW * known.size:
-            known = np.maximum(known, self.model.geometry.ball_distances(frames, self.pairs))
+        last, known = self._last, None
+        if last.q.shape == q.shape:
+            known = last.distance - self.model.changes(q - last.q, self.pairs)
+            if np.count_nonzero(known <= COUNTED) > FEW * known.size:
+                known = np.maximum(known, self.model.geometry.ball_distances(frames, self.pairs))
         found = self.model.pair_distances(frames, self.pairs, COUNTED, known)
-        self._reference.q, self._reference.distance = q, found.distance
+        last.q, last.distance = q, found.distance
         return found
 
     @cached_property
-    def _reference(self) -> _Reference:
-        return _Reference(self.model.levers_between[self.pairs])
+    def _last(self) -> _Known:
+        """What was computed last: nothing at first."""
+        return _Known(np.zeros((0, self.model.nq)), np.zeros((0, len(self.pairs))))
 
 
 def _ratio(distance: Array) -> Array:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.robot import Array, Mask
+from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.deadline import Deadline
 from optimizer.kinematics.angles import wrapped
@@ -47,19 +47,16 @@ MOST_FIRST = 16
 
 
 @dataclass(frozen=True)
-class _Side:
-    """Boxes (m, nq) [rad] of one end of a leg, their least and greatest potential energies (m, 2) [J], which joints
-    (m, nq) are in them without other full turns, and the box (n,) of each node."""
+class _Side(Boxes):
+    """Boxes of one end of a leg, their least and greatest potential energies (m, 2) [J], and the box (n,) of each
+    node."""
 
-    centre: Array
-    half: Array
     levels: Array
-    placed: Mask
     box: Indices
 
     def some(self, boxes: Indices) -> _Side:
         """Some of them, a node each."""
-        parts = (self.centre[boxes], self.half[boxes], self.levels[boxes], self.placed[boxes])
+        parts = (self.centre[boxes], self.half[boxes], self.placed[boxes], self.levels[boxes])
         return _Side(*parts, np.arange(len(boxes)))
 
     @classmethod
@@ -68,9 +65,9 @@ class _Side:
         of_ends = np.array([2 * [prepared.potential(end.q)] for end in layer.ends])
         if len(layer.q) <= MOST_NODES:
             placed = np.ones(layer.q.shape, dtype=bool)
-            return cls(layer.q, np.zeros_like(layer.q), of_ends[layer.end], placed, np.arange(len(layer.q)))
+            return cls(layer.q, np.zeros_like(layer.q), placed, of_ends[layer.end], np.arange(len(layer.q)))
         q = np.array([end.q for end in layer.ends])
-        return cls(q, np.zeros_like(q), of_ends, np.zeros(q.shape, dtype=bool), layer.end)
+        return cls(q, np.zeros_like(q), np.zeros(q.shape, dtype=bool), of_ends, layer.end)
 
 
 class FreeEndsChain:
@@ -190,8 +187,7 @@ class FreeEndsChain:
     def _quick(self, k: int, start: _Side, goal: _Side) -> Array:
         """Quick bounds (s, g) [J] on leg `k` between cells, with the dwell at the goal."""
         gain = goal.levels[:, 0] - start.levels[:, 1][:, None]
-        a, b = (Boxes(each.centre, each.half, each.placed) for each in (start, goal))
-        return self.quick[k].between(a, b, gain) + self._dwells(k)[:1]
+        return self.quick[k].between(start, goal, gain) + self._dwells(k)[:1]
 
     def _between(self, k: int, s: Indices, g: Indices) -> Array:
         """Bounds (n,) [J] on leg `k` between nodes s and g (n,), with the dwell at the goal."""
@@ -212,7 +208,7 @@ class FreeEndsChain:
         if layer not in self.covered:
             return _Side.of(self.layers[layer], self.legs[k].prepared)
         cells = self.covered[layer].cells
-        return _Side(cells.centre, cells.half, cells.levels[:, arm], cells.placed, np.arange(len(cells.angle)))
+        return _Side(cells.centre, cells.half, cells.placed, cells.levels[:, arm], np.arange(len(cells.angle)))
 
     def _dwells(self, k: int) -> Array:
         """What the dwell after leg `k` adds (g,) [J] at each node of its goal, at least."""

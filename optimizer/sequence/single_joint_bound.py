@@ -17,8 +17,6 @@ from optimizer.search.lower_bound import LeastBound
 
 # steps of displacement, up to so much [rad], and of gain
 AWAY, FARTHEST, GAINS = 48, 4 * np.pi, 48
-
-
 # joints that are looked up: those that make the greatest difference
 JOINTS = 3
 

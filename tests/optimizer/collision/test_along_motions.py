@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from models.robot import Array
+from optimizer.collision import clearance_proof
 from optimizer.collision.clearance_proof import GAP, is_proven_clear, proven_clearance
 from optimizer.collision.model import STRIDE, CollisionModel
+from optimizer.problem.arm import Arm
+from optimizer.problem.clouds import Points
+from optimizer.problem.scene import Obstacle, Scene
 from tests.optimizer.cells import LOADS, arm_in_cell, cell, positions, wander
+from tests.optimizer.moves import ROBOT
 
 ROUNDING = 1e-9  # m
 WITHIN = (0.0, 0.03, 0.3)  # m
@@ -52,3 +57,19 @@ def test_what_is_proven_clear_is_certified() -> None:
         clear += is_clear
         assert proof.min_clearance >= 0 if is_clear else proof.min_clearance < 2 * GAP
     assert 3 < clear < 57
+
+
+def test_what_is_proven_clear_is_certified_even_if_its_proof_takes_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bound near to the least distance takes more checks than the limit, that the margins hold takes fewer."""
+    points = np.random.default_rng(0).uniform(-1.2, 1.2, (35, 400, 3))[4]
+    around = Points(points[np.linalg.norm(points, axis=1) > 0.55], 0.002)
+    scene = Scene([Obstacle("cloud", around, np.eye(4), margin=0.0)])
+    model, motion = CollisionModel(Arm(robot=ROBOT, scene=scene)), wander(4)
+    exhausted = 0
+    for most in (800, 1600, 3200, 6400, 12800):
+        monkeypatch.setattr(clearance_proof, "MOST_CHECKS", most)
+        proof = proven_clearance(model, motion)
+        assert proof is not None and proof.min_clearance <= proof.sampled
+        exhausted += proof.min_clearance < proof.sampled - 2 * GAP
+        assert proof.min_clearance >= 0 or not is_proven_clear(model, motion)
+    assert exhausted
