@@ -43,9 +43,10 @@ class _Fresh:
 class QPRows:
     """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
-    `hard` rows are never relaxed. `chosen` (3, r, M) marks the grid points with a kinematic row, `places` lists them,
-    and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the lower and upper bounds with a row.
-    `passed` (point, column) lists the path constraints with a row, and `path` is the row of each.
+    `hard` rows are never relaxed. `chosen` (3, r, M) is the sign of the rate that a grid point's newest kinematic row
+    limits, 0 without one, `places` lists the points, and `kinematic` is the row of each. In the same way `bounded`
+    (2, n) marks the lower and upper bounds with a row. `passed` (point, column) lists the path constraints with a row,
+    and `path` is the row of each.
     """
 
     def __init__(self, whitening: Array, grid: tuple[int, ...]) -> None:
@@ -55,7 +56,7 @@ class QPRows:
         self.A = np.zeros((0, whitening.shape[1]))
         self.least, self.most = np.zeros(0), np.zeros(0)
         self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-        self.chosen, self.bounded = np.zeros(grid, dtype=bool), np.zeros((2, n), dtype=bool)
+        self.chosen, self.bounded = np.zeros(grid, dtype=np.int8), np.zeros((2, n), dtype=bool)
         none = np.zeros(0, dtype=int)
         self.places: Places = (none, none, none)
         self.sides: tuple[Index, Index] = (none, none)
@@ -100,11 +101,13 @@ class QPRows:
         for name in ("least", "most", "hard", "active"):
             setattr(self, name, np.concatenate([getattr(self, name), *(getattr(each, name) for each in fresh)]))
 
-    def add_kinematic(self, gradients: Array, most: Array, places: Places, active: Mask | None = None) -> None:
-        """Add the rows of places that have none yet; see `add`."""
+    def add_kinematic(
+        self, gradients: Array, most: Array, places: Places, signs: Array, active: Mask | None = None
+    ) -> None:
+        """Add the rows of places that have none yet for these signs of the rate; see `add`."""
         self.kinematic = np.concatenate([self.kinematic, self.add(gradients, most, active=active)])
         self.places = _joined(self.places, places)
-        self.chosen[places] = True
+        self.chosen[places] = signs
 
     def add_path(self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask) -> None:
         """Add the rows of path constraints that have none yet; see `add`."""

