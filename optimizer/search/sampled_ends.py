@@ -24,8 +24,8 @@ from optimizer.solution import CandidateStatus
 
 # samples solved before any is refined: in all, and of one pair of branches
 BATCH, ALIKE = 12, 2
-# solved samples that are refined, each of a kind of its own
-MOST_REFINED = 4
+# solved samples that are refined, each of a kind of its own: so many, of at most this ratio of the least energy
+MOST_REFINED, WORTH_REFINING = 4, 1.3
 # configurations that differ by less are the same [rad]
 SAME = 1e-6
 
@@ -89,13 +89,17 @@ def between(
 def refine_best(
     solved: Sequence[Candidate], kind: Callable[[Candidate], Hashable], refine: Callable[[Candidate], Candidate]
 ) -> list[Candidate]:
-    """The candidates that `refine` makes of the best sample of each kind, at most MOST_REFINED of them.
+    """The candidates that `refine` makes of the best sample of each kind, at most MOST_REFINED of them, if its energy
+    is not far above that of the best of all.
 
     `solved` are solved samples. A sample that `refine` returns unchanged is left out.
     """
     chosen: dict[Hashable, Candidate] = {}
+    least = min((each.energy or 0.0 for each in solved), default=0.0)
+    most = least + (WORTH_REFINING - 1) * abs(least)
     for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
-        chosen.setdefault(kind(candidate), candidate)
+        if (candidate.energy or 0.0) <= most:
+            chosen.setdefault(kind(candidate), candidate)
     refined = [(candidate, refine(candidate)) for candidate in list(chosen.values())[:MOST_REFINED]]
     return [better for candidate, better in refined if better is not candidate]
 

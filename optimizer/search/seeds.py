@@ -25,6 +25,7 @@ from optimizer.trajectories.quadrature import quadrature
 
 # durations of the quintic, in multiples of the shortest one, and the panels and points of its quadrature
 TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3
+ROUGH_SCALE, ROUGH_PANELS = 1.3, 2
 # pairs whose energies are estimated: those of least lower bound
 MOST_ESTIMATED = 384
 # seeds need at most this ratio of the least estimate, and so many of them are solved at a time
@@ -62,13 +63,21 @@ def estimates(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Arr
     return estimates_between(prepared, q_start, q_goal, np.array([each.shortest for each in candidates]))
 
 
-def estimates_between(prepared: PreparedProblem, q_start: Array, q_goal: Array, shortest: Array) -> Array:
+def expected(prepared: PreparedProblem, candidates: Sequence[Candidate]) -> Array:
+    """Objectives (n,) [J] that are expected of candidates: half-way from the lower bound to the estimate."""
+    return (estimates(prepared, candidates) + [each.lower_bound for each in candidates]) / 2
+
+
+def estimates_between(
+    prepared: PreparedProblem, q_start: Array, q_goal: Array, shortest: Array, rough: bool = False
+) -> Array:
     """Objectives (n,) [J] of quintics on straight lines between configurations (n, nq) [rad], of the best of a few
-    durations by the `shortest` ones (n,) [s], raised where a torque is too high."""
-    (at, rate, acceleration), weights = _quintic()
+    durations by the `shortest` ones (n,) [s], raised where a torque is too high; `rough`: of one duration, and half the
+    instants."""
+    (at, rate, acceleration), weights = _quintic(ROUGH_PANELS if rough else PANELS)
     way, count = (q_goal - q_start)[:, None], len(q_start)
     best, q = np.full(count, np.inf), q_start[:, None] + way * at
-    for durations in _durations(prepared.problem, shortest):
+    for durations in _durations(prepared.problem, shortest, (ROUGH_SCALE,) if rough else TIME_SCALES):
         T = durations[:, None, None]
         y = np.concatenate([q, way * rate / T, way * acceleration / T**2], axis=2)
         cost, tau = prepared.kernel.values(y.reshape(-1, y.shape[2]), prepared.objective_parameters)
@@ -88,16 +97,16 @@ def _waiting(prepared: PreparedProblem, q_goal: Array, durations: Array) -> Arra
     return np.asarray(prepared.holding_power(q_goal) * by_motors + brake_power(problem.cycle, prepared.arm) * by_brakes)
 
 
-def _durations(problem: Problem, shortest: Array) -> list[Array]:
-    """The durations (n,) [s] that are tried, within those that are allowed; for work and in a cycle the longest one,
-    too."""
+def _durations(problem: Problem, shortest: Array, scales: Sequence[float]) -> list[Array]:
+    """The durations (n,) [s] that are tried, at these multiples of the shortest ones, within those that are allowed;
+    for work and in a cycle the longest one, too."""
     least = LEAST_DURATION if problem.duration_min is None else problem.duration_min
     most = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
     if problem.cycle is not None:
         most = min(most, problem.cycle.time)
     if least == most:
         return [np.full_like(shortest, most)]
-    tried = [np.clip(scale * shortest, least, most) for scale in TIME_SCALES]
+    tried = [np.clip(scale * shortest, least, most) for scale in scales]
     return [*tried, np.full_like(shortest, most)] if _is_work(problem) or problem.cycle is not None else tried
 
 
@@ -111,9 +120,9 @@ def _is_work(problem: Problem) -> bool:
 
 
 @cache
-def _quintic() -> tuple[Array, Array]:
+def _quintic(panels: int) -> tuple[Array, Array]:
     """Fraction of the way and its first two derivatives by the fraction of time (3, k, 1), and weights (k,)."""
-    x, weights = quadrature(np.linspace(0.0, 1.0, PANELS + 1), POINTS)
+    x, weights = quadrature(np.linspace(0.0, 1.0, panels + 1), POINTS)
     return quintic.derivatives(x)[:, :, None], weights
 
 
