@@ -19,7 +19,7 @@ from optimizer.search.candidates import Candidate, Reason, bound
 from optimizer.search.end_feasibility import check_configurations
 from optimizer.search.other_turns import other_turns
 from optimizer.search.sampled_ends import activate_deferred, moved_end, on_branch
-from optimizer.search.seeds import expected, how_near
+from optimizer.search.seeds import NEAR_IN_WORK, estimates, expected
 from optimizer.solution import CandidateStatus
 
 # samples that move: those of least lower bound
@@ -29,9 +29,11 @@ SAME_PLACE, MOST_PLACES = 0.1, 32
 # configurations that are solved are farther apart in some joint [rad], are expected to need at most this ratio of the
 # least energy that is expected, and are so many
 APART, NEAR, MOST = 0.5, 1.15, 8
+# of mechanical work, the straight line says more than the bound, and both say little
+APART_FOR_WORK, NEAR_FOR_WORK, MOST_FOR_WORK = 0.7, NEAR_IN_WORK, 3
 # samples of other branches that are solved, too, those of least lower bound: a straight line says little of motions
-# that bend because of a torque's limit, and less of mechanical work
-OTHERS, OTHERS_FOR_WORK = 4, 6
+# that bend because of a torque's limit; of mechanical work, samples of least bound as if there were nothing else
+OTHERS = 4
 # share of a joint's torque that counts as friction: no way is for free [1]
 DRAG = 1e-3
 
@@ -48,20 +50,24 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
     by_bound = np.lexsort(([each.shortest for each in samples], [each.lower_bound for each in samples]))
     samples = [samples[k] for k in by_bound[:MOST_MOVED].tolist()]
     pool = [*_moved(prepared, samples), *samples]
-    energy = expected(prepared, pool)
-    turned = other_turns(prepared, samples, float(energy.min()))
-    if turned:
-        pool, energy = [*pool, *turned], np.concatenate([energy, expected(prepared, turned)])
-    near = max(NEAR, how_near(prepared.problem)[0])
-    q = np.array([[*each.q_start, *each.q_goal] for each in pool])
-    for k in _least_around(energy, q, near):
-        if pool[k].deferred:
-            pool[k].deferred = False
-            pool[k].settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
+    if prepared.problem.objective == "mechanical":
+        chosen = _least_around(pool, estimates(prepared, pool), APART_FOR_WORK, NEAR_FOR_WORK, MOST_FOR_WORK)
+    else:
+        energy = expected(prepared, pool)
+        turned = other_turns(prepared, samples, float(energy.min()))
+        if turned:
+            pool, energy = [*pool, *turned], np.concatenate([energy, expected(prepared, turned)])
+        chosen = _least_around(pool, energy, APART, NEAR, MOST)
+    for each in chosen:
+        if each.deferred:
+            each.deferred = False
+            each.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
         else:
-            candidates.append(pool[k])
-    is_work = prepared.problem.objective == "mechanical"
-    activate_deferred(candidates, OTHERS_FOR_WORK if is_work else OTHERS, 1)
+            candidates.append(each)
+    if prepared.problem.objective == "mechanical":
+        activate_deferred(candidates)
+    else:
+        activate_deferred(candidates, OTHERS, 1)
     return True
 
 
@@ -92,16 +98,17 @@ def _moved(prepared: PreparedProblem, samples: Sequence[Candidate]) -> list[Cand
     return moved
 
 
-def _least_around(energy: Array, q: Array, near: float) -> list[int]:
-    """Indices of at most MOST configurations (n, r) [rad], each far from any that needs less of the energies (n,)
-    [J], and at most the ratio `near` of the least."""
+def _least_around(pool: Sequence[Candidate], energy: Array, apart: float, near: float, count: int) -> list[Candidate]:
+    """At most so many candidates, each far `apart` [rad] from any that needs less of the energies (n,) [J], and of at
+    most the ratio `near` of the least."""
+    q = np.array([[*each.q_start, *each.q_goal] for each in pool])
     order = np.argsort(energy, kind="stable").tolist()
     # an energy is negative where the supply takes more back than it gives
     most = energy[order[0]] + (near - 1) * abs(energy[order[0]])
-    chosen = list[int]()
+    chosen = list[Candidate]()
     for place, k in enumerate(order):
-        if energy[k] > most or len(chosen) == MOST:
+        if energy[k] > most or len(chosen) == count:
             break
-        if not place or np.abs(q[order[:place]] - q[k]).max(axis=1).min() > APART:
-            chosen.append(k)
+        if not place or np.abs(q[order[:place]] - q[k]).max(axis=1).min() > apart:
+            chosen.append(pool[k])
     return chosen

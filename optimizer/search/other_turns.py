@@ -30,13 +30,13 @@ def other_turns(prepared: PreparedProblem, samples: Sequence[Candidate], least: 
     if not prepared.problem.windings:
         return []
     limits = prepared.arm.active_limits
-    drag = prepared.arm.friction_law.coulomb if prepared.problem.objective == "electrical" else 0.0
+    coulomb = prepared.arm.friction_law.coulomb
     q_start, q_goal = (np.array([getattr(each, name) for each in samples]) for name in ("q_start", "q_goal"))
     way, given = q_goal - q_start, np.array([[each.start.fixed] for each in samples])
     turn = -FULL_TURN * np.sign(way)
     at_goal = (q_goal + turn >= limits.q_min) & (q_goal + turn <= limits.q_max)
     at_start = (q_start - turn >= limits.q_min) & (q_start - turn <= limits.q_max) & ~given
-    bounds = np.array([[each.lower_bound] for each in samples]) + drag * (np.abs(way + turn) - np.abs(way))
+    bounds = np.array([[each.lower_bound] for each in samples]) + coulomb * (np.abs(way + turn) - np.abs(way))
     most = least + (NEAR - 1) * abs(least)
     rows, joints = np.nonzero((at_goal | at_start) & (way != 0) & (bounds <= most))
     if not len(rows):
