@@ -28,6 +28,7 @@ from optimizer.search.incumbent import Incumbent
 from optimizer.search.missed_branches import all_known, bound_of_others
 from optimizer.search.near_goals import activate_near_goals
 from optimizer.search.other_starts import start_beside
+from optimizer.search.outer_turns import explore_families
 from optimizer.search.path_ends import bound_beside, path_candidates
 from optimizer.search.refinement import baselines_of, compare_with_baselines, refine
 from optimizer.search.sampled_ends import activate_deferred, between
@@ -176,7 +177,8 @@ class Run:
         incumbent = self.incumbent
         candidates, most_solved = incumbent.candidates, incumbent.method.most_solved
         self.activate()
-        while True:
+
+        def solve_open() -> None:
             explore(
                 incumbent.prepared,
                 candidates,
@@ -185,6 +187,9 @@ class Run:
                 most_solved,
                 incumbent.tell_tried,
             )
+
+        while True:
+            explore_families(incumbent, solve_open)
             solved = incumbent.best() is not None and not self.has_lost_a_goal()
             if solved or incumbent.deadline.passed or not self.activate():
                 break

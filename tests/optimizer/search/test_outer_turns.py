@@ -1,0 +1,114 @@
+"""Families of candidates that differ by full turns of the outer joints: who is solved, what becomes of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, explore_families, families_of
+from optimizer.search.run import Run
+from optimizer.solution import CandidateStatus
+from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
+
+DURATION = 3.0
+FULL_TURN = 2 * np.pi
+
+
+def prepared(**given: Any) -> Incumbent:
+    run = Run(problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given))
+    run.prepare()
+    return run.incumbent
+
+
+def exploring(incumbent: Incumbent, energy: Callable[[Candidate], float | None]) -> Callable[[], None]:
+    """An exploration that finds these energies [J]; a candidate without one collides."""
+
+    def explore() -> None:
+        for each in incumbent.candidates:
+            if each.status is not CandidateStatus.UNVISITED or each.deferred:
+                continue
+            each.energy = energy(each)
+            if each.energy is None:
+                each.attempt = SolveResult(SolveStatus.PRUNED, "collides")
+                each.settle(CandidateStatus.PRUNED, Reason.METHOD, "collides")
+            else:
+                each.attempt = SolveResult(SolveStatus.SOLVED, "converged")
+                each.settle(CandidateStatus.SOLVED, Reason.METHOD, "converged")
+
+    return explore
+
+
+def test_families() -> None:
+    incumbent = prepared()
+    families = families_of(incumbent)
+    everyone = [each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE]
+    assert sorted(id(each) for family in families for each in family) == sorted(map(id, everyone))
+    assert 1 < len(families) < len(everyone)
+    for family in families:
+        turns = np.array([each.q_goal - family[0].q_goal for each in family]) / FULL_TURN
+        assert turns[:, :3] == pytest.approx(0.0, abs=1e-9)
+        assert turns == pytest.approx(turns.round(), abs=1e-9)
+        assert family[0].shortest == min(each.shortest for each in family)
+
+
+@pytest.mark.parametrize("given", [{"objective": "electrical"}, {"method": "time_scaling"}])
+def test_no_families(given: dict[str, Any]) -> None:
+    """Where the bounds rule out enough, and where a solve takes little, every candidate is tried."""
+    incumbent = prepared(**given)
+    explore_families(incumbent, exploring(incumbent, lambda each: each.lower_bound + 1.0))
+    assert not any(each.reason is Reason.FAMILY for each in incumbent.candidates)
+
+
+def test_best_families_are_solved() -> None:
+    """Others are pruned, and no solved member is worth less than one that its family would have let by."""
+    incumbent = prepared()
+    families = families_of(incumbent)
+    rank = {id(each): k for k, family in enumerate(families) for each in family}
+    # every family needs a tenth more than the one before
+    explore_families(incumbent, exploring(incumbent, lambda each: 1e3 * 1.1 ** rank[id(each)]))
+    near = [k for k in range(len(families)) if 1.1**k <= NEAR][:FAMILIES]
+    for k, family in enumerate(families):
+        solved = [each.energy is not None for each in family]
+        assert solved == [place < (MEMBERS if k in near else 1) for place in range(len(family))]
+        left = [each for each in family if each.energy is None]
+        assert all((each.status, each.reason) == (CandidateStatus.PRUNED, Reason.FAMILY) for each in left)
+    assert not any(each.deferred for each in incumbent.candidates)
+
+
+def test_what_bounds_rule_out_is_said_to_be() -> None:
+    incumbent = prepared()
+    explore_families(incumbent, exploring(incumbent, lambda each: each.lower_bound))
+    best = incumbent.best()
+    assert best is not None
+    left = [each for each in incumbent.candidates if each.energy is None and each.holdable]
+    assert {each.reason for each in left if each.lower_bound >= (best.energy or 0.0)} <= {Reason.BOUND, Reason.TOO_SLOW}
+
+
+def test_another_member_stands_for_one_that_collides() -> None:
+    incumbent = prepared()
+    families = families_of(incumbent)
+    hindered = max(families, key=len)
+    assert len(hindered) > 2
+    wanted, collide = hindered[2], {id(each) for each in hindered[:2]}
+    explore_families(incumbent, exploring(incumbent, lambda each: None if id(each) in collide else 1e3))
+    assert wanted.energy is not None
+
+
+def test_all_are_tried_while_there_is_no_motion() -> None:
+    incumbent = prepared()
+    explore_families(incumbent, exploring(incumbent, lambda _: None))
+    assert all(each.attempt is not None for family in families_of(incumbent) for each in family)
+
+
+def test_once_time_is_over_nothing_is_pruned() -> None:
+    incumbent = prepared()
+    incumbent.end = incumbent.end.within(-1.0)
+    explore_families(incumbent, lambda: None)
+    open_ = [each for family in families_of(incumbent) for each in family]
+    assert all(each.status is CandidateStatus.UNVISITED and each.reason is Reason.NOT_REACHED for each in open_)
