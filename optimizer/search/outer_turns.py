@@ -28,7 +28,7 @@ DIGITS = 6
 def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> None:
     """Solve one member of each family by `explore`, which solves all candidates that are open, then the best families.
 
-    What is not solved is pruned, once there is a motion.
+    What neither a solve nor a bound rules out is left unvisited.
     """
     families = families_of(incumbent)
     if all(len(each) == 1 for each in families):
@@ -49,16 +49,18 @@ def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> Non
     for family in sorted(near, key=_energy)[:FAMILIES]:
         _release(family[:MEMBERS])
     explore()
-    _prune(incumbent, waiting)
+    _leave(incumbent, waiting)
 
 
 def families_of(incumbent: Incumbent) -> list[list[Candidate]]:
     """The open and the solved candidates by family, the one of least possible duration first.
 
-    Each is a family of its own with another objective, whose bounds rule out enough, or another method.
+    Each is a family of its own with another objective, whose bounds rule out enough, another method, or a tight bound,
+    for which everything is solved.
     """
     open_ = [each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE]
-    alone = (incumbent.problem.objective, incumbent.problem.method) != ("mechanical", "bspline")
+    asked = incumbent.problem
+    alone = (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight"
     if alone or any(each.sampled or each.deferred for each in open_):
         return [[each] for each in open_]
     families: dict[tuple[int, int, bytes], list[Candidate]] = {}
@@ -101,8 +103,8 @@ def _release(candidates: Sequence[Candidate]) -> None:
         each.deferred = False
 
 
-def _prune(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
-    """Give those up that still wait, unless the deadline ended the search."""
+def _leave(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
+    """Say why those that still wait are not solved, unless the deadline ended the search."""
     left = [each for each in waiting if each.deferred]
     _release(left)
     best = incumbent.best()
@@ -110,5 +112,7 @@ def _prune(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
         return
     for each in left:
         if each.status is CandidateStatus.UNVISITED:
-            reason = Reason.BOUND if each.lower_bound >= best.energy else Reason.FAMILY
-            each.settle(CandidateStatus.PRUNED, reason)
+            if each.lower_bound >= best.energy:
+                each.settle(CandidateStatus.PRUNED, Reason.BOUND)
+            else:
+                each.settle(CandidateStatus.UNVISITED, Reason.FAMILY)

@@ -57,16 +57,16 @@ def test_families() -> None:
         assert family[0].shortest == min(each.shortest for each in family)
 
 
-@pytest.mark.parametrize("given", [{"objective": "electrical"}, {"method": "time_scaling"}])
+@pytest.mark.parametrize("given", [{"objective": "electrical"}, {"method": "time_scaling"}, {"bound": "tight"}])
 def test_no_families(given: dict[str, Any]) -> None:
-    """Where the bounds rule out enough, and where a solve takes little, every candidate is tried."""
+    """Every candidate is tried where bounds rule out enough, a solve takes little, or nothing shall be left."""
     incumbent = prepared(**given)
     explore_families(incumbent, exploring(incumbent, lambda each: each.lower_bound + 1.0))
     assert not any(each.reason is Reason.FAMILY for each in incumbent.candidates)
 
 
 def test_best_families_are_solved() -> None:
-    """Others are pruned, and no solved member is worth less than one that its family would have let by."""
+    """Others are left, and no solved member is worth less than one that its family would have let by."""
     incumbent = prepared()
     families = families_of(incumbent)
     rank = {id(each): k for k, family in enumerate(families) for each in family}
@@ -77,7 +77,7 @@ def test_best_families_are_solved() -> None:
         solved = [each.energy is not None for each in family]
         assert solved == [place < (MEMBERS if k in near else 1) for place in range(len(family))]
         left = [each for each in family if each.energy is None]
-        assert all((each.status, each.reason) == (CandidateStatus.PRUNED, Reason.FAMILY) for each in left)
+        assert all((each.status, each.reason) == (CandidateStatus.UNVISITED, Reason.FAMILY) for each in left)
     assert not any(each.deferred for each in incumbent.candidates)
 
 
@@ -106,7 +106,7 @@ def test_all_are_tried_while_there_is_no_motion() -> None:
     assert all(each.attempt is not None for family in families_of(incumbent) for each in family)
 
 
-def test_once_time_is_over_nothing_is_pruned() -> None:
+def test_once_time_is_over_nothing_is_left_for_its_family() -> None:
     incumbent = prepared()
     incumbent.end = incumbent.end.within(-1.0)
     explore_families(incumbent, lambda: None)
