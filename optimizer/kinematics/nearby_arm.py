@@ -17,6 +17,9 @@ from optimizer.kinematics.nearby_loops import loops
 from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.kinematics.spherical_shoulder import SphericalShoulder
 
+# distances [m] of poses beside one that is beyond the reach of the arm nearby, if only by what the two arms differ
+BESIDE = (1e-3, 2e-3)
+
 
 @dataclass(frozen=True, eq=False)
 class NearbyArm:
@@ -37,11 +40,11 @@ class NearbyArm:
                 return cls(form, mirrored, JointAxes.of(each))
         return None
 
-    def loops(self, T: Array, finer: int = 1) -> tuple[list[Array], list[Array]]:
+    def loops(self, T: Array) -> tuple[list[Array], list[Array]]:
         """Points (m, 7) [rad] along loops on which the arm nearby holds its flange at T (4, 4), and along curves that
-        are in none: see `nearby_loops`. There are so many times more points of all if they are to be `finer`."""
+        are in none: see `nearby_loops`."""
         pose = RedundantPose(self.form, np.asarray(np.linalg.inv(T)) if self.mirrored else T)
-        found, rest = loops(pose, finer)
+        found, rest = loops(pose)
         # on the left shoulder, the third axis leans to the other side
         scale, shift = np.ones(7), np.zeros(7)
         scale[1], shift[:3] = -1.0, (np.pi, -2 * self.form.lean_at_zero, np.pi)
@@ -50,3 +53,15 @@ class NearbyArm:
             found, rest = [-q[:, ::-1] for q in found], [-q[:, ::-1] for q in rest]
             scale, shift = scale[::-1], -shift[::-1]
         return [*found, *(scale * q + shift for q in found)], [*rest, *(scale * q + shift for q in rest)]
+
+    def beside(self, T: Array) -> list[Array]:
+        """Points (m, 7) [rad] along the curves on which the arm nearby holds its flange beside T (4, 4), shifted along
+        the axes of the base: there are some if T is beyond its reach by less than the arms differ."""
+        found = list[Array]()
+        for distance in BESIDE:
+            for shift in distance * np.vstack([np.eye(3), -np.eye(3)]):
+                near = T.copy()
+                near[:3, 3] += shift
+                closed, rest = self.loops(near)
+                found += [*closed, *rest]
+        return found

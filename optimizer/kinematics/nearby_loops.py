@@ -1,5 +1,6 @@
 """The curves of an arm, all points at once, from those of an arm nearby whose closed form is known.
 
+There are more points where these are long or bend: the closed form costs less than what a curve without enough costs.
 Where two branches meet, the curve over one goes on over the other: together they are loops. A step of Newton's method
 leads points along a loop onto the curve of the arm itself. Next to a singularity that curve is another one: there the
 step is long, or its tangents turn, and the loop is left to be followed point by point.
@@ -22,25 +23,28 @@ from optimizer.kinematics.redundant_pose import RedundantPose
 
 # steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of these make a loop
 STEPS, STARTS = 16, 4
-# length [rad] of a step from which on a curve gets so many times the points, of which those are kept that are so far
-# apart [rad]
-UNEVEN, DENSER, EVEN = 0.6, 4, 0.3
+# a step that is longer [rad] is cut into parts that long, so many at most; one along which the curve bends by more than
+# BENT_BY [rad], into two, if it is not shorter than LEAST [rad]; so many times over
+LONG, PART, MOST_PARTS, BENT_BY, LEAST, ROUNDS = 0.6, 0.25, 16, 0.35, 0.03, 5
+# farthest points that are kept along a curve [rad], and most that it bends between them [rad]
+SPACED, TURNED = 0.45, 0.4
 # the last angle all around [rad]
 WHOLE = (-np.pi, np.pi)
 # distance [rad] of two ends of curves that are one point, and of a third that is not
 JOINED, APART = 1e-4, 1e-2
+# product of lengths of steps [rad²] of which one is none
+NONE = 1e-20
 # longest step of Newton's method [rad] that needs no other, and farthest way [rad] of a point to the curve
 SHORT, MOVED = 0.01, 0.05
 
 
-def loops(pose: RedundantPose, finer: int) -> tuple[list[Array], list[Array]]:
+def loops(pose: RedundantPose) -> tuple[list[Array], list[Array]]:
     """Points (m, 7) [rad] along loops of curves of a pose on the right shoulder, each from its first point once around,
-    without full turns left out; and along curves that are in none, because more than two meet at an end, or one does.
-    There are so many times more points if they are to be `finer`."""
+    without full turns left out; and along curves that are in none: at an end, more than two meet, or one does."""
     curves = right_curves(pose)
     if curves is None:
         return [], []
-    points, ends = _points(curves, finer)
+    points, ends = _points(curves)
     found, rest = [points[k] for k in np.flatnonzero(curves.whole).tolist()], list[Array]()
     meets = _meeting(ends)
     left = np.flatnonzero(~curves.whole).tolist()
@@ -65,45 +69,75 @@ def spread_over(points: Array) -> Array:
     return np.asarray(points[((np.arange(count) + 0.5) * len(points) / count).astype(int)])
 
 
-def _points(curves: CurveStack, finer: int) -> tuple[list[Array], Array]:
+def _points(curves: CurveStack) -> tuple[list[Array], Array]:
     """Points (m, 7) [rad] along each of the curves from end to end, without full turns left out, and the configurations
     at the first and the last of them, (2n, 7)."""
-    count = len(curves.whole)
     # a whole turn has twice the range
-    steps = (2 if curves.whole.any() else 1) * STEPS * finer
-    points = _along(curves, np.arange(count), steps)
-    ends = points[:, [0, -1]].reshape(-1, 7)
-    unwound, length = _unwound(points)
-    found = list(unwound)
-    uneven = np.flatnonzero(length.max(axis=1) > UNEVEN)
-    if len(uneven):
-        unwound, length = _unwound(_along(curves, uneven, DENSER * steps))
-        # the first point after every EVEN, and both ends
-        past = np.floor(np.cumsum(length, axis=1) * (finer / EVEN))
-        kept = np.ones(unwound.shape[:2], dtype=bool)
-        kept[:, 1:-1] = past[:, :-1] > np.hstack([np.zeros((len(uneven), 1)), past[:, :-2]])
-        for k, each, chosen in zip(uneven.tolist(), unwound, kept, strict=True):
-            found[k] = each[chosen]
-    return found, ends
+    counts = np.where(curves.whole, 2 * STEPS, STEPS)
+    rows = np.repeat(np.arange(len(counts)), counts + 1)
+    last = np.cumsum(counts + 1) - 1
+    share = (np.arange(len(rows)) - (last - counts)[rows]) / counts[rows]
+    u = np.pi * np.where(curves.whole[rows], 2 * share - 1, share)
+    q = _at(curves, u, rows)
+    ends = q[np.array([last - counts, last]).T.ravel()]
+    for _ in range(ROUNDS):
+        steps, length, bend = _steps(q, rows)
+        parts = _parts(length, bend)
+        cut = np.flatnonzero(parts > 1)
+        if not len(cut):
+            break
+        # the points between those of each cut step
+        before = np.repeat(cut, parts[cut] - 1)
+        nth = np.arange(1, len(before) + 1) - np.repeat(np.cumsum(parts[cut] - 1) - parts[cut] + 1, parts[cut] - 1)
+        between = u[before] + nth / parts[before] * (u[before + 1] - u[before])
+        q = np.insert(q, before + 1, _at(curves, between, rows[before]), axis=0)
+        u, rows = np.insert(u, before + 1, between), np.insert(rows, before + 1, rows[before])
+    else:
+        steps, length, bend = _steps(q, rows)
+    kept = _kept(length, bend, rows)
+    unwound = np.cumsum(np.vstack([q[:1], steps]), axis=0)[kept]
+    return np.split(unwound, np.flatnonzero(np.diff(rows[kept])) + 1), ends
 
 
-def _along(curves: CurveStack, rows: NDArray[np.intp], steps: int) -> Array:
-    """Configurations (n, steps + 1, 7) [rad] along curves of rows (n,), from end to end."""
-    share = np.arange(steps + 1) / steps
-    u = np.where(curves.whole[rows, None], np.pi * (2 * share - 1), np.pi * share)
-    each = np.repeat(rows, steps + 1)
-    q7 = curves.last_angle(u.ravel(), each)
-    return curves.pose.configurations(q7, curves.sheet[each]).reshape(len(rows), steps + 1, 7)
+def _at(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:
+    """Configurations (n, 7) [rad] at parameters u (n,) of curves (n,)."""
+    return curves.pose.configurations(curves.last_angle(u, rows), curves.sheet[rows])
 
 
-def _unwound(points: Array) -> tuple[Array, Array]:
-    """Points (n, m, 7) [rad] along curves with the full turns that are left out between one and the next, and the
-    lengths (n, m - 1) of the steps between."""
-    steps = wrapped(points[:, 1:] - points[:, :-1])
-    unwound = points.copy()
-    np.cumsum(steps, axis=1, out=unwound[:, 1:])
-    unwound[:, 1:] += points[:, :1]
-    return unwound, np.sqrt((steps * steps).sum(axis=2))
+def _steps(q: Array, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
+    """The steps (n - 1, 7) [rad] from each of the points q (n, 7) of curves (n,) to the next, their lengths (n - 1,), 0
+    from one curve to another, and by how much [rad] the curves bend along them (n - 1,), nearly."""
+    steps = wrapped(q[1:] - q[:-1])
+    length = np.sqrt((steps * steps).sum(axis=1))
+    length[rows[1:] != rows[:-1]] = 0.0
+    product = length[1:] * length[:-1]
+    cosine = (steps[1:] * steps[:-1]).sum(axis=1) / np.maximum(product, NONE)
+    turn = np.zeros(len(q))
+    turn[1:-1] = np.where(product > NONE, np.sqrt(np.maximum(2 - 2 * cosine, 0.0)), 0.0)
+    # at its ends, a curve goes on along another one, and bends as it does next to them
+    last = np.append(np.flatnonzero(rows[1:] != rows[:-1]), len(q) - 1)
+    first = np.append(0, last[:-1] + 1)
+    turn[last], turn[first] = turn[last - 1], turn[first + 1]
+    return steps, length, (turn[1:] + turn[:-1]) / 2
+
+
+def _parts(length: Array, bend: Array) -> NDArray[np.intp]:
+    """How many parts each step of a length (n,) along which the curve bends (n,) [rad] is to be cut into."""
+    long = np.minimum(np.ceil(length / PART), MOST_PARTS)
+    return np.where(length > LONG, long, np.where((bend > BENT_BY) & (length > LEAST), 2, 1)).astype(np.intp)
+
+
+def _kept(length: Array, bend: Array, rows: NDArray[np.intp]) -> list[int]:
+    """Indices of the points of curves (n,) that are enough, both ends of each curve among them."""
+    starts = [True, *(rows[1:] != rows[:-1]).tolist(), True]
+    found, way, turned = list[int](), 0.0, 0.0
+    # plain numbers: every choice depends on the one before
+    for k, (step, turn) in enumerate(zip([*length.tolist(), 0.0], [*bend.tolist(), 0.0], strict=True)):
+        if starts[k] or starts[k + 1] or way + step > SPACED or turned + turn > TURNED:
+            found.append(k)
+            way = turned = 0.0
+        way, turned = way + step, turned + turn
+    return found
 
 
 def _joined(parts: Sequence[Array]) -> Array:

@@ -39,8 +39,6 @@ NEARLY, NEAREST, AROUND, SPREAD = 1e-5, 8, 40, 0.1
 ON_EDGE = 1e-6
 # smallest singular value below which no curve is followed: configurations may go off in several directions
 SINGULAR = 1e-4
-# how many times the points of loops along which the curves are not found
-FINER = 4
 # poses whose curves are kept
 KEPT = 32
 
@@ -115,13 +113,11 @@ class TracedArm:
         loops, rest = self._nearby.loops(T)
         paths, good = followed(self._chain, loops, T)
         left = np.flatnonzero(~good).tolist()
-        if left:
-            # where curves bend, or come near to each other, the points may have been too far apart
-            finer = self._nearby.loops(T, FINER)[0]
-            more, good = followed(self._chain, [finer[k] for k in left], T)
-            paths += more
-            left = [k for k, found in zip(left, good.tolist(), strict=True) if not found]
         return paths, np.vstack([none, *map(spread_over, rest), *(spread_over(loops[k][:-1]) for k in left)])
+
+    def _beside(self, T: Array) -> list[Array]:
+        """Starts (n, 7) of the arm nearby, beside the pose T (4, 4): the arm itself may reach a little further."""
+        return [] if self._nearby is None else [spread_over(each) for each in self._nearby.beside(T)]
 
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
@@ -133,10 +129,10 @@ class TracedArm:
 
     def _through(self, starts: Array, T: Array, others: bool) -> list[TracedPath]:
         """The curves with the flange at T (4, 4) that starts (n, 7) lead to, and if there are no others, those that the
-        table's starts lead to."""
+        table's starts and those of the arm nearby beside T lead to."""
         q, missed = solved(self._chain, starts, T, STEPS)
         if not others and not (missed < SOLVED).any():
-            starts = self._seeds.starts(T)
+            starts = np.vstack([self._seeds.starts(T), *self._beside(T)])
             q, missed = solved(self._chain, starts, T, STEPS)
         q, missed = self._with_near(q, missed, T)
         if not others and not (missed < SOLVED).any():

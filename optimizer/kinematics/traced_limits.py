@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models.robot import Array, Mask
-from optimizer.kinematics.across_curve import LAST, TINY, nearly_error
+from optimizer.kinematics.across_curve import LEFT, step_to
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.traced_curve import TracedCurve, on_curve
 from optimizer.kinematics.traced_stack import Rows, TracedStack
@@ -147,18 +147,14 @@ def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]
     binding = (np.abs(own) - limits.half).argmax(axis=1)
     joint, side = limits.joints[binding], np.sign(own[rows, binding])
     target = q[rows, joint] + side * (limits.half[binding] - ROUNDING / 2) - own[rows, binding]
+    along = np.zeros((n, nq))
+    along[rows, joint] = 1.0
     for _ in range(STEPS):
-        reached, jacobian = one.chain.flange_and_jacobian(q)
-        system, sides = TINY * np.tile(np.eye(nq), (n, 1, 1)), np.empty((n, nq, 1))
-        system[:, :-1] += jacobian
-        system[rows, -1, joint] += 1.0
-        sides[:, :-1, 0], sides[:, -1, 0] = nearly_error(reached, one.T), target - q[rows, joint]
-        move = np.linalg.solve(system, sides)[:, :, 0]
+        move, left = step_to(one.chain, q, along, target - q[rows, joint], one.T)
         q = q + np.clip(move, -NEAR, NEAR)
-        last = np.abs(move).max(axis=1)
-        if last.max() < LAST:
+        if left.max() < LEFT:
             break
-    return q, (last < LAST) & (limits.excess(q) <= 0)
+    return q, (left < LEFT) & (limits.excess(q) <= 0)
 
 
 def _zeros(beyond: Callable[[Array], Array], share: Array, inside: Mask) -> Array:

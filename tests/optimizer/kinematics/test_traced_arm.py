@@ -17,7 +17,7 @@ from optimizer.kinematics.chain import Chain, miss, pose_error
 from optimizer.kinematics.curve_tracing import cycles, traced
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.nearby_arm import NearbyArm
-from optimizer.kinematics.nearby_loops import SHORT, followed
+from optimizer.kinematics.nearby_loops import LONG, SHORT, followed
 from optimizer.kinematics.newton import solved
 from optimizer.kinematics.redundant_arm import RedundantArm
 from optimizer.kinematics.seed_table import SeedTable
@@ -58,6 +58,10 @@ BENT_CURVES = (
         ]
     ),
 )
+# configuration [rad] of an arm stretched further than the one nearby reaches: 0.35 mm lie between their axes
+STRETCHED = np.array([-5.237985, 0.035838, 1.066330, -0.002736, -4.184650, -1.781755, -3.956364])
+# least share of poses all of whose curves are found without being followed step by step
+AT_ONCE = 0.9
 # s: no search comes near it, however busy the machine
 AMPLE = 300.0
 
@@ -145,6 +149,19 @@ def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> 
             assert other.closed and all(away(curve, q) < SHORT for q in path.q)
             count += 1
     assert count > 15
+
+
+def test_nearly_all_poses_have_points_enough_along_their_curves() -> None:
+    """A pose with a curve that is followed step by step takes ten times as long; once, that was every seventh."""
+    rng, chain, count, poses = np.random.default_rng(61), Chain.of(GEN3.model), 0, 40
+    nearby = NearbyArm.of(chain)
+    assert nearby is not None
+    for _ in range(poses):
+        T = flange(GEN3, inside(GEN3, rng))
+        loops, rest = nearby.loops(T)
+        assert all(np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops)
+        count += not rest and followed(chain, loops, T)[1].all()
+    assert count >= AT_ONCE * poses
 
 
 def test_parts_of_curves_between_starts_make_loops_and_ways_to_an_end() -> None:
@@ -239,6 +256,14 @@ def test_a_curve_that_bends_within_a_thousandth_goes_on() -> None:
     for q in BENT_CURVES:
         curves = arm.self_motions(flange(GEN3, q))
         assert min(away(each, q) for each in curves) < FOUND and all(each.closed for each in curves)
+
+
+def test_an_arm_stretched_further_than_the_one_nearby_is_found() -> None:
+    """The one nearby has no curve there. The starts of the table led to two others of the arm's curves."""
+    arm, T = TracedArm.of(GEN3.model), flange(GEN3, STRETCHED)
+    nearby = NearbyArm.of(Chain.of(GEN3.model))
+    assert arm is not None and nearby is not None and nearby.loops(T) == ([], []) and nearby.beside(T)
+    assert min(away(each, STRETCHED) for each in arm.self_motions(T, GEN3.limits)) < FOUND
 
 
 def test_out_of_reach_no_distance_is_claimed() -> None:

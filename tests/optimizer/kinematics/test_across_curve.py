@@ -1,0 +1,41 @@
+"""Newton's method across a curve of configurations, with the second order of the motion, against forward kinematics."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.registry import load_robot
+from optimizer.kinematics.across_curve import LEFT, onto, second_order
+from optimizer.kinematics.chain import Chain, miss, pose_error
+from tests.optimizer.chains import serial_chain
+
+CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]
+# steps [rad], and what they leave over their cube [m/rad³]: a length of the arm, times the joints that turn it
+STEPS, THIRD_ORDER = (3e-2, 3e-3, 3e-4), 40.0
+# error [m, rad] of what is on the curve: each of seven joints may be off by some LEFT
+EXACT = 10 * LEFT
+
+
+def test_what_two_orders_leave_goes_with_the_cube_of_the_step() -> None:
+    rng = np.random.default_rng(71)
+    for chain in CHAINS:
+        q = rng.uniform(-2.0, 2.0, (50, 7))
+        T, jacobian = chain.flange_and_jacobian(q)
+        for step in STEPS:
+            move = step * rng.uniform(-1.0, 1.0, q.shape)
+            twist = pose_error(T, chain.flange(q + move))
+            left = twist - (jacobian @ move[:, :, None])[:, :, 0] - second_order(jacobian, move)
+            assert np.abs(left).max() < THIRD_ORDER * step**3
+
+
+def test_what_is_led_onto_the_curve_is_on_it_across_the_given_direction() -> None:
+    rng = np.random.default_rng(72)
+    for chain in CHAINS:
+        for away in (1e-6, 1e-4, 1e-2):
+            q = rng.uniform(-2.0, 2.0, 7)
+            T, jacobian = chain.flange_and_jacobian(q[None])
+            along = np.linalg.svd(jacobian[0])[2][-1] + 0.1 * rng.normal(size=7)
+            starts = q + away * rng.uniform(-1.0, 1.0, (20, 7))
+            reached = onto(chain, starts, np.tile(along, (20, 1)), T[0])
+            assert miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
+            assert np.abs((reached - starts) @ along).max() < EXACT
