@@ -17,16 +17,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import groupby, product
-from math import ceil, floor, tau
 from typing import Any, Protocol
 
 import numpy as np
 
-from models.robot import MOST_ROBOTS, Array, Limits, Mask, Robot
+from models.robot import MOST_ROBOTS, Array, Limits, Robot
 from optimizer.exceptions import InvalidProblem, SingularPose, UnreachablePose
 from optimizer.kinematics import redundant_curve, traced_curve
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.decomposition import DecomposedArm
+from optimizer.kinematics.full_turns import full_turn_alternatives, nearest_turns
 from optimizer.kinematics.ik_solutions import IKSolution, PrincipalSolution, Singularities
 from optimizer.kinematics.isolated import distinct
 from optimizer.kinematics.multi_start import MultiStart
@@ -197,25 +197,34 @@ class ClosedFormInverseKinematics:
         if motions:
             each = max(LEAST_OF_EACH, min(members, MOST_IN_ALL * members // len(motions)))
             configurations = _members(motions, [spread(motion, each) for motion in motions])
-            if limits is not None:
-                configurations = _inside_if_any(motions, configurations, limits)
             for motion, of_motion in zip(motions, configurations, strict=True):
                 labels += [motion.label] * len(of_motion)
                 curves += [None if is_point(motion) else motion] * len(of_motion)
             q = np.vstack([q, *configurations])
-        # never a wrong answer: a solution that forward kinematics does not confirm is dropped
-        off = self._chain.flange(q) - T
-        if len(motions) < 2 and np.abs(off).max(initial=0.0) < ACCURACY / 4:
-            return _Reached(q, labels, curves)
+        reached = self._confirmed(_Reached(q, labels, curves), T, len(motions) > 1)
+        others = _unseen(motions, reached, limits) if motions and limits is not None else []
+        if not others:
+            return reached
+        more = _Reached(
+            np.vstack([q for _, q in others]), [each.label for each, _ in others], [each for each, _ in others]
+        )
+        more = self._confirmed(more, T, False)
+        return _Reached(np.vstack([reached.q, more.q]), reached.labels + more.labels, reached.curves + more.curves)
+
+    def _confirmed(self, found: _Reached, T: Array, several: bool) -> _Reached:
+        """What is found less what does not reach T (4, 4), so that no answer is wrong; and if there are several curves,
+        less one of two that are the same: two of a redundant arm's curves meet at an end that both have."""
+        off = self._chain.flange(found.q) - T
+        if not several and np.abs(off).max(initial=0.0) < ACCURACY / 4:
+            return found
         position = np.linalg.norm(off[:, :3, 3], axis=1)
         rotation = np.linalg.norm(off[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
         missed = np.maximum(position, rotation)
         chosen = np.flatnonzero(missed < ACCURACY)
-        if len(motions) > 1:
-            # two of a redundant arm's curves meet at an end that both have
-            chosen = chosen[distinct(q[chosen], missed[chosen])]
+        if several:
+            chosen = chosen[distinct(found.q[chosen], missed[chosen])]
         kept = chosen.tolist()
-        return _Reached(q[chosen], [labels[k] for k in kept], [curves[k] for k in kept])
+        return _Reached(found.q[chosen], [found.labels[k] for k in kept], [found.curves[k] for k in kept])
 
     def solve(
         self,
@@ -236,7 +245,7 @@ class ClosedFormInverseKinematics:
             raise SingularPose(target, error.smallest_singular_value) from None
         if not reachable:
             raise self._out_of_reach(T, target)
-        nearest, held = _nearest_turns(reached.q, limits)
+        nearest, held = nearest_turns(reached.q, limits)
         wound, owners = list[Array](), list[PrincipalSolution]()
         for branch, near, inside in zip(reached.principal(self._form, self._chain), nearest, held, strict=True):
             if not inside:
@@ -278,19 +287,6 @@ class ClosedFormInverseKinematics:
         )
 
 
-def full_turn_alternatives(q: Array, q_min: Array, q_max: Array) -> list[list[float]]:
-    """Per joint, the angles q + 2πk [rad] within the limits, nearest to zero first; q, q_min, q_max (nq,).
-
-    An angle that lies beyond a limit by rounding alone counts as on it.
-    """
-    choices = []
-    for angle, lower, upper in zip(q.tolist(), q_min.tolist(), q_max.tolist(), strict=True):
-        least, most = ceil((lower - ROUNDING - angle) / tau), floor((upper + ROUNDING - angle) / tau)
-        inside = (min(max(angle + tau * k, lower), upper) for k in range(least, most + 1))
-        choices.append(sorted(inside, key=abs))
-    return choices
-
-
 def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list[Array]:
     """Configurations (n, nq) [rad] of each of the self-motions of one pose at its parameters (n,)."""
     found = list[Array]()
@@ -301,16 +297,19 @@ def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list
     return found
 
 
-def _inside_if_any(motions: Sequence[SelfMotion], members: Sequence[Array], limits: Limits) -> list[Array]:
-    """The members (n, nq) [rad] of each self-motion; if none is within the limits, the middle one of many that are."""
-    counts = [len(each) for each in members]
-    held = np.array(_nearest_turns(np.vstack(members), limits)[1])
-    found = list(members)
-    for k in np.flatnonzero(~np.logical_or.reduceat(held, np.cumsum([0, *counts[:-1]]))).tolist():
-        many = motions[k].at(spread(motions[k], MANY))
-        inside = np.flatnonzero(_nearest_turns(many, limits)[1])
-        if len(inside):
-            found[k] = many[inside[[len(inside) // 2]]]
+def _unseen(motions: Sequence[SelfMotion], reached: _Reached, limits: Limits) -> list[tuple[SelfMotion, Array]]:
+    """The self-motions that no configuration within the limits stands for, though they have some, and of each the
+    middle one (1, nq) of many that are. Its members may be outside, and an end that is not may count as another's."""
+    inside = nearest_turns(reached.q, limits)[1]
+    held = {id(curve) for curve, each in zip(reached.curves, inside, strict=True) if each}
+    found = list[tuple[SelfMotion, Array]]()
+    for motion in motions:
+        if id(motion) not in held and not is_point(motion):
+            # without its ends: they are there as another's, if they are inside
+            many = motion.at(spread(motion, MANY)[1:-1])
+            within = np.flatnonzero(nearest_turns(many, limits)[1])
+            if len(within):
+                found.append((motion, many[within[[len(within) // 2]]]))
     return found
 
 
@@ -319,21 +318,6 @@ _TOGETHER: dict[type, Callable[[Any, Sequence[Array]], list[Array]]] = {
     RedundantCurve: redundant_curve.members,
     TracedCurve: traced_curve.members,
 }
-
-
-def _nearest_turns(q: Array, limits: Limits) -> tuple[Array, Sequence[bool]]:
-    """The first of `full_turn_alternatives` of every joint of q (n, nq) [rad] in [-π, π], and which rows (n,) have
-    all."""
-    if len(q) and (limits.q_min <= q.min(axis=0)).all() and (q.max(axis=0) <= limits.q_max).all():
-        return q, [True] * len(q)
-    least = np.ceil((limits.q_min - ROUNDING - q) / tau)
-    most = np.floor((limits.q_max + ROUNDING - q) / tau)
-    # np.clip takes five times as long for so few
-    turns = np.minimum(np.maximum(least, 0.0), np.maximum(most, least))
-    near = np.minimum(np.maximum(q + tau * turns, limits.q_min), limits.q_max)
-    near.setflags(write=False)
-    held: Mask = np.asarray((least <= most).all(axis=1))
-    return near, held.tolist()
 
 
 def _orthonormal(T: Array) -> Array:

@@ -9,8 +9,8 @@ import numpy as np
 from models.robot import Array, Robot
 from optimizer.deadline import checkpoint
 from optimizer.exceptions import NoReachableTarget, OutsideLimits, SingularPose, UnreachablePose
+from optimizer.kinematics.full_turns import full_turn_alternatives
 from optimizer.kinematics.inverse import (
-    full_turn_alternatives,
     inverse_kinematics_for,
     required_inverse_kinematics,
 )

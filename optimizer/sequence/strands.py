@@ -15,7 +15,8 @@ from optimizer.deadline import checkpoint
 from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.course_tracing import traces
-from optimizer.kinematics.inverse import full_turn_alternatives, required_inverse_kinematics
+from optimizer.kinematics.full_turns import full_turn_alternatives
+from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.problem.arm import Arm
 from optimizer.problem.branches import BranchFilter

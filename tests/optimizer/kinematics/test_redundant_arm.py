@@ -32,6 +32,30 @@ ROUGHLY = 1.5
 BEYOND = 0.15
 # relative
 SAME = 1e-6
+# configurations [rad] of an iiwa14 on curves of which only the ends, which others have, and the middle were once looked
+# at, and the middle is outside the limits
+OUTSIDE_IN_THE_MIDDLE = (
+    [0.622008753913, 1.773831814219, 2.365978576939, -0.918253011653, -1.213216563581, -1.805610968930, 0.170567686219],
+    [
+        -2.693120771898,
+        -0.108022916652,
+        -1.495926897457,
+        1.636634698177,
+        0.140531116865,
+        -0.559247289051,
+        -1.294109628827,
+    ],
+)
+# one of an iiwa14 that is stretched but for this [rad]: what it is found to
+NEARLY_STRETCHED = [
+    0.176878052873,
+    1.549884477646,
+    1.813836506031,
+    5.7100475841e-06,
+    -1.585568033,
+    -2.064212006,
+    -1.45936,
+]
 
 
 @pytest.fixture(params=long_but(["panda", "iiwa14"], ["panda", "iiwa14", "xarm7"]), scope="module")
@@ -295,3 +319,20 @@ def test_arms_of_another_form_have_none() -> None:
         model = robot.model.copy()
         model.jointPlacements[joint].translation += np.array([1e-4, 2e-4, 3e-4])
         assert RedundantArm.of(model) is None
+
+
+@pytest.mark.parametrize("configuration", OUTSIDE_IN_THE_MIDDLE)
+def test_a_curve_that_is_outside_the_limits_in_the_middle_is_answered(configuration: list[float]) -> None:
+    robot, q = load_robot("iiwa14"), np.array(configuration)
+    answers = required_inverse_kinematics(robot, "goal").solve(forward(robot, q))
+    curves = list({id(each.self_motion): each.self_motion for each in answers}.values())
+    assert away(curves, q) < FOUND  # type: ignore[arg-type]
+    assert all(robot.limits.q_min[j] <= each.q[j] <= robot.limits.q_max[j] for each in answers for j in range(7))
+
+
+def test_an_arm_stretched_but_for_its_rounding_is_answered_stretched() -> None:
+    """A known miss: it is farther than FOUND from all curves, by no more than its fourth angle."""
+    robot, q = load_robot("iiwa14"), np.array(NEARLY_STRETCHED)
+    answers = required_inverse_kinematics(robot, "goal").solve(forward(robot, q))
+    curves = list({id(each.self_motion): each.self_motion for each in answers}.values())
+    assert FOUND < away(curves, q) <= ROUGHLY * q[3]  # type: ignore[arg-type]

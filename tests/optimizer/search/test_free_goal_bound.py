@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from optimizer.kinematics.inverse import full_turn_alternatives, inverse_kinematics_for
+from optimizer.kinematics.full_turns import full_turn_alternatives
+from optimizer.kinematics.inverse import inverse_kinematics_for
 from optimizer.kinematics.orientation_tolerance import sample_orientations
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
