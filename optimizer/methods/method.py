@@ -52,7 +52,8 @@ class SolveResult:
 
     `iterations` are those of the method: SQP iterations, generations, or energies evaluated. `solves` counts the NLPs.
     `collision` is the clearance that the best motion found violates, None if it violates none. `cut_short`: the
-    deadline ended the optimisation of the motion, or the planning of a path.
+    deadline ended the optimisation of the motion, or the planning of a path. `unhindered` [J] is what the motion of
+    least energy without clearance constraints needs, if that collides.
     """
 
     status: SolveStatus
@@ -63,6 +64,7 @@ class SolveResult:
     stationarity: float | None = None
     collision: Clearance | None = None
     cut_short: bool = False
+    unhindered: float | None = None
 
 
 class Method(ABC):
@@ -87,6 +89,8 @@ class Method(ABC):
     # whether the candidate was postponed: then clearance constraints on its own motion, and a planning in few states,
     # were tried in vain
     was_postponed: bool = False
+    # whether the motion that the candidate has is from a planned path
+    is_from_planned_path: bool = False
 
     def __init__(
         self,

@@ -130,7 +130,7 @@ class SqpMethod(Method):
         stage = self._first_stage(guess)
         if self._is_far_costlier(guess, stage):
             return SolveResult(SolveStatus.PRUNED, COSTLIER)
-        iterations, collision = 0, None
+        iterations, collision, unhindered = 0, None, None
         for solves in range(1, REPAIRS + 1):
             # while no motion is known, one that is not yet optimal is better than none
             needed = self.takes_long or (len(stage.pairs) > 0 and np.isinf(self.best_known))
@@ -152,10 +152,12 @@ class SqpMethod(Method):
             if check.passed:
                 reason = STOPPED if late else CONVERGED
                 return SolveResult(
-                    SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity, cut_short=late
-                )
+                    SolveStatus.SOLVED, reason, iterations, solves, check.spline, result.stationarity,
+                    cut_short=late, unhindered=unhindered,
+                )  # fmt: skip
             if collision is not None and not len(stage.pairs):
-                if self.prepared.cost_of(check.spline) >= self.best_known:
+                unhindered = self.prepared.cost_of(check.spline)
+                if unhindered >= self.best_known:
                     return SolveResult(SolveStatus.PRUNED, NO_BETTER, iterations, solves)
                 if self.was_postponed or (np.isfinite(self.best_known) and collision.min_clearance < -DEEP):
                     return _failed("its motion collides", collision, iterations, solves)

@@ -11,6 +11,7 @@ from optimizer.deadline import DeadlinePassed, watch
 from optimizer.methods import solver_for
 from optimizer.methods.duration_intervals import DurationInterval, duration_intervals
 from optimizer.methods.method import DEADLINE_PASSED, Method, SolveResult, SolveStatus
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.sliding import SLID, moved_to, released
@@ -23,7 +24,9 @@ NO_END = "the arm cannot be where the turn of the tool leads"
 
 def solver_of(incumbent: Incumbent, candidate: Candidate, interval: DurationInterval) -> Method:
     """The solver of the problem's method for a candidate, in one interval of durations."""
-    return solver_for(incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval)
+    solver = solver_for(incumbent.prepared, candidate.q_start, candidate.q_goal, incumbent.deadline, interval)
+    solver.is_from_planned_path = candidate.attempt is not None and FROM_PLANNED_PATH in candidate.attempt.reason
+    return solver
 
 
 def in_time(incumbent: Incumbent, attempt: Callable[[], SolveResult]) -> SolveResult:

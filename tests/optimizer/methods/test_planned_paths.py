@@ -9,9 +9,10 @@ import pytest
 
 from optimizer.collision.path_planner import PlanningEnd, along, plan_paths
 from optimizer.deadline import NEVER, Deadline
-from optimizer.methods import planned_paths
+from optimizer.methods import free_spline, planned_paths
 from optimizer.methods.free_spline import FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.methods.planned_paths import FROM_PLANNED_PATH
 from optimizer.methods.sqp_method import NOT_MUCH_BETTER, above
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.bus import Bus, BusMode
@@ -82,3 +83,24 @@ def test_far_costlier_paths_are_skipped_only_where_no_energy_comes_back(mode: Bu
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     solver.best_known = 0.1
     assert (solver.along_path(*along(path, 1.0, arm.active_limits.v_max)).iterations == 0) == skipped
+
+
+def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_paths(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It may have left it on the wrong side; of both motions, the one of least energy is kept, with its own reason."""
+    arm, q_start, q_goal = task("post")
+    prepared = PreparedProblem.of(problem(arm, q_start, q_goal))
+    with monkeypatch.context() as alone:
+        alone.setattr(free_spline, "WAY_OUT", np.inf)
+        direct = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+    energy = prepared.cost_of(direct.spline)
+    assert direct.unhindered is not None and energy > free_spline.WAY_OUT * direct.unhindered
+    compared = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+    assert prepared.cost_of(compared.spline) <= energy and compared.solves > direct.solves
+    assert (FROM_PLANNED_PATH in compared.reason) == (prepared.cost_of(compared.spline) < energy)
+    # a path that leads nowhere better
+    costlier = replace(compared, spline=direct.spline, reason=FROM_PLANNED_PATH)
+    monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
+    kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+    assert kept.reason == direct.reason and prepared.cost_of(kept.spline) == energy
