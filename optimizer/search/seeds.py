@@ -25,6 +25,7 @@ from optimizer.trajectories.quadrature import quadrature
 
 # durations of the quintic, in multiples of the shortest one, and the panels and points of its quadrature
 TIME_SCALES, PANELS, POINTS = (1.15, 1.5, 2.2), 4, 3
+# the same of a rough estimate
 ROUGH_SCALE, ROUGH_PANELS = 1.3, 2
 # pairs whose energies are estimated: those of least lower bound
 MOST_ESTIMATED = 384
