@@ -23,11 +23,9 @@ def step_across(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, 
     """Steps (n, nq) [rad] from q (n, nq), across the directions `along` (n, nq), to where the flange is at T (4, 4);
     and the tangents (n, nq) of its curve at q, with 1 for their product with `along`. Both to first order."""
     reached, jacobian = chain.flange_and_jacobian(q)
-    n, nq = q.shape
-    system, sides = np.empty((n, nq, nq)), np.zeros((n, nq, 2))
-    system[:, :-1], system[:, -1] = jacobian, along
+    sides = np.zeros((*q.shape, 2))
     sides[:, :-1, 0], sides[:, -1, 1] = nearly_error(reached, T), 1.0
-    found = np.asarray(np.linalg.solve(system + TINY * np.eye(nq), sides), dtype=float)
+    found = np.asarray(np.linalg.solve(_system(jacobian, along), sides), dtype=float)
     return found[:, :, 0], found[:, :, 1]
 
 
@@ -38,10 +36,7 @@ def step_to(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tup
     Newton's step and what the second order adds to it. With a ratio r of the two, what is left is some r² of the step.
     """
     reached, jacobian = chain.flange_and_jacobian(q)
-    n, nq = q.shape
-    system, sides = np.empty((n, nq, nq)), np.empty((n, nq, 1))
-    system[:, :-1], system[:, -1] = jacobian, along
-    system += TINY * np.eye(nq)
+    system, sides = _system(jacobian, along), np.empty((*q.shape, 1))
     sides[:, :-1, 0], sides[:, -1, 0] = nearly_error(reached, T), ahead
     move: Array = np.linalg.solve(system, sides)[:, :, 0].astype(float, copy=False)
     sides[:, :-1, 0], sides[:, -1, 0] = second_order(jacobian, move), 0.0
@@ -49,6 +44,12 @@ def step_to(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tup
     first, second = np.maximum(np.abs(move).max(axis=1), NONE), np.abs(more).max(axis=1)
     small = second < first / 2
     return np.asarray(move - np.where(small[:, None], more, 0.0)), np.where(small, second**2 / first, first)
+
+
+def _system(jacobian: Array, along: Array) -> Array:
+    """Matrices (n, nq, nq) of Jacobians (n, nq - 1, nq) above directions (n, nq), next to singular ones at worst."""
+    system = np.concatenate([jacobian, along[:, None]], axis=1)
+    return np.asarray(system + TINY * np.eye(along.shape[1]))
 
 
 def second_order(jacobian: Array, move: Array) -> Array:

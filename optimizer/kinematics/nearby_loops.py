@@ -1,6 +1,6 @@
 """The curves of an arm, all points at once, from those of an arm nearby whose closed form is known.
 
-There are more points where these are long or bend: the closed form costs less than what a curve without enough costs.
+Where these are long or bend, they get more points: a curve with too few would have to be followed point by point.
 Where two branches meet, the curve over one goes on over the other: together they are loops. A step of Newton's method
 leads points along a loop onto the curve of the arm itself. Next to a singularity that curve is another one: there the
 step is long, or its tangents turn, and the loop is left to be followed point by point.
@@ -40,7 +40,7 @@ SHORT, MOVED = 0.01, 0.05
 
 def loops(pose: RedundantPose) -> tuple[list[Array], list[Array]]:
     """Points (m, 7) [rad] along loops of curves of a pose on the right shoulder, each from its first point once around,
-    without full turns left out; and along curves that are in none: at an end, more than two meet, or one does."""
+    without full turns left out; and along curves that are in none, since more than two meet at an end, or only one."""
     curves = right_curves(pose)
     if curves is None:
         return [], []

@@ -89,10 +89,11 @@ class FreeSpline(SqpMethod):
         energy = self.prepared.cost_of(found.spline)
         self.best_known = min(self.best_known, energy)
         planned = self.from_planned_paths(found)
+        late = planned.cut_short or planned.status is SolveStatus.OUT_OF_TIME
         if planned.spline is found.spline:
-            return found
+            return replace(found, cut_short=late)
         better = planned.spline is not None and self.prepared.cost_of(planned.spline) < energy
-        return with_effort(planned if better else found, [found, planned])
+        return with_effort(planned if better else replace(found, cut_short=late), [found, planned])
 
     @property
     def _progress(self) -> float:

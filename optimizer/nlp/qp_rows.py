@@ -43,9 +43,9 @@ class _Fresh:
 class QPRows:
     """Constraints least ≤ A y ≤ most in whitened variables; rows are added at the end.
 
-    `hard` rows are never relaxed. `chosen` (3, r, M) is the sign of the rate that a grid point's newest kinematic row
-    limits, 0 without one, `places` lists the points, and `kinematic` is the row of each. In the same way `bounded`
-    (2, n) marks the lower and upper bounds with a row. `passed` (point, column) lists the path constraints with a row,
+    `hard` rows are never relaxed. `chosen` (2, 3, r, M) marks the lower and upper limits on rates with a row, by grid
+    point, `places` lists the points, and `kinematic` is the row of each. In the same way `bounded` (2, n) marks the
+    lower and upper bounds with a row. `passed` (point, column) lists the path constraints with a row,
     and `path` is the row of each.
     """
 
@@ -56,7 +56,7 @@ class QPRows:
         self.A = np.zeros((0, whitening.shape[1]))
         self.least, self.most = np.zeros(0), np.zeros(0)
         self.hard, self.active = np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-        self.chosen, self.bounded = np.zeros(grid, dtype=np.int8), np.zeros((2, n), dtype=bool)
+        self.chosen, self.bounded = np.zeros((2, *grid), dtype=bool), np.zeros((2, n), dtype=bool)
         none = np.zeros(0, dtype=int)
         self.places: Places = (none, none, none)
         self.sides: tuple[Index, Index] = (none, none)
@@ -102,12 +102,12 @@ class QPRows:
             setattr(self, name, np.concatenate([getattr(self, name), *(getattr(each, name) for each in fresh)]))
 
     def add_kinematic(
-        self, gradients: Array, most: Array, places: Places, signs: Array, active: Mask | None = None
+        self, gradients: Array, most: Array, places: Places, upper: Mask, active: Mask | None = None
     ) -> None:
-        """Add the rows of places that have none yet for these signs of the rate; see `add`."""
+        """Add the rows of places that have none yet for their `upper` or lower limit; see `add`."""
         self.kinematic = np.concatenate([self.kinematic, self.add(gradients, most, active=active)])
         self.places = _joined(self.places, places)
-        self.chosen[places] = signs
+        self.chosen[upper.astype(int), *places] = True
 
     def add_path(self, gradients: Array, slack: Array, passed: tuple[Index, Index], active: Mask) -> None:
         """Add the rows of path constraints that have none yet; see `add`."""

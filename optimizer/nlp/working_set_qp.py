@@ -192,9 +192,7 @@ class WorkingSetQP:
         chosen = self._active.copy()
         chosen[self._worst(at.ratio, np.full(3, NEAR))] = True
         places = _places(chosen)
-        value = at.ratio[places]
-        gradients = self._kinematic_rows(places, np.sign(value), at.T)
-        rows.add_kinematic(gradients, 1 - np.abs(value), places, np.sign(value), active=self._active[places])
+        self._add_rates(rows, at, places, at.ratio[places] >= 0, self._active[places])
 
     def _worst(self, ratio: Array, above: Array) -> Places:
         """The anchors and local peaks at which the size of ratios (3, r, M) exceeds the bound of its derivative (3,).
@@ -227,14 +225,21 @@ class WorkingSetQP:
         if self.free_time:
             limits = np.maximum(1 + self._orders * x[-1] * self.time_scale / at.T, 1e-3)
         places = self._worst(predicted, limits * (1 + FEASIBILITY / 4))
-        # the row's sign is that of the value after the step, not before it
-        unknown = rows.chosen[places] != np.sign(predicted[places])
+        # the side is that of the value after the step, not before it
+        upper = predicted[places] >= 0
+        unknown = ~rows.chosen[upper.astype(int), *places]
         fresh: Places = (places[0][unknown], places[1][unknown], places[2][unknown])
         if not len(fresh[0]):
             return False
-        signs = np.sign(predicted[fresh])
-        rows.add_kinematic(self._kinematic_rows(fresh, signs, at.T), 1 - signs * at.ratio[fresh], fresh, signs)
+        self._add_rates(rows, at, fresh, upper[unknown])
         return True
+
+    def _add_rates(self, rows: QPRows, at: QPInputs, places: Places, upper: Mask, active: Mask | None = None) -> None:
+        """Adds the `upper` or lower limits on rates at the places; `active` as in `QPRows.add`."""
+        signs = np.where(upper, 1.0, -1.0)
+        rows.add_kinematic(
+            self._kinematic_rows(places, signs, at.T), 1 - signs * at.ratio[places], places, upper, active
+        )
 
     def _kinematic_rows(self, places: Places, signs: Array, T: float) -> Array:
         """Gradients (rows, n) of sign · value / limit at the places."""

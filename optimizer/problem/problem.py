@@ -45,8 +45,9 @@ class Problem:
 
     `branch` restricts the inverse kinematics branches of start and goal. With `windings` the goal may also be a full
     turn of a joint away. With the `bound` "tight" more time goes into the lower bounds of what could still beat the
-    answer; of least mechanical work, into solving all of it. `sample_period` [s] is that of the returned samples. After
-    `deadline` [s] of wall time the best verified result so far is returned.
+    answer; for mechanical work, into solving all candidates that differ by full turns of the outer joints.
+    `sample_period` [s] is that of the returned samples. After `deadline` [s] of wall time the best verified result so
+    far is returned.
 
     Raises InvalidProblem or OutsideLimits, with the field named, if the parts do not fit together.
     """

@@ -41,7 +41,7 @@ class Reason(Enum):
     DEFERRED = "other samples of the target have smaller lower bounds"
     ENOUGH_SOLVED = "the method solves no more candidates"
     BOUND = "its lower bound is not below the best energy found"
-    FAMILY = "not solved: with other full turns of the outer joints it needs far more energy than the best motion found"
+    FAMILY = "not solved: others that differ from it by full turns of the outer joints alone were"
     INVALID_END = "the arm cannot be at one of its ends"
     TOO_SLOW = "takes longer than allowed"
     METHOD = "as the method says"

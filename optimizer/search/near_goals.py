@@ -14,6 +14,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.kinematics.goal_manifold import GoalManifold
+from optimizer.methods.sqp_method import above
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate, Reason, bound
 from optimizer.search.end_feasibility import check_configurations
@@ -50,7 +51,8 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
     by_bound = np.lexsort(([each.shortest for each in samples], [each.lower_bound for each in samples]))
     samples = [samples[k] for k in by_bound[:MOST_MOVED].tolist()]
     pool = [*_moved(prepared, samples), *samples]
-    if prepared.problem.objective == "mechanical":
+    is_work = prepared.problem.objective == "mechanical"
+    if is_work:
         chosen = _least_around(pool, estimates(prepared, pool), APART_FOR_WORK, NEAR_FOR_WORK, MOST_FOR_WORK)
     else:
         energy = expected(prepared, pool)
@@ -64,7 +66,7 @@ def activate_near_goals(prepared: PreparedProblem, candidates: list[Candidate]) 
             each.settle(CandidateStatus.UNVISITED, Reason.NOT_REACHED)
         else:
             candidates.append(each)
-    if prepared.problem.objective == "mechanical":
+    if is_work:
         activate_deferred(candidates)
     else:
         activate_deferred(candidates, OTHERS, 1)
@@ -103,8 +105,7 @@ def _least_around(pool: Sequence[Candidate], energy: Array, apart: float, near: 
     most the ratio `near` of the least."""
     q = np.array([[*each.q_start, *each.q_goal] for each in pool])
     order = np.argsort(energy, kind="stable").tolist()
-    # an energy is negative where the supply takes more back than it gives
-    most = energy[order[0]] + (near - 1) * abs(energy[order[0]])
+    most = above(float(energy[order[0]]), near)
     chosen = list[Candidate]()
     for place, k in enumerate(order):
         if energy[k] > most or len(chosen) == count:

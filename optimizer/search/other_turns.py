@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from optimizer.methods.sqp_method import above
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import FULL_TURN, Candidate, bound
 from optimizer.search.seeds import estimates_between
@@ -37,7 +38,7 @@ def other_turns(prepared: PreparedProblem, samples: Sequence[Candidate], least: 
     at_goal = (q_goal + turn >= limits.q_min) & (q_goal + turn <= limits.q_max)
     at_start = (q_start - turn >= limits.q_min) & (q_start - turn <= limits.q_max) & ~given
     bounds = np.array([[each.lower_bound] for each in samples]) + coulomb * (np.abs(way + turn) - np.abs(way))
-    most = least + (NEAR - 1) * abs(least)
+    most = above(least, NEAR)
     rows, joints = np.nonzero((at_goal | at_start) & (way != 0) & (bounds <= most))
     if not len(rows):
         return []

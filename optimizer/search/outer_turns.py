@@ -55,14 +55,15 @@ def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> Non
 def families_of(incumbent: Incumbent) -> list[list[Candidate]]:
     """The open and the solved candidates by family, the one of least possible duration first.
 
-    Each is a family of its own with another objective, whose bounds rule out enough, another method, or a tight bound,
-    for which everything is solved.
+    None with another objective, whose bounds rule out enough, another method, or a tight bound, for which everything
+    is solved.
     """
-    open_ = [each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE]
     asked = incumbent.problem
-    alone = (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight"
-    if alone or any(each.sampled or each.deferred for each in open_):
-        return [[each] for each in open_]
+    if (asked.objective, asked.method) != ("mechanical", "bspline") or asked.bound == "tight":
+        return []
+    open_ = [each for each in incumbent.candidates if each.status is not CandidateStatus.INFEASIBLE]
+    if any(each.sampled or each.deferred for each in open_):
+        return []
     families: dict[tuple[int, int, bytes], list[Candidate]] = {}
     for each in sorted(open_, key=lambda each: (each.shortest, each.lower_bound)):
         inner = (each.q_goal - each.q_start)[: len(each.q_start) // 2].round(DIGITS)

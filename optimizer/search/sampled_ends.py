@@ -17,6 +17,7 @@ from optimizer.exceptions import JoulepathError
 from optimizer.kinematics.angles import nearest_turn
 from optimizer.kinematics.goal_manifold import GoalManifold
 from optimizer.kinematics.inverse import required_inverse_kinematics
+from optimizer.methods.sqp_method import above
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate, Reason, bound
 from optimizer.search.ends import SIDES, EndConfiguration, label_of
@@ -96,7 +97,7 @@ def refine_best(
     """
     chosen: dict[Hashable, Candidate] = {}
     least = min((each.energy or 0.0 for each in solved), default=0.0)
-    most = least + (WORTH_REFINING - 1) * abs(least)
+    most = above(least, WORTH_REFINING)
     for candidate in sorted(solved, key=lambda each: each.energy or 0.0):
         if (candidate.energy or 0.0) <= most:
             chosen.setdefault(kind(candidate), candidate)

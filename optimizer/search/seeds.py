@@ -15,6 +15,7 @@ import numpy as np
 
 from models.robot import Array, Mask
 from optimizer.energy.dwell import brake_power, waits
+from optimizer.methods.sqp_method import above
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, Problem
 from optimizer.search.candidates import Candidate, Reason
@@ -49,8 +50,7 @@ def activate_seeds(prepared: PreparedProblem, candidates: Sequence[Candidate]) -
     least = _least(known, energy)
     order = [k for k in np.argsort(energy, kind="stable").tolist() if least[k]]
     near, count = how_near(prepared.problem)
-    # an energy is negative where the supply takes more back than it gives
-    most = energy[order[0]] + (near - 1) * abs(energy[order[0]])
+    most = above(float(energy[order[0]]), near)
     chosen = [k for k in order if energy[k] <= most][:count]
     for k in chosen:
         known[k].deferred = False

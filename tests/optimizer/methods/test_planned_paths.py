@@ -103,4 +103,12 @@ def test_a_motion_that_left_an_obstacle_at_great_cost_is_compared_with_planned_p
     costlier = replace(compared, spline=direct.spline, reason=FROM_PLANNED_PATH)
     monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_: costlier)
     kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
-    assert kept.reason == direct.reason and prepared.cost_of(kept.spline) == energy
+    assert kept.reason == direct.reason and prepared.cost_of(kept.spline) == energy and not kept.cut_short
+    # a deadline that ends the comparison ends the solution of the candidate: nobody may call it optimal
+    for late in (
+        SolveResult(SolveStatus.OUT_OF_TIME, ""),
+        replace(direct, status=SolveStatus.FAILED, cut_short=True),
+    ):
+        monkeypatch.setattr(FreeSpline, "from_planned_paths", lambda *_, late=late: late)
+        kept = FreeSpline(prepared, q_start, q_goal, NEVER).solve()
+        assert kept.cut_short and kept.status is SolveStatus.SOLVED and prepared.cost_of(kept.spline) == energy

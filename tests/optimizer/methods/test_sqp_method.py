@@ -153,16 +153,15 @@ def test_going_nowhere_is_a_motion(method: str) -> None:
 
 
 def test_a_motion_is_solved_again_from_itself_with_its_knots_where_jerk_switches_now() -> None:
-    """Its goal has moved since: in no more steps than from a fit, to no more energy, within every limit."""
-    near = GOAL + 0.02
-    own = solver(START, near)
-    assert isinstance(own, FreeSpline)
-    q, t = sampled(spline(own.solve()))
-    tight = spline(own.solve_tightly(q, t, 1e-3))
-    moved = solver(START, GOAL)
-    assert isinstance(moved, FreeSpline)
-    again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
-    assert again.iterations <= fitted.iterations
-    cost = moved.prepared.cost_of
-    assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
-    assert_held(problem(START, GOAL), spline(again))
+    """Its goal has moved since: in fewer steps than from fits, to no more energy, within every limit."""
+    steps = np.zeros(2, dtype=int)
+    for start, goal in ((START, GOAL), *random_moves(3, 1)):
+        own, moved = solver(start, goal + 0.02), solver(start, goal)
+        assert isinstance(own, FreeSpline) and isinstance(moved, FreeSpline)
+        tight = spline(own.solve_tightly(*sampled(spline(own.solve())), 1e-3))
+        again, fitted = moved.solve_regraded(tight), moved.solve_from(*sampled(tight), fine=True)
+        steps += again.iterations, fitted.iterations
+        cost = moved.prepared.cost_of
+        assert cost(spline(again)) <= cost(spline(fitted)) * (1 + 1e-3)
+        assert_held(problem(start, goal), spline(again))
+    assert steps[0] < steps[1]

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from optimizer.nlp.nonlinear_program import FEASIBILITY
+from models.robot import Array
+from optimizer.nlp.nonlinear_program import FEASIBILITY, NonlinearProgram
 from optimizer.nlp.working_set_qp import MOST_ROUNDS, NEAR, QPInputs, WorkingSetQP
 from tests.optimizer.moves import GOAL, START
 from tests.optimizer.nlp.test_sqp import program, quintic, shortest
+
+
+def inputs_at(p: NonlinearProgram, qp: WorkingSetQP, free: Array, rng: np.random.Generator) -> QPInputs:
+    """A QP with the identity as its Hessian and a random gradient, at free control points (m, r)."""
+    one, duration = np.eye(qp.n), qp.time_scale
+    line = p.derivatives(free, duration, np.zeros((len(p.basis.nodes), p.kernel.nq)))
+    values = p.path_rows.values(p.points(free), duration)
+    ratio = p.kinematics(free) / qp.rates(duration)[:, :, None]
+    return QPInputs(one.dot, one, rng.normal(size=qp.n), free, duration, line, values, ratio)
 
 
 def test_a_step_breaks_no_limit_on_the_other_side() -> None:
@@ -24,15 +35,25 @@ def test_a_step_breaks_no_limit_on_the_other_side() -> None:
         while np.abs(p.kinematics(free + scale * noise) / rates).max() > 0.95:
             scale *= 0.9
         free = free + scale * noise
-        ratio = p.kinematics(free) / rates
-        one = np.eye(qp.n)
-        line = p.derivatives(free, duration, np.zeros((len(p.basis.nodes), p.kernel.nq)))
-        values = p.path_rows.values(p.points(free), duration)
-        inputs = QPInputs(one.dot, one, rng.normal(size=qp.n), free, duration, line, values, ratio)
-        step = qp.solve(inputs, MOST_ROUNDS)
+        inputs = inputs_at(p, qp, free, rng)
+        ratio, step = inputs.ratio, qp.solve(inputs, MOST_ROUNDS)
         assert step is not None
         assert not step.relaxed
         after = p.kinematics(free + step.x.reshape(free.shape)) / rates
         assert np.abs(after).max() <= 1 + FEASIBILITY
         turned += int(((np.abs(ratio) > NEAR) & (-np.sign(ratio) * after > 0.99)).any())
     assert turned
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9, 2.5])
+def test_no_limit_has_two_rows(share: float) -> None:
+    """Also where the limits cannot be kept: a relaxed step breaks limits whose rows are there."""
+    duration = share * shortest(START, GOAL)
+    p = program(START, GOAL, duration_max=duration, duration_min=duration)
+    rng = np.random.default_rng(8)
+    for _ in range(10):
+        qp = WorkingSetQP(p, duration)
+        step = qp.solve(inputs_at(p, qp, quintic(p) + 0.05 * rng.normal(size=(p.free_count, p.r)), rng), MOST_ROUNDS)
+        assert step is not None and (share > 1 or step.relaxed)
+        # the lower and the upper one of a point
+        assert np.unique(np.array(step.places), axis=1, return_counts=True)[1].max() <= 2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.candidates import FULL_TURN, Candidate, Reason
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, explore_families, families_of
 from optimizer.search.run import Run
@@ -17,7 +17,6 @@ from optimizer.solution import CandidateStatus
 from tests.optimizer.moves import GOAL, fixed, problem, tcp_pose
 
 DURATION = 3.0
-FULL_TURN = 2 * np.pi
 
 
 def prepared(**given: Any) -> Incumbent:
