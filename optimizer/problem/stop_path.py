@@ -9,7 +9,7 @@ import numpy as np
 from optimizer.exceptions import InvalidProblem
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
-from optimizer.problem.targets import AnyOf, Target
+from optimizer.problem.targets import PosesAround, Target, members
 from optimizer.problem.tool_path import ToolPath
 
 STRAIGHT = ToolPath()
@@ -20,8 +20,7 @@ class StopPath:
     """The TCP goes from the stop's target, which is one pose then, over `path.via` to `goal`, and rests at both ends.
 
     Where the tool may turn about an axis on the way, either end may leave the rotation about it free, too. Of a stop
-    with several targets, a path leads from each of them to the one of `goals` in its place. `around` are poses of which
-    these targets and goals are some: the bound of a round that has them is that of all configurations of these poses.
+    with several targets, a path leads from each of them to the one of `goals` in its place.
 
     `speed` [m/s] bounds the speed of the TCP on the way. With `split`, a path that no configuration follows whole is
     divided by reconfigurations: moves between configurations of one pose.
@@ -30,8 +29,7 @@ class StopPath:
     """
 
     goal: Pose | ConeOrientedPose
-    goals: tuple[Pose, ...] = ()
-    around: tuple[ConeOrientedPose, ConeOrientedPose] | None = None
+    goals: PosesAround | None = None
     path: ToolPath = STRAIGHT
     speed: float | None = None
     split: bool = False
@@ -45,7 +43,7 @@ class StopPath:
 
         `target` is that of the stop.
         """
-        several = isinstance(target, AnyOf) and len(target.targets) == len(self.goals) > 0
+        several = self.goals is not None and len(members(target)) == len(self.goals.targets)
         if not several and not isinstance(target, Pose | ConeOrientedPose):
             raise InvalidProblem("target", "The target of a stop with a path is one pose: its start.")
         ends = {"start": (0, target), "goal": (len(self.path.via) + 1, self.goal)}

@@ -27,7 +27,7 @@ APPROACH, RETREAT, ENTRY = "/approach", "/retreat", "/entry"
 
 @dataclass(frozen=True, kw_only=True)
 class Stop:
-    """A target at which the arm comes to rest, for `dwell` [s].
+    """A target at which the arm comes to rest, for `dwell` [s]. Its orientation may be free in part.
 
     `payload` is carried from here on, the dwell included: grasped, or released with a payload without mass; None leaves
     it unchanged. `branch` restricts the inverse kinematics branches of this stop. The moves into the stop, a line
@@ -57,10 +57,9 @@ class Stop:
 
     @property
     def free_ends(self) -> tuple[bool, bool]:
-        """Whether the start of the stop's path and its end leave a rotation of the tool free."""
-        if self.path is None:
-            return False, False
-        return isinstance(self.target, ConeOrientedPose), isinstance(self.path.goal, ConeOrientedPose)
+        """Whether the target leaves the orientation free in part, and whether the end of the stop's path does."""
+        at_end = self.path is not None and isinstance(self.path.goal, ConeOrientedPose)
+        return isinstance(self.target, ConeOrientedPose), at_end
 
     @property
     def entry(self) -> str:

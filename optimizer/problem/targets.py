@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from models.robot import Array
@@ -36,6 +36,14 @@ class AnyOf:
             raise InvalidProblem("any_of", "any_of must not be nested: list all targets in one.")
 
 
+@dataclass(frozen=True)
+class PosesAround(AnyOf):
+    """Some of the poses that `around` allows; the bound of a round that has them is that of all configurations of all
+    of these poses. Without it, they are some of infinitely many that are not bounded."""
+
+    around: ConeOrientedPose | None = None
+
+
 Target = Single | AnyOf
 
 
@@ -64,11 +72,12 @@ def validated(arm: Arm, name: str, target: Target, on_path: bool = False) -> Tar
     if isinstance(target, AnyOf):
         nq = (arm.robot.nq,)
         fields = [f"{name}.any_of.{k}.q" for k in range(len(target.targets))]
-        return AnyOf(
-            tuple(
+        return replace(
+            target,
+            targets=tuple(
                 member if isinstance(member, Pose | ConeOrientedPose) else frozen(member, nq, field)
                 for member, field in zip(target.targets, fields, strict=True)
-            )
+            ),
         )
     if isinstance(target, Pose | ConeOrientedPose):
         return target

@@ -18,7 +18,7 @@ from optimizer.problem.names import check_name, first_repeated
 from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION, MethodName
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, ENTRY, RETREAT, PlannedMove, Stop, moves_over, passing
-from optimizer.problem.targets import Target, members, validated
+from optimizer.problem.targets import AnyOf, Target, validated
 from optimizer.solution import Objective
 
 MOST_STOPS = 256
@@ -46,9 +46,12 @@ class WorkRound:
     none.
 
     With `stopping` the arm rests at the stops that it would pass through, too: what passing is compared with. Where it
-    is not `compared`, other ways to go round are not looked for.
+    is not `compared`, other ways to go round are not looked for. A `rough` round is likely one of the best: electrical
+    moves that are not solved weigh more than their bounds, so that fewer of them are.
 
-    Orientations are given in full. Raises InvalidProblem or OutsideLimits, with the field named.
+    The orientation at a stop may be free in part, at the start it is given in full.
+
+    Raises InvalidProblem or OutsideLimits, with the field named.
     """
 
     arm: Arm
@@ -68,6 +71,7 @@ class WorkRound:
     wait: str | None = None
     stopping: bool = False
     compared: bool = True
+    rough: bool = False
     sample_period: float = 0.008
     deadline: float = 60.0
 
@@ -76,9 +80,9 @@ class WorkRound:
         if not 1 <= len(self.stops) <= MOST_STOPS:
             raise InvalidProblem("stops", f"A round must have 1 to {MOST_STOPS} stops.")
         self._check_names()
-        object.__setattr__(self, "start", _full_target(self.arm, "start", self.start))
+        object.__setattr__(self, "start", _checked_target(self.arm, "start", self.start))
         checked = tuple(
-            replace(stop, target=_full_target(self.arm, f"stops.{k}.target", stop.target, stop.path is not None))
+            replace(stop, target=_checked_target(self.arm, f"stops.{k}.target", stop.target))
             for k, stop in enumerate(self.stops)
         )
         object.__setattr__(self, "stops", checked)
@@ -260,15 +264,21 @@ class WorkRound:
         return min(max(duration, self.duration_min or 0.0), most)
 
 
-def _full_target(arm: Arm, field: str, target: Target, on_path: bool = False) -> Target:
-    """The target, its joint positions as read-only arrays; with a path, a rotation may be free.
+def _checked_target(arm: Arm, field: str, target: Target) -> Target:
+    """The target, its joint positions as read-only arrays.
 
-    Raises InvalidProblem or OutsideLimits.
+    Raises InvalidProblem, also for a start, or one of several targets, whose orientation is free in part; or
+    OutsideLimits.
     """
-    if on_path and isinstance(target, ConeOrientedPose):
-        return target
-    if any(isinstance(member, ConeOrientedPose) for member in members(target)):
-        raise InvalidProblem(field, "The orientation of a stop is given in full: give a quaternion, rpy or rotvec.")
+    if field == START and isinstance(target, ConeOrientedPose):
+        raise InvalidProblem(
+            field,
+            "The orientation at the start is given in full: give a quaternion, rpy or rotvec, or joint positions.",
+        )
+    if isinstance(target, AnyOf) and any(isinstance(member, ConeOrientedPose) for member in target.targets):
+        raise InvalidProblem(
+            field, "Of several targets, each has its orientation in full: give a quaternion, rpy or rotvec."
+        )
     try:
         return validated(arm, "goal", target)
     except OutsideLimits as error:

@@ -38,8 +38,9 @@ from optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
 # cells of a layer that are split in a round; pairs of two layers of cells that are bounded at once, and how often in a
 # round; rounds; the share of the least known chain that will do
 SPLIT, PAIRS, TIMES, ROUNDS, ENOUGH = 60, 3000, 4, 24, 0.99
-# rounds in which the bound rises by less than this share of it are the last ones
-STEADY, PROGRESS = 3, 2e-3
+# so many rounds in which the bound rises by less than a share of it are the last ones: of this share with two layers of
+# cells, and of more with more of them, as a round takes longer then
+STEADY, PROGRESS, SLOWER = 3, 2e-3, 1.5
 # nodes of a known layer that stand as they are: of more, those that differ in full turns are one
 MOST_NODES = 200
 # nodes of the first layer of a closed round, the chains of each of which are told apart
@@ -101,7 +102,7 @@ class FreeEndsChain:
     def least(self, deadline: Deadline) -> float:
         """The bound [J] on the round."""
         enough = ENOUGH * LeastChain([leg.least_costs for leg in self.legs], self.asked.closed).find()[0]
-        least = list[float]()
+        least, progress = list[float](), PROGRESS * max(len(self.covered) - 1, 1) ** SLOWER
         for _ in range(ROUNDS):
             through = self._through()
             for k in self.covered:
@@ -112,7 +113,7 @@ class FreeEndsChain:
             self._tell(enough)
             through = self._through()
             least.append(float(through[0].min()))
-            if len(least) > STEADY and least[-1] - least[-1 - STEADY] < PROGRESS * abs(least[-1]):
+            if len(least) > STEADY and least[-1] - least[-1 - STEADY] < progress * abs(least[-1]):
                 break
             for k, cover in self.covered.items():
                 self._split(k, cover, through[k])

@@ -30,10 +30,10 @@ MOST_NODES = 20_000
 @dataclass(frozen=True, eq=False)
 class Layer:
     """Configurations `q` (n, nq) [rad] of one stop. Each is one of `ends`, `end` (n,) says which, and `turns` (n, nq)
-    full turns away from this one's joint positions. `complete`: no branch of any pose may be missing. Where they are
-    some of those `around` an axis of the tool, all configurations of this pose count, known or not; of a `given` one,
-    if the angle is given. `traces` are the ways that lead to the `ends`, as the arm follows them, one for each; none
-    where no way leads there."""
+    full turns away from this one's joint positions. `complete`: no branch of any pose may be missing. `some`: their
+    poses are some of infinitely many. Where these are those of one pose `around`, which leaves the orientation free in
+    part, all of its configurations count, known or not; of a `given` one, if the angle is given. `traces` are the ways
+    that lead to the `ends`, as the arm follows them, one for each; none where no way leads there."""
 
     name: str
     ends: list[EndConfiguration]
@@ -41,6 +41,7 @@ class Layer:
     end: npt.NDArray[np.intp]
     turns: npt.NDArray[np.intp]
     complete: bool
+    some: bool = False
     around: ConeOrientedPose | None = None
     given: Pose | None = None
     traces: tuple[Trace, ...] = ()
@@ -48,7 +49,7 @@ class Layer:
     @property
     def sampled(self) -> bool:
         """Whether some of them stand for infinitely many."""
-        return any(end.sampled for end in self.ends)
+        return self.some or any(end.sampled for end in self.ends)
 
 
 def layer_of(

@@ -67,7 +67,7 @@ def bounded_costs(asked: WorkRound, move: PlannedMove, leg: Leg, deadline: Deadl
 
 def _of_unknown(leg: Leg, enough: float, deadline: Deadline) -> float:
     """Bound [J] on the motions of a leg of which an end is not known; no more than `enough` is needed of it."""
-    if leg.start.complete and leg.goal.complete:
+    if all(layer.complete and not layer.some for layer in leg.layers):
         return _of_curves(leg, deadline)
     if all(layer.around is not None or (layer.complete and not layer.sampled) for layer in leg.layers):
         return _of_turned(leg, enough, deadline)

@@ -71,9 +71,9 @@ class RoundSearch(LazySearch):
                 legs = [self._leg(move, layers) for move in self.moves]
         except DeadlinePassed:
             raise DeadlineExceeded([]) from None
-        self._is_long = len(asked.stops) > MANY_STOPS and asked.objective == "electrical"
+        self._is_rough = (asked.rough or len(asked.stops) > MANY_STOPS) and asked.objective == "electrical"
         for leg in legs:
-            if self._is_long and not isinstance(leg, PassingLeg):
+            if self._is_rough and not isinstance(leg, PassingLeg):
                 leg.weigh_more(LIKELY_MORE)
         # motions that rest at the passes of a pair, along one of its routes
         self.stopping: dict[tuple[int, int, int], tuple[Route, Spline]] = {}
@@ -110,7 +110,7 @@ class RoundSearch(LazySearch):
             # what has no motion yet may take all the time that is left, the others a share of it in a long round
             fresh.sort(key=lambda each: each in self._runs)
             for done, each in enumerate(fresh):
-                shared = self._is_long and each in self._runs
+                shared = self._is_rough and each in self._runs
                 self.finish(*each, share=1 / (len(fresh) - done) if shared else 1.0)
 
     def attempt(self, k: int, s: int, g: int) -> float | None:
@@ -213,7 +213,7 @@ class RoundSearch(LazySearch):
     def leaves_better(self) -> bool:
         """Whether some chain has a bound below the best one, where legs weigh more than their bounds: through passes,
         and in a round of many stops."""
-        if self.routes_left or not (self.asked.passes or self._is_long):
+        if self.routes_left or not (self.asked.passes or self._is_rough):
             return self.routes_left
         return self.leaves_chains
 

@@ -14,15 +14,17 @@ import numpy as np
 from models.robot import Array, Mask
 from optimizer.exceptions import InvalidProblem, PathAttempt, PathInfeasible
 from optimizer.kinematics.course_tracing import Trace, traces_of_each
+from optimizer.kinematics.orientation_tolerance import sample_orientations
 from optimizer.kinematics.tcp import tcp_pose
 from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.line import Line
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.problem.stop_path import StopPath, at_stop
 from optimizer.problem.stops import APPROACH, RETREAT, Stop
-from optimizer.problem.targets import Target, members
+from optimizer.problem.targets import PosesAround, Target
 from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import START, WorkRound
 from optimizer.search.end_feasibility import check_configurations
@@ -30,6 +32,9 @@ from optimizer.search.ends import EndConfiguration, label_of
 from optimizer.search.path_ends import attempt_of
 from optimizer.sequence.layers import Layer, arms_at, layer_of
 from optimizer.sequence.legs import MOST_ON_WAY
+
+# sine of the angle between two directions that count as one: that of their rounding
+ALONG = 1e-12
 
 
 @dataclass(frozen=True)
@@ -48,7 +53,7 @@ class _Way:
         Raises InvalidProblem, as `ToolCourse.of`.
         """
         if self.path is not None:
-            goal = self.path.goals[target] if self.path.goals else self.path.goal
+            goal = self.path.goal if self.path.goals is None else self.path.goals.targets[target]
             assert isinstance(goal, Pose)
             return ToolCourse.of(self.path.path, T, goal.T)
         assert self.line is not None
@@ -89,19 +94,44 @@ def layers_of_stop(asked: WorkRound, k: int) -> list[Layer]:
             attempts = _attempts(asked, origin, found, blocked, follows)
             raise PathInfeasible(length, attempts, layers[way.end].name)
         kept &= follows
-    some = stop.path is not None and bool(stop.path.goals)
+    some = stop.path is not None and stop.path.goals is not None
     if windings and (not asked.windings or (some and kept.sum() > MOST_ON_WAY)):
         kept = _nearest_to_middle(asked, at, kept)
     of_stop = [_only(layers[place], kept) for place in stop.places]
-    if stop.path is None or not some:
+    if not isinstance(stop.target, PosesAround):
         return of_stop
-    ends = (stop.entry, stop.name)
-    around = dict(zip(ends, stop.path.around or (None, None), strict=True))
-    given = dict(zip(ends, (_only_pose(members(stop.target)), _only_pose(stop.path.goals)), strict=True))
+    around, given = _poses_around(stop), dict[str, Pose | None]()
+    if stop.path is not None and stop.path.goals is not None:
+        given = {stop.entry: _only_pose(stop.target.targets), stop.name: _only_pose(stop.path.goals.targets)}
     return [
-        replace(layer, complete=False, around=around.get(place), given=given.get(place))
+        replace(layer, some=True, around=around.get(place), given=given.get(place))
         for place, layer in zip(stop.places, of_stop, strict=True)
     ]
+
+
+def _poses_around(stop: Stop) -> dict[str, ConeOrientedPose | None]:
+    """The poses of which those at the places of a stop are some, as far as one pose of free orientation is all of
+    them."""
+    assert isinstance(stop.target, PosesAround)
+    around = {stop.entry: stop.target.around}
+    if stop.path is not None and stop.path.goals is not None:
+        around[stop.name] = stop.path.goals.around
+    for way in _ways(stop):
+        if way.line is not None:
+            around[way.end] = _shifted(around[way.origin], way.line, way.sign)
+    return around
+
+
+def _shifted(pose: ConeOrientedPose | None, line: Line, sign: float) -> ConeOrientedPose | None:
+    """The poses at the outer end of a line, of one in the base frame or along the only axis about which the tool may
+    turn; None otherwise."""
+    if pose is None:
+        return None
+    along = bool(np.linalg.norm(np.cross(line.direction, pose.axis)) <= ALONG * np.linalg.norm(line.direction))
+    if line.frame == "tcp" and not (along and pose.freedom == 1):
+        return None
+    T = pose.with_orientation(sample_orientations(pose, 1)[0]).T
+    return replace(pose, position=pose.position + sign * line.shift(T))
 
 
 def _only_pose(poses: Sequence[Target]) -> Pose | None:

@@ -25,7 +25,13 @@ IN_THE_DOCUMENT = {
 # those of the OpenAPI document are sent by its own test
 SENT = FILES.keys() - IN_THE_DOCUMENT.keys()
 # answered in seconds
-SLOW = {"cycle/seam_any_turn", "optimize/seam_any_turn", "optimize/polynomial_ga", "replay/lift_with_payload"}
+SLOW = {
+    "cycle/round_parts",
+    "cycle/seam_any_turn",
+    "optimize/seam_any_turn",
+    "optimize/polynomial_ga",
+    "replay/lift_with_payload",
+}
 
 
 def test_a_file_holds_the_documents_example_of_its_name() -> None:

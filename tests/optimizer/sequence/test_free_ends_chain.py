@@ -27,7 +27,7 @@ from optimizer.problem.stops import Stop
 from optimizer.problem.tool_path import ToolPath
 from optimizer.problem.work_round import WorkRound
 from optimizer.search.lower_bound import LeastBound
-from optimizer.sequence import free_path_ends
+from optimizer.sequence import free_orientations
 from optimizer.sequence.free_ends_chain import FreeEndsChain
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
@@ -60,12 +60,12 @@ def _round(seed: int, robot: str = "ur5e") -> WorkRound:
 @pytest.fixture(autouse=True)
 def few_angles(monkeypatch: pytest.MonkeyPatch) -> None:
     """Fewer angles than a request has: the bound is that of all angles anyway."""
-    monkeypatch.setattr(free_path_ends, "ALL_AROUND", (0.0, 2.0, 4.0))
+    monkeypatch.setattr(free_orientations, "ALL_AROUND", (0.0, 2.0, 4.0))
 
 
 def _chain(asked: WorkRound) -> FreeEndsChain:
-    tried = {stop.name: free_path_ends._all_around(stop) for stop in asked.stops if any(stop.free_ends)}
-    first = free_path_ends._at(asked, tried, bounded=True)
+    tried = {stop.name: free_orientations._all_around(stop) for stop in asked.stops if any(stop.free_ends)}
+    first = free_orientations._at(asked, tried, bounded=True)
     chain = FreeEndsChain.of(first, RoundSearch(first, time.perf_counter).legs)
     assert chain is not None
     return chain

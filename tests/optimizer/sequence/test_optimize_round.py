@@ -254,9 +254,10 @@ WRONG: dict[str, tuple[str, dict[str, Any]]] = {
     "dwell nan": ("stops.0.dwell", {"stops": [Stop(name="a", target=HOME, dwell=np.nan)]}),
     "heavy": ("stops.0.payload.mass", {"stops": [Stop(name="a", target=HOME, payload=Payload(mass=6.0))]}),
     "joints": ("stops.0.target.q", {"stops": [Stop(name="a", target=np.zeros(5))]}),
-    "free": (
+    "free start": ("start", {"start": ConeOrientedPose(np.array([0.4, 0.0, 0.3]))}),
+    "free among several": (
         "stops.0.target",
-        {"stops": [Stop(name="a", target=ConeOrientedPose(np.array([0.4, 0.0, 0.3])))]},
+        {"stops": [Stop(name="a", target=AnyOf((ConeOrientedPose(np.array([0.4, 0.0, 0.3])), HOME)))]},
     ),
     "hold": ("hold.brake_delay", {"brake_delay": -1.0}),
     "deadline": ("deadline", {"deadline": 0.0}),
