@@ -1,7 +1,8 @@
 """Seeded random cells and tasks in them: tables with things on them, shelves, boxes with walls, cages of bars.
 
 Task `index` of a seed is the first draw of (seed, index) that has a solution: start and goal are collision-free, and
-the path planner finds a path between them in AMPLE seconds.
+the path planner finds a path between them in AMPLE seconds. `python -m benchmarks.path_existence` asks other planners
+about the draws that are left out.
 """
 
 from __future__ import annotations
@@ -57,8 +58,31 @@ class CellTask:
         return f"seed {self.seed} index {self.index} ({self.cell})"
 
 
-def cell_task(seed: int, index: int) -> CellTask:
-    """Task `index` of a seed; the kinds of cells take turns."""
+@dataclass(frozen=True)
+class Draw:
+    """A random cell with collision-free configurations: q_start (nq,) and those of the goal pose T_goal (4, 4), the
+    nearest first [rad]. It is number `draw` of its task."""
+
+    draw: int
+    cell: Cell
+    arm: Arm
+    model: CollisionModel
+    q_start: Array
+    q_goals: list[Array]
+    T_goal: Array
+
+    def reached(self) -> Array | None:
+        """The nearest goal configuration (nq,) [rad] to which the path planner finds a path in AMPLE seconds; None if
+        there is none."""
+        checkers = ValidityCheckers(self.arm, self.model)
+        for q_goal in self.q_goals:
+            if plan_paths(self.arm, self.q_start, q_goal, Deadline.after(AMPLE), 1, checkers=checkers).paths:
+                return q_goal
+        return None
+
+
+def draws(seed: int, index: int) -> Iterator[Draw]:
+    """The draws of task `index` of a seed; the kinds of cells take turns."""
     cell = CELLS[index % len(CELLS)]
     table = Obstacle("table", Box(np.array([2.0, 2.0, 0.04])), _at(0, 0, -0.03))
     for draw in count():
@@ -70,15 +94,19 @@ def cell_task(seed: int, index: int) -> CellTask:
         model = CollisionModel(arm)
         T_start, T_goal = starts(), goals()
         from_, to = (_clear(arm, model, T) for T in (T_start, T_goal))
-        if not from_ or not to:
-            continue
-        checkers = ValidityCheckers(arm, model)
-        q_start = from_[int(rng.integers(len(from_)))]
-        # the nearest configuration of the goal to which there is a path
-        for q_goal in sorted(to, key=lambda q, q_start=q_start: float(np.abs(q - q_start).max())):  # type: ignore[misc]
-            if plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 1, checkers=checkers).paths:
-                blocked = model.least_distance(np.linspace(q_start, q_goal, 200), 0.0) < 0
-                return CellTask(seed, index, cell, arm, q_start, q_goal, T_goal, draw + 1, blocked)
+        if from_ and to:
+            q_start = from_[int(rng.integers(len(from_)))]
+            away = [float(np.abs(q - q_start).max()) for q in to]
+            yield Draw(draw, cell, arm, model, q_start, [to[k] for k in np.argsort(away, kind="stable")], T_goal)
+
+
+def cell_task(seed: int, index: int) -> CellTask:
+    """Task `index` of a seed; the kinds of cells take turns."""
+    for each in draws(seed, index):
+        q_goal = each.reached()
+        if q_goal is not None:
+            blocked = each.model.least_distance(np.linspace(each.q_start, q_goal, 200), 0.0) < 0
+            return CellTask(seed, index, each.cell, each.arm, each.q_start, q_goal, each.T_goal, each.draw + 1, blocked)
     raise AssertionError
 
 
@@ -97,10 +125,11 @@ def _clear(arm: Arm, model: CollisionModel, T: Array) -> list[Array]:
     return [solution.q for solution in found if model.least_distance(solution.q[None], 0.0) > 0]
 
 
-Draw = tuple[list[Obstacle], Callable[[], Array], Callable[[], Array]]
+# obstacles, and where the TCP may start and end (4, 4)
+_Cell = tuple[list[Obstacle], Callable[[], Array], Callable[[], Array]]
 
 
-def _on_table(rng: np.random.Generator) -> Draw:
+def _on_table(rng: np.random.Generator) -> _Cell:
     """Three to nine objects of any shape on the table."""
     things = []
     for number in range(int(rng.integers(3, 10))):
@@ -116,7 +145,7 @@ def _on_table(rng: np.random.Generator) -> Draw:
     return things, lambda: _above(rng, 0.1, 0.4), lambda: _above(rng, 0.1, 0.4)
 
 
-def _shelf(rng: np.random.Generator) -> Draw:
+def _shelf(rng: np.random.Generator) -> _Cell:
     """Three boards between two sides, and a back; the goal is between two boards, the start in front."""
     turn, distance = _yaw(rng.uniform(-np.pi, np.pi)), float(rng.uniform(0.55, 0.7))
     low, gap, width = float(rng.uniform(0.05, 0.3)), float(rng.uniform(0.28, 0.38)), float(rng.uniform(0.6, 0.9))
@@ -138,7 +167,7 @@ def _shelf(rng: np.random.Generator) -> Draw:
     return [*boards, *sides, back], lambda: _above(rng, 0.1, 0.5), inside
 
 
-def _bin(rng: np.random.Generator) -> Draw:
+def _bin(rng: np.random.Generator) -> _Cell:
     """Two boxes open above, their four walls each; from the inside of one to the inside of the other."""
     walls, middles = [], []
     first = rng.uniform(-np.pi, np.pi)
@@ -163,7 +192,7 @@ def _bin(rng: np.random.Generator) -> Draw:
     return walls, lambda: inside(0), lambda: inside(1)
 
 
-def _cage(rng: np.random.Generator) -> Draw:
+def _cage(rng: np.random.Generator) -> _Cell:
     """Eight upright bars around the arm, and two that lie above."""
     bars = []
     for number in range(8):
@@ -178,7 +207,7 @@ def _cage(rng: np.random.Generator) -> Draw:
     return bars, lambda: _above(rng, 0.1, 0.6), lambda: _above(rng, 0.1, 0.6)
 
 
-_DRAWS: dict[Cell, Callable[[np.random.Generator], Draw]] = {
+_DRAWS: dict[Cell, Callable[[np.random.Generator], _Cell]] = {
     "table": _on_table,
     "shelf": _shelf,
     "bin": _bin,

@@ -1,11 +1,16 @@
-"""Whether there is a collision-free path at all: OMPL's planners as they come, apart from the project's own planner.
+"""Whether there is a path where the project's planner finds none: OMPL's planners as they come are asked.
 
-What `optimizer.collision.path_planner` adds to OMPL could starve a search: boxes of configurations, slices, weighted
-joints, reserves and limits of states. Here there is none of it. Coal checks the states.
+    python -m benchmarks.path_existence --count 100
+
+The random cells of `benchmarks.scenes` are drawn. Those with a clear start and goal to which the project's planner
+finds no path are left out there. What it adds to OMPL could starve a search: boxes of configurations, slices, weighted
+joints, reserves and limits of states. Here there is none of it, and time is ample; Coal checks the states. The exit
+code is 1 if one of the draws that are left out has a path.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +18,8 @@ from ompl import base as ob
 from ompl import geometric as og
 from ompl import util as ou
 
+from benchmarks.cells import draws
+from benchmarks.command import on_one_core, parser, write_json
 from models.robot import Array
 from optimizer.collision.model import collision_model
 from optimizer.collision.state_validity import StateValidityChecker
@@ -20,6 +27,8 @@ from optimizer.problem.arm import Arm
 
 # distance [rad] between checked states of an edge, and farthest [rad] from the start that a joint goes
 STEP, FARTHEST = 0.05, 2 * np.pi
+# time of each planner [s]
+PATIENCE = 40.0
 # one grows trees from both ends, the other cells where the known ones are few
 PLANNERS = (og.RRTConnect, og.LBKPIECE1)
 
@@ -61,3 +70,29 @@ def path_exists(arm: Arm, q_start: Array, q_goals: Sequence[Array], patience: fl
         if problem.hasExactSolution():
             return True
     return False
+
+
+def main() -> int:
+    """Draws the cells, and asks about those that are left out."""
+    arguments = parser(__doc__)
+    arguments.add_argument("--count", type=int, default=100, help="tasks (%(default)s)")
+    arguments.add_argument("--patience", type=float, default=PATIENCE, help="time of each planner [s] (%(default)s)")
+    given = arguments.parse_args()
+    on_one_core()
+    drawn, left_out = 0, list[tuple[str, bool]]()
+    for index in range(given.count):
+        for each in draws(given.seed, index):
+            drawn += 1
+            if each.reached() is not None:
+                break
+            name = f"seed {given.seed} index {index} draw {each.draw} ({each.cell})"
+            left_out.append((name, path_exists(each.arm, each.q_start, each.q_goals, given.patience)))
+            print(f"{name}: {'a path exists' if left_out[-1][1] else 'no planner finds a path'}", flush=True)
+    missed = sum(exists for _, exists in left_out)
+    print(f"{drawn} draws with a clear start and goal, {len(left_out)} left out, {missed} of them with a path")
+    write_json(given.json, {"seed": given.seed, "drawn": drawn, "left_out": left_out})
+    return int(missed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
