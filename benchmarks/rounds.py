@@ -3,6 +3,7 @@
     python -m benchmarks.rounds --count 20
     python -m benchmarks.rounds --count 50 --dwell 0
     python -m benchmarks.rounds --count 50 --anywhere
+    python -m benchmarks.rounds --count 50 --turned
     python -m benchmarks.rounds --count 5 --stops 12
     python -m benchmarks.rounds --count 10 --time 1.5
     python -m benchmarks.rounds --count 20 --stops 5 --passes 4
@@ -13,7 +14,8 @@ A UR5e starts from rest at given joint positions over the table, takes up 2 kg a
 next one, and comes back. Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each,
 or as long as `--dwell` says: what it draws then, no choice of configurations saves. Collisions are ignored, so that
 every round has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
-move, the first move chooses it. With `--time`, each round gets so many times the duration of least energy. With
+move, the first move chooses it. With `--turned`, the parts are round: the tool may be turned by any angle about its axis
+at every stop. With `--time`, each round gets so many times the duration of least energy. With
 `--passes`, it passes through the first stops without a rest, and carries the part nowhere; then a round that needs more
 than the one that stops there ends the benchmark. With `--free`, the order is free, and the arm carries nothing either.
 """
@@ -32,6 +34,7 @@ from models.registry import load_robot
 from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.optimize_round import optimize_round
 from optimizer.problem.arm import Arm, Payload
+from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.free_order import FreeOrder
 from optimizer.problem.pose import Pose
 from optimizer.problem.stops import Stop
@@ -71,6 +74,7 @@ def rounds(
     free: bool = False,
     dwell: float = DWELL,
     anywhere: bool = False,
+    turned: bool = False,
 ) -> Iterator[WorkRound]:
     """The rounds, each with a generator of its own."""
     arm = Arm(robot=load_robot("ur5e"), collisions=False)
@@ -79,13 +83,17 @@ def rounds(
         yield WorkRound(
             arm=arm,
             start=first if anywhere else HOME,
-            stops=[_stop(j, pose, passes, free, dwell) for j, pose in enumerate(targets)],
+            stops=[_stop(j, _target(pose, turned), passes, free, dwell) for j, pose in enumerate(targets)],
             order=FreeOrder() if free else None,
             deadline=deadline,
         )
 
 
-def _stop(number: int, pose: Pose, passes: int, free: bool, dwell: float) -> Stop:
+def _target(pose: Pose, turned: bool) -> Pose | ConeOrientedPose:
+    return ConeOrientedPose.about(pose, np.array([0.0, 0.0, 1.0])) if turned else pose
+
+
+def _stop(number: int, pose: Pose | ConeOrientedPose, passes: int, free: bool, dwell: float) -> Stop:
     if passes or free:
         passed = number < passes
         return Stop(name=str(number), target=pose, dwell=0.0 if passed else dwell, passed=passed)
@@ -115,6 +123,7 @@ def main() -> None:
     arguments.add_argument("--passes", type=int, default=0, help="stops that are passed (%(default)s)")
     arguments.add_argument("--free", action="store_true", help="the order is free")
     arguments.add_argument("--anywhere", action="store_true", help="the start is a pose, in any configuration")
+    arguments.add_argument("--turned", action="store_true", help="the tool may be turned about its axis at the stops")
     arguments.add_argument("--time", type=float, help="give each round so many times its own duration")
     arguments.add_argument("--dwell", type=float, default=DWELL, help="dwell at each stop [s] (%(default)s)")
     given = arguments.parse_args()
@@ -123,9 +132,8 @@ def main() -> None:
     optimize_round(next(rounds(given.seed + 1, 1, 1, given.deadline)))  # loads what the others find loaded
     found: dict[str, list[float]] = {}
     optimal = legs = certified = 0
-    for own in rounds(
-        given.seed, given.count, given.stops, given.deadline, given.passes, given.free, given.dwell, given.anywhere
-    ):
+    how = (given.passes, given.free, given.dwell, given.anywhere, given.turned)
+    for own in rounds(given.seed, given.count, given.stops, given.deadline, *how):
         asked = own if given.time is None else in_time(own, given.time)
         began = time.perf_counter()
         answer = optimize_round(asked)

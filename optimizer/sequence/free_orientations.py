@@ -39,7 +39,8 @@ from optimizer.sequence.configurations_beside import beside
 from optimizer.sequence.known_motions import knowing, known_motions
 from optimizer.sequence.round_baselines import compared_again
 from optimizer.sequence.round_search import LEAST_TIME
-from optimizer.sequence.round_solution import Move, RoundSolution
+from optimizer.sequence.round_solution import Move, RoundBaseline, RoundSolution
+from optimizer.sequence.successive_moves import successively_chosen
 
 # angles [rad] about an axis at first, and orientations that are free otherwise
 ALL_AROUND, SPREAD = tuple(np.arange(12) * (np.pi / 6)), 24
@@ -48,10 +49,12 @@ ALL_AROUND, SPREAD = tuple(np.arange(12) * (np.pi / 6)), 24
 STEPS, MORE = (np.pi / 12, np.pi / 24), (np.pi / 6, np.pi / 12, np.pi / 24, np.pi / 48, np.pi / 96)
 # shares of the deadline: for the orientations without full turns, and of what is left for the first round with them
 ROUGH, FIRST = 0.35, 0.6
+# share of what is left then for the moves that are chosen one after the other
+FEW = 0.4
 # orientations of a stop that are tried with full turns
 TURNED = 3
 # so many steps are made; further ones as long as the last one gained more than this share of the energy
-AT_LEAST, LITTLE = 2, 1e-3
+AT_LEAST, LITTLE = 2, 2e-4
 
 Search = Callable[[WorkRound], RoundSolution]
 # rotation vectors (3,) [rad], in the TCP frame, by which the tool is turned at a stop, or at the start of its path, and
@@ -77,6 +80,8 @@ def with_free_orientations(asked: WorkRound, search: Search, clock: Clock) -> Ro
         except NoReachableTarget as error:
             raise _at_any_angle(error, [f"stops/{stop.entry}" for stop in free.values()]) from None
         compared, at_paths = best.baselines, _found_at(best, tried)
+        if _is_compared_once(asked) and all(len(stop.places) == 1 for stop in asked.stops):
+            best, compared = _with_successive_moves(asked, best, search, end.within(FEW * end.left), clock)
         steps = MORE if all(stop.path is None for stop in free.values()) else STEPS
         gained = True
         for k, step in enumerate(steps):
@@ -89,11 +94,8 @@ def with_free_orientations(asked: WorkRound, search: Search, clock: Clock) -> Ro
             with suppress(JoulepathError):
                 near = replace(near, deadline=end.left / (len(steps) - k), compared=not _is_compared_once(asked))
                 found = search(near)
-                if found.needed.of(asked.objective) < best.needed.of(asked.objective):
-                    # the bound of the first round is that of all orientations
-                    bound = min(best.lower_bound, found.needed.of(asked.objective))
-                    # configurations that are given are some of infinitely many
-                    best = replace(found, lower_bound=bound, status="feasible", complete=best.complete)
+                if found.needed.of(asked.objective) < before:
+                    best = _better(found, best)
                     at_paths |= _found_at(found, tried)
                     gained = found.needed.of(asked.objective) < before * (1 - LITTLE)
     if _is_compared_once(asked):
@@ -135,6 +137,31 @@ def _evenly_from(turns: Sequence[Turns], at: Turns) -> list[Turns]:
     """TURNED of them, evenly spread over their list, `at` first."""
     first = next(k for k, each in enumerate(turns) if each is at)
     return [turns[(first + (k * len(turns)) // TURNED) % len(turns)] for k in range(TURNED)]
+
+
+def _with_successive_moves(
+    asked: WorkRound, best: RoundSolution, search: Search, end: Deadline, clock: Clock
+) -> tuple[RoundSolution, list[RoundBaseline]]:
+    """The better one of a round and the one that moves choose one after the other, and the baselines: this one is that
+    of choosing move by move."""
+    chosen = successively_chosen(asked, end, clock)
+    if chosen is None:
+        return best, best.baselines
+    try:
+        found = search(replace(chosen, deadline=max(end.left, LEAST_TIME)))
+    except JoulepathError:
+        return best, best.baselines
+    by_moves = [each for each in found.baselines if each.name == "move_by_move"]
+    baselines = {each.name: each for each in (*best.baselines, *by_moves)}
+    better = found.needed.of(asked.objective) < best.needed.of(asked.objective)
+    return _better(found, best) if better else best, list(baselines.values())
+
+
+def _better(found: RoundSolution, than: RoundSolution) -> RoundSolution:
+    """A better round than the one that has the bound over all orientations."""
+    # the configurations that it chose among are some of infinitely many
+    bound = min(than.lower_bound, found.needed.of(found.objective))
+    return replace(found, lower_bound=bound, status="feasible", complete=than.complete)
 
 
 def _is_compared_once(asked: WorkRound) -> bool:
