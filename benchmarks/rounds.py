@@ -14,8 +14,8 @@ A UR5e starts from rest at given joint positions over the table, takes up 2 kg a
 next one, and comes back. Poses are drawn with the tool nearly down where the arm reaches them. It dwells 0.3 s at each,
 or as long as `--dwell` says: what it draws then, no choice of configurations saves. Collisions are ignored, so that
 every round has an answer. With `--anywhere`, the start is one more such pose, in any configuration: choosing move by
-move, the first move chooses it. With `--turned`, the parts are round: the tool may be turned by any angle about its axis
-at every stop. With `--time`, each round gets so many times the duration of least energy. With
+move, the first move chooses it. With `--turned`, the parts are round: the tool may be turned by any angle about its
+axis at every stop. With `--time`, each round gets so many times the duration of least energy. With
 `--passes`, it passes through the first stops without a rest, and carries the part nowhere; then a round that needs more
 than the one that stops there ends the benchmark. With `--free`, the order is free, and the arm carries nothing either.
 """
