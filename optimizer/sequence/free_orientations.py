@@ -161,7 +161,12 @@ def _better(found: RoundSolution, than: RoundSolution) -> RoundSolution:
     """A better round than the one that has the bound over all orientations."""
     # the configurations that it chose among are some of infinitely many
     bound = min(than.lower_bound, found.needed.of(found.objective))
-    return replace(found, lower_bound=bound, status="feasible", complete=than.complete)
+    # nor do they tell how large the search was
+    moves = [
+        replace(move, pairs=before.pairs, kinds=before.kinds, solved=before.solved + move.solved)
+        for move, before in zip(found.moves, than.moves, strict=True)
+    ]
+    return replace(found, moves=moves, lower_bound=bound, status="feasible", complete=than.complete)
 
 
 def _is_compared_once(asked: WorkRound) -> bool:
@@ -257,7 +262,7 @@ def _at_any_angle(error: NoReachableTarget, stops: Sequence[str]) -> JoulepathEr
     return UnreachablePose(
         error.target,
         None,
-        f"At none of {len(error.unreachable)} angles of the tool is it in reach. At the first: {reason}",
+        f"At none of {len(error.unreachable)} orientations of the tool is it in reach. At the first: {reason}",
     )
 
 

@@ -108,7 +108,7 @@ def test_a_deadline_gives_a_round_or_says_so(readings: int) -> None:
 def test_a_start_out_of_reach_at_every_angle_is_one_pose() -> None:
     with pytest.raises(UnreachablePose) as refusal:
         optimize_round(seam(free((1.7, -0.2, 0.2)), free((1.7, 0.2, 0.2))))
-    assert refusal.value.target == "stops/seam/entry" and "angles" in str(refusal.value)
+    assert refusal.value.target == "stops/seam/entry" and "orientations" in str(refusal.value)
 
 
 @pytest.mark.parametrize(
