@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from optimizer.kinematics.tcp import flange_pose
 from optimizer.kinematics.tool_course import ToolCourse
 from optimizer.kinematics.ur_closed_form import URClosedForm
 from optimizer.prepared_problem import PreparedProblem
-from optimizer.problem.arm import Arm
+from optimizer.problem.arm import Arm, Payload
 from optimizer.problem.cone_oriented_pose import ConeOrientedPose
 from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
@@ -32,7 +33,7 @@ from optimizer.sequence.free_ends_chain import FreeEndsChain
 from optimizer.sequence.round_search import RoundSearch
 from optimizer.sequence.single_joint_bound import Boxes, SingleJointBound
 from tests.optimizer.moves import AMPLE
-from tests.optimizer.sequence.rounds import HOME
+from tests.optimizer.sequence.rounds import HOME, PART
 from tests.selection import long_but
 
 AXIS = np.array([0.0, 0.0, 1.0])
@@ -185,3 +186,27 @@ def _dense(points: Array) -> Array:
     """Points (n, 3) on the straight lines between some."""
     at = np.linspace(0.0, len(points) - 1.0, 400)
     return np.stack([np.interp(at, np.arange(len(points)), each) for each in points.T], axis=1)
+
+
+@pytest.mark.parametrize("seed", long_but([0, 1], range(8)))
+def test_no_chain_through_free_stops_has_less(seed: int) -> None:
+    """Two stops that leave the angle free, with a payload between them: all configurations at many angles, with any
+    full turns."""
+    rng = np.random.default_rng(seed)
+    arm = Arm(robot=load_robot("ur5e"), collisions=False)
+    ends = [
+        ConeOrientedPose.about(Pose.from_quaternion(at, [0.0, 1.0, 0.0, 0.0]), AXIS)
+        for at in rng.uniform([0.3, -0.4, 0.15], [0.55, 0.4, 0.4], (2, 3))
+    ]
+    stops = [Stop(name=str(k), target=end, payload=(PART, Payload())[k]) for k, end in enumerate(ends)]
+    chain = _chain(WorkRound(arm=arm, start=HOME, stops=stops, deadline=AMPLE))
+    places = [HOME[None], *(_reaching(arm, end, rng) for end in ends), HOME[None]]
+    least = np.zeros(1)
+    for leg, (a, b) in zip(chain.legs, pairwise(places), strict=True):
+        U = [np.array([leg.prepared.potential(each) for each in q]) for q in (a, b)]
+        apart, gain = wrapped(b[None] - a[:, None]).reshape(-1, 6), (U[1][None] - U[0][:, None]).ravel()
+        between = LeastBound(PreparedProblem.of(leg.prepared.freed)).of(apart, gain).reshape(len(a), len(b))
+        least = (least[:, None] + between).min(axis=0)
+    bound = chain.least(NEVER)
+    assert 0 < bound <= float(least[0]) + ROUNDING
+    assert bound > 0.8 * float(least[0])
