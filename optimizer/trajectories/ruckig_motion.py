@@ -27,13 +27,13 @@ def time_optimal(limits: Limits, q_start: Array, q_goal: Array) -> SampledMotion
     profiles = found.profiles[0]
     tau, weights = lobatto_nodes(_breaks(found))
     t = tau * found.duration
-    states = np.array([found.at_time(instant) for instant in t.tolist()])
+    q, v, a = _states(found, t)
     return SampledMotion(
         t=t,
         weights=weights * found.duration,
-        q=states[:, 0],
-        v=states[:, 1],
-        a=states[:, 2],
+        q=q,
+        v=v,
+        a=a,
         peak_v=np.abs([profile.v for profile in profiles]).max(axis=1),
         peak_a=np.abs([profile.a for profile in profiles]).max(axis=1),
         peak_jerk=np.abs([profile.j for profile in profiles]).max(axis=1),
@@ -64,11 +64,22 @@ def time_optimal_spline(limits: Limits, q_start: Array, q_goal: Array) -> Spline
 
 def time_optimal_positions(limits: Limits, q_start: Array, q_goal: Array, at: Array) -> Array:
     """Positions (k, nq) [rad] of Ruckig's motion at the fractions `at` (k,) of its duration."""
-    return _positions(_ruckig(limits, q_start, q_goal), at)
+    found = _ruckig(limits, q_start, q_goal)
+    return _states(found, at * found.duration)[0]
 
 
-def _positions(found: ruckig.Trajectory, at: Array) -> Array:
-    return np.array([found.at_time(instant)[0] for instant in (at * found.duration).tolist()])
+def _states(found: ruckig.Trajectory, t: Array) -> tuple[Array, Array, Array]:
+    """q [rad], v [rad/s] and a [rad/s²] (k, nq) at times t (k,) [s], from the phases of constant jerk: those of
+    `found.at_time`, which takes an instant at a time."""
+    profiles = found.profiles[0]
+    length, jerk = np.array([(profile.t, profile.j) for profile in profiles]).transpose(1, 0, 2)
+    at_start = np.array([(profile.p[:-1], profile.v[:-1], profile.a[:-1]) for profile in profiles])
+    ends = length.cumsum(axis=1)
+    phase = (t[:, None, None] >= ends[:, :-1]).sum(axis=2)
+    joint = np.arange(len(profiles))
+    q, v, a = at_start.transpose(1, 0, 2)[:, joint, phase]
+    j, dt = jerk[joint, phase], t[:, None] - (ends - length)[joint, phase]
+    return q + dt * (v + dt * (a / 2 + dt * j / 6)), v + dt * (a + dt * j / 2), a + dt * j
 
 
 def _ruckig(limits: Limits, q_start: Array, q_goal: Array) -> ruckig.Trajectory:
