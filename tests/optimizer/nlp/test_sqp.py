@@ -31,10 +31,9 @@ PEER = 5e-4
 # relative; what IPOPT may still find from where the optimiser stopped: along the flat valleys of mechanical energy a
 # step that promises less than 5e-5 may be the first of a long way
 REST = 1e-3
-# share of the cost per greatest displacement, or per doubling of the time, that no multiplier accounts for; the
-# solver stops
-# where a further step promises TO_THE_END of the cost: with a curvature h of the cost, (2 h · TO_THE_END)^½ may be left,
-# and h is some tens along the softest directions. Where it usually stops, rounding of the processor at hand decides how
+# share of the cost per greatest displacement, or per doubling of the time, that no multiplier accounts for. The solver
+# stops where a further step promises TO_THE_END of the cost: with a curvature h of the cost, (2 h · TO_THE_END)^½ may
+# be left, and h is some tens along the softest directions. Where it usually stops, the processor's rounding decides how
 # much is left
 STATIONARY, TO_THE_END = 0.04, PROGRESS / 10
 SAME = 1e-4  # relative; cost at one optimum reached along different ways
