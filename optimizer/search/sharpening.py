@@ -39,6 +39,8 @@ CONTENDING, CONTENDERS = 1.35, 6
 # then other candidates are followed if they need at most this ratio of the least energy, and so many of them; they are
 # given up once they need more than the last ratio of what the best one needed at the same width
 NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
+# share by which a motion needs more before its corners are as sharp as they become
+ROUNDER = 1.02
 # half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
 WAVES, AMPLITUDES = 3, (0.1, 1.5)
 # a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
@@ -60,6 +62,9 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     shortest = float(shortest_duration(best.q_goal - best.q_start, problem.arm.active_limits))
     if best.spline.duration < LEAST_FREEDOM * shortest:
         return
+    if len(best.spline.control_points) == DENSE and problem.objective == "mechanical":
+        # its corners are sharp
+        return
     for rough in _near(incumbent, best, CONTENDING)[:CONTENDERS]:
         _Follower(incumbent, rough).solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
     best = incumbent.best() or best
@@ -67,6 +72,16 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     ahead = _Follower(incumbent, best).follow(restarts=RESTARTS if problem.objective == "mechanical" else 0)
     for rival in rivals:
         _Follower(incumbent, rival).follow(restarts=0, ahead=ahead)
+
+
+def follow_in_time(incumbent: Incumbent, candidate: Candidate, best: float) -> None:
+    """Follow a solved candidate to sharp corners, unless it turns out to need more than `best` [J]; inf if none is
+    known."""
+    follower = _Follower(incumbent, candidate)
+    if len(candidate.spline.control_points) != MIDDLE:
+        follower.solved(candidate.spline, WIDTH, MIDDLE, PROGRESS)
+    # with rounder corners it needs more
+    follower.follow(restarts=0, ahead=[ROUNDER * best] * (len(SHARPER_WIDTHS) - 1) if np.isfinite(best) else [])
 
 
 def _near(incumbent: Incumbent, best: Candidate, ratio: float) -> list[Candidate]:
@@ -101,7 +116,7 @@ class _Follower:
             progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
             best = None if best is None else self.solved(best, width, DENSE, progress)
             energies.append(cost_of(best))
-            if ahead and energies[-1] > BEHIND * ahead[len(energies) - 1]:
+            if len(ahead) >= len(energies) and energies[-1] > BEHIND * ahead[len(energies) - 1]:
                 break
         return energies
 
