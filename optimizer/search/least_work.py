@@ -32,14 +32,15 @@ from optimizer.solution import CandidateStatus
 
 # candidates whose rough motions are found at a time, in order of their lower bounds
 AT_ONCE = 12
-# relative decreases that a further step must promise: on few control points, on more, on as many as the last motion
-COARSE_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 5e-3, 2e-3
+# relative decreases that a further step must promise: on few control points, from random guesses, on more control
+# points, and on as many as the last motion
+COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 4e-3, 5e-3, 2e-3
 # motions are given up if they are expected to need more than this ratio of the least of all
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
 # random guesses of the two best candidates, and how many of their motions are solved on more control points
-RESTARTS, FOLLOWED = 8, 3
+RESTARTS, FOLLOWED = 8, 4
 # of candidates without collisions, those that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.03, 2
 # with as many control points as the last motion, they are given up if they need more than this ratio of the least work
@@ -99,7 +100,7 @@ class _LeastWork:
         contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
         contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
         again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, RESTARTS)]
-        again = self.work.solved(again, COARSE, WIDTH, COARSE_PROGRESS, BEHIND)[:FOLLOWED]
+        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[:FOLLOWED]
         again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
         self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)))
         self._solve_promising()

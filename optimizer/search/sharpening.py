@@ -40,7 +40,7 @@ CONTENDING, CONTENDERS = 1.35, 6
 # given up once they need more than the last ratio of what the best one needed at the same width
 NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
 # share by which a motion needs more before its corners are as sharp as they become
-ROUNDER = 1.02
+ROUNDER = 1.015
 # half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
 WAVES, AMPLITUDES = 3, (0.1, 1.5)
 # a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
