@@ -16,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from models.robot import Array
 from optimizer.deadline import DeadlinePassed, watch
 from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
 from optimizer.methods.duration_intervals import duration_intervals
@@ -30,6 +31,8 @@ from optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
 from optimizer.search.sharpening import DENSE, LAST_PROGRESS, LEAST_FREEDOM, MIDDLE, PROGRESS, follow_in_time
 from optimizer.solution import CandidateStatus
 
+# time [s] that the search needs to be sure of a motion
+LEAST_TIME = 3.0
 # candidates whose rough motions are found at a time, in order of their lower bounds
 AT_ONCE = 12
 # relative decreases that a further step must promise: on few control points, from random guesses, on more control
@@ -56,9 +59,11 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
     """Find motions as the module says; `explore` solves the candidates that are left open. False if none was found.
 
     Does nothing with another objective, a free duration, constraints along the path, or a tight bound, for which every
-    candidate is solved.
+    candidate is solved; nor with little time, as the first motion comes late.
     """
     asked = incumbent.problem
+    if incumbent.deadline.left < LEAST_TIME or not incumbent.prepared.kernel.compiled:
+        return False
     families = families_of(incumbent)
     fixed = asked.duration_max is not None and asked.duration_min == asked.duration_max
     free = incumbent.prepared.path is None and not asked.passes and asked.tool_path is None
@@ -70,7 +75,7 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
         with watch(incumbent.deadline):
             work.search()
     except DeadlinePassed:
-        pass
+        incumbent.cut_short = True
     if incumbent.best() is None:
         return False
     left = [each for each in waiting if each.status is CandidateStatus.UNVISITED]
@@ -83,13 +88,15 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
 
 @dataclass(eq=False)
 class _LeastWork:
-    """The search; `rough` are the motions of least work that are known of its candidates, `tried` those solved."""
+    """The search. `rough` are the motions of least work that are known of its candidates by their ids, `tried` the
+    candidates that were solved, `behind` those that turned out to need more than another one on the way."""
 
     incumbent: Incumbent
     families: list[list[Candidate]]
     work: RoughWork
     rough: dict[int, Rough] = field(default_factory=dict)
     tried: set[int] = field(default_factory=set)
+    behind: set[int] = field(default_factory=set)
 
     def search(self) -> None:
         """Find rough motions, solve the best, then those that promise less."""
@@ -157,29 +164,26 @@ class _LeastWork:
         (first, last), best = SHARPER_WIDTHS, np.inf
         followed = self.work.solved(clear, MIDDLE, first, PROGRESS, BEHIND)
         for each in self.work.solved(followed, DENSE, first, DENSE_PROGRESS, NEAR_BEST):
-            if each.work <= BEHIND_BEST * best:
-                result = self._solved(each, each.points, last, LAST_PROGRESS)
-                if result.spline is None:
-                    # not within the limits: it may be with rounder corners
-                    continue
+            if each.work > BEHIND_BEST * best:
+                self.behind.add(id(each.candidate))
+            elif self._solved(each, each.points, last, LAST_PROGRESS).spline is not None:
+                # if there is none, there may be one with rounder corners
                 best = min(best, each.work)
-            self.tried.add(id(each.candidate))
+                self.tried.add(id(each.candidate))
 
     def _solve_promising(self) -> None:
         """Solve the candidates whose rough motions promise less than what is known, the most promising first."""
         for rough in self._known():
             candidate, best = rough.candidate, self.incumbent.best()
             known = np.inf if best is None or best.energy is None else best.energy
-            if id(candidate) in self.tried or PROMISE * rough.work >= known:
+            if id(candidate) in self.tried | self.behind or PROMISE * rough.work >= known:
                 continue
             self.tried.add(id(candidate))
             result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
             if result.spline is not None and (candidate.energy or np.inf) < above(known, WORTH_SHARPENING):
                 follow_in_time(self.incumbent, candidate, known)
 
-    def _solved(
-        self, rough: Rough, points: np.ndarray, width: float, progress: float, below: float = np.inf
-    ) -> SolveResult:
+    def _solved(self, rough: Rough, points: Array, width: float, progress: float, below: float = np.inf) -> SolveResult:
         """A candidate's solve from control points (n, nq) [rad], which it keeps; from nothing if that fails while no
         motion is known, or time is so short that knots must be at the switches of jerk."""
         incumbent, candidate = self.incumbent, rough.candidate
@@ -192,12 +196,14 @@ class _LeastWork:
             result = in_time(incumbent, partial(solver.solve_points, points, self.work.duration, progress))
         if result.status is SolveStatus.FAILED and len(points) != DENSE:
             result = in_time(incumbent, solver.solve)
+        incumbent.cut_short |= result.cut_short
         if result.spline is not None:
             incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
         elif len(points) != DENSE and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
             candidate.attempt = result
             candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
-        incumbent.tell_tried(candidate)
+        if candidate.status is not CandidateStatus.UNVISITED:
+            incumbent.tell_tried(candidate)
         return result
 
     def _prune(self) -> None:
@@ -206,6 +212,6 @@ class _LeastWork:
         if best is None or best.energy is None:
             return
         for each in self._known():
-            behind = id(each.candidate) in self.tried or PROMISE * each.work >= best.energy
+            behind = id(each.candidate) in self.behind or PROMISE * each.work >= best.energy
             if behind and each.candidate.status is CandidateStatus.UNVISITED:
                 each.candidate.settle(CandidateStatus.PRUNED, Reason.METHOD, COSTLIER)
