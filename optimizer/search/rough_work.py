@@ -12,6 +12,7 @@ from optimizer.methods.limit_repair import MARGIN
 from optimizer.nlp.many_motions import ManyMotions
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate
+from optimizer.search.random_displacements import random_displacements
 from optimizer.trajectories import bspline
 from optimizer.trajectories.ruckig_motion import time_optimal_positions
 from optimizer.trajectories.spline import Spline, spline_of
@@ -20,11 +21,6 @@ from optimizer.trajectories.spline import Spline, spline_of
 SHARP = 1e-6
 # control points of guesses, and steps from one that are made whatever they promise: the first promise little
 COARSE, SURE = 13, 3
-# half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
-WAVES, AMPLITUDES = 3, (0.1, 1.5)
-# share of each limit on speed, acceleration and jerk that a displacement may use
-SHARE = 0.5
-SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,19 +71,11 @@ class RoughWork:
     def random(self, candidate: Candidate, count: int) -> list[Rough]:
         """As many guesses of a candidate: random displacements of the quintic, within the limits but for places."""
         limits, line = self.prepared.problem.arm.active_limits, _line(candidate)
-        half_waves = np.arange(1, WAVES + 1)
-        waves = np.sin(np.pi * np.outer(bspline.greville(bspline.uniform(COARSE).knots), half_waves))
-        # greatest rate of a wave of amplitude 1 (derivative, wave) per limit
-        steepest = (np.pi * half_waves / self.duration) ** np.arange(1, 4)[:, None]
-        rng = np.random.default_rng(SEED)
-        found = []
-        for _ in range(count):
-            size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
-            amplitude = rng.normal(size=(WAVES, line.shape[1])) * (size / half_waves[:, None])
-            amplitude *= np.minimum(1.0, (SHARE * limits.rates / (steepest @ np.abs(amplitude))).min(axis=0))
-            points = np.clip(line + waves @ amplitude, limits.q_min, limits.q_max)
-            found.append(Rough(candidate, _at_rest(points, candidate)))
-        return found
+        at = bspline.greville(bspline.uniform(COARSE).knots)
+        return [
+            Rough(candidate, _at_rest(np.clip(line + each, limits.q_min, limits.q_max), candidate))
+            for each in random_displacements(limits, self.duration, at, count)
+        ]
 
     def solved(self, guesses: Sequence[Rough], count: int, width: float, progress: float, behind: float) -> list[Rough]:
         """Motions solved from others on `count` control points with corners of `width` [W], that of least work first.

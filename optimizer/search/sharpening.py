@@ -23,6 +23,7 @@ from optimizer.methods.duration_intervals import DurationInterval, duration_inte
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.random_displacements import random_displacements
 from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.spline import Spline, lasting, sampled
 from optimizer.trajectories.time_scalings import quintic_spline
@@ -41,14 +42,9 @@ CONTENDING, CONTENDERS = 1.35, 6
 NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
 # share by which a motion needs more before its corners are as sharp as they become
 ROUNDER = 1.015
-# half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
-WAVES, AMPLITUDES = 3, (0.1, 1.5)
 # a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
 # and there is next to nothing to gain
 LEAST_FREEDOM = 1.03
-# share of each limit on speed, acceleration and jerk that a displacement may use
-SHARE = 0.5
-SEED = 0
 
 
 def sharpen(incumbent: Incumbent, best: Candidate) -> None:
@@ -126,18 +122,9 @@ class _Follower:
         limits = self.incumbent.problem.arm.active_limits
         line = quintic_spline(q_start, q_goal, self._interval(self.candidate.spline.duration).t_max)
         q, t = sampled(line)
-        waves = np.sin(np.pi * np.outer(t / line.duration, np.arange(1, WAVES + 1)))
-        rng = np.random.default_rng(SEED)
         found = []
-        frequency = np.pi * np.arange(1, WAVES + 1) / line.duration
-        # greatest rate of a wave of amplitude 1 (derivative, wave) per limit
-        steepest = frequency ** np.arange(1, 4)[:, None]
-        for _ in range(count):
-            size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
-            amplitude = rng.normal(size=(WAVES, q.shape[1])) * (size / np.arange(1, WAVES + 1)[:, None])
-            # far beyond the limits, the SQP would spend its time on QPs without a solution
-            amplitude *= np.minimum(1.0, (SHARE * limits.rates / (steepest @ np.abs(amplitude))).min(axis=0))
-            guess = np.clip(q + waves @ amplitude, limits.q_min, limits.q_max)
+        for each in random_displacements(limits, line.duration, t / line.duration, count):
+            guess = np.clip(q + each, limits.q_min, limits.q_max)
             motion = self._from_samples(guess, t, WIDTH, FEW, PROGRESS)
             if motion is not None:
                 found.append(motion)

@@ -61,7 +61,7 @@ def test_what_was_lacking_is_tried_again() -> None:
     """Of a large matrix a little different from the last one: positive definite, and not far from its own."""
     n = MOST_AGAIN + 1
     convexity, gradient = Convexity(), np.ones(n)
-    H, band = banded(n, 0.5)
+    _, band = banded(n, 0.5)
     first = convexity.of(band).least(gradient)
     moved = band.copy()
     moved[:, 0] += 1e-6
