@@ -22,7 +22,7 @@ from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
 from optimizer.methods.duration_intervals import duration_intervals
 from optimizer.methods.free_spline import TIGHT, FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
-from optimizer.methods.sqp_method import COSTLIER, above
+from optimizer.methods.sqp_method import above
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate, Reason
 from optimizer.search.incumbent import Incumbent
@@ -214,4 +214,4 @@ class _LeastWork:
         for each in self._known():
             behind = id(each.candidate) in self.behind or PROMISE * each.work >= best.energy
             if behind and each.candidate.status is CandidateStatus.UNVISITED:
-                each.candidate.settle(CandidateStatus.PRUNED, Reason.METHOD, COSTLIER)
+                each.candidate.settle(CandidateStatus.PRUNED, Reason.ROUGHLY)
