@@ -37,13 +37,13 @@ LEAST_TIME = 3.0
 AT_ONCE = 12
 # relative decreases that a further step must promise: on few control points, from random guesses, on more control
 # points, and on as many as the last motion
-COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 4e-3, 5e-3, 2e-3
+COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 2e-3, 2e-3, 1e-3
 # motions are given up if they are expected to need more than this ratio of the least of all
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
 # random guesses of the two best candidates, and how many of their motions are solved on more control points
-RESTARTS, FOLLOWED = 8, 4
+RESTARTS, FOLLOWED = 8, 6
 # of candidates without collisions, those that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.03, 2
 # with as many control points as the last motion, they are given up if they need more than this ratio of the least work
