@@ -172,6 +172,11 @@ class FreeSpline(SqpMethod):
         """From samples q (k, nq) at times t (k,), with `count` control points over evenly spaced knots."""
         return self._solve_in(bspline.uniform(count), q, t, progress)
 
+    def solve_points(self, points: Array, duration: float, progress: float) -> SolveResult:
+        """From control points (n, nq) [rad] over evenly spaced knots of a motion of `duration` [s]."""
+        space = bspline.uniform(len(points))
+        return self.improve(Guess(space, self.coordinates.from_joints(points), duration, progress=progress))
+
     def _solve_in(self, space: Basis, q: Array, t: Array, progress: float = PROGRESS) -> SolveResult:
         """From samples q (k, nq) at times t (k,), in a spline space."""
         duration = float(t[-1])

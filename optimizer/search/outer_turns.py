@@ -49,7 +49,7 @@ def explore_families(incumbent: Incumbent, explore: Callable[[], object]) -> Non
     for family in sorted(near, key=_energy)[:FAMILIES]:
         _release(family[:MEMBERS])
     explore()
-    _leave(incumbent, waiting)
+    leave(incumbent, waiting)
 
 
 def families_of(incumbent: Incumbent) -> list[list[Candidate]]:
@@ -104,7 +104,7 @@ def _release(candidates: Sequence[Candidate]) -> None:
         each.deferred = False
 
 
-def _leave(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
+def leave(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
     """Say why those that still wait are not solved, unless the deadline ended the search."""
     left = [each for each in waiting if each.deferred]
     _release(left)

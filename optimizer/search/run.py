@@ -25,6 +25,7 @@ from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.least_work import explore_least_work
 from optimizer.search.missed_branches import all_known, bound_of_others
 from optimizer.search.near_goals import activate_near_goals
 from optimizer.search.other_starts import start_beside
@@ -188,6 +189,8 @@ class Run:
                 incumbent.tell_tried,
             )
 
+        if explore_least_work(incumbent, solve_open):
+            return
         while True:
             explore_families(incumbent, solve_open)
             solved = incumbent.best() is not None and not self.has_lost_a_goal()

@@ -23,6 +23,7 @@ from optimizer.methods.duration_intervals import DurationInterval, duration_inte
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate
 from optimizer.search.incumbent import Incumbent
+from optimizer.search.random_displacements import random_displacements
 from optimizer.trajectories.seven_segment import shortest_duration
 from optimizer.trajectories.spline import Spline, lasting, sampled
 from optimizer.trajectories.time_scalings import quintic_spline
@@ -39,14 +40,11 @@ CONTENDING, CONTENDERS = 1.35, 6
 # then other candidates are followed if they need at most this ratio of the least energy, and so many of them; they are
 # given up once they need more than the last ratio of what the best one needed at the same width
 NEAR, RIVALS, BEHIND = 1.03, 2, 1.005
-# half waves of a random displacement, least and largest standard deviation of their amplitudes [rad]
-WAVES, AMPLITUDES = 3, (0.1, 1.5)
+# share by which a motion needs more before its corners are as sharp as they become
+ROUNDER = 1.015
 # a motion shorter than this ratio of the shortest duration switches at its limits: even spacing cannot represent it,
 # and there is next to nothing to gain
 LEAST_FREEDOM = 1.03
-# share of each limit on speed, acceleration and jerk that a displacement may use
-SHARE = 0.5
-SEED = 0
 
 
 def sharpen(incumbent: Incumbent, best: Candidate) -> None:
@@ -60,6 +58,9 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     shortest = float(shortest_duration(best.q_goal - best.q_start, problem.arm.active_limits))
     if best.spline.duration < LEAST_FREEDOM * shortest:
         return
+    if len(best.spline.control_points) == DENSE and problem.objective == "mechanical":
+        # its corners are sharp
+        return
     for rough in _near(incumbent, best, CONTENDING)[:CONTENDERS]:
         _Follower(incumbent, rough).solved(rough.spline, WIDTH, MIDDLE, PROGRESS)
     best = incumbent.best() or best
@@ -67,6 +68,16 @@ def sharpen(incumbent: Incumbent, best: Candidate) -> None:
     ahead = _Follower(incumbent, best).follow(restarts=RESTARTS if problem.objective == "mechanical" else 0)
     for rival in rivals:
         _Follower(incumbent, rival).follow(restarts=0, ahead=ahead)
+
+
+def follow_in_time(incumbent: Incumbent, candidate: Candidate, best: float) -> None:
+    """Follow a solved candidate to sharp corners, unless it turns out to need more than `best` [J]; inf if none is
+    known."""
+    follower = _Follower(incumbent, candidate)
+    if len(candidate.spline.control_points) != MIDDLE:
+        follower.solved(candidate.spline, WIDTH, MIDDLE, PROGRESS)
+    # with rounder corners it needs more
+    follower.follow(restarts=0, ahead=[ROUNDER * best] * (len(SHARPER_WIDTHS) - 1) if np.isfinite(best) else [])
 
 
 def _near(incumbent: Incumbent, best: Candidate, ratio: float) -> list[Candidate]:
@@ -101,7 +112,7 @@ class _Follower:
             progress = LAST_PROGRESS if width == SHARPER_WIDTHS[-1] else PROGRESS
             best = None if best is None else self.solved(best, width, DENSE, progress)
             energies.append(cost_of(best))
-            if ahead and energies[-1] > BEHIND * ahead[len(energies) - 1]:
+            if len(ahead) >= len(energies) and energies[-1] > BEHIND * ahead[len(energies) - 1]:
                 break
         return energies
 
@@ -111,18 +122,9 @@ class _Follower:
         limits = self.incumbent.problem.arm.active_limits
         line = quintic_spline(q_start, q_goal, self._interval(self.candidate.spline.duration).t_max)
         q, t = sampled(line)
-        waves = np.sin(np.pi * np.outer(t / line.duration, np.arange(1, WAVES + 1)))
-        rng = np.random.default_rng(SEED)
         found = []
-        frequency = np.pi * np.arange(1, WAVES + 1) / line.duration
-        # greatest rate of a wave of amplitude 1 (derivative, wave) per limit
-        steepest = frequency ** np.arange(1, 4)[:, None]
-        for _ in range(count):
-            size = np.exp(rng.uniform(*np.log(AMPLITUDES)))
-            amplitude = rng.normal(size=(WAVES, q.shape[1])) * (size / np.arange(1, WAVES + 1)[:, None])
-            # far beyond the limits, the SQP would spend its time on QPs without a solution
-            amplitude *= np.minimum(1.0, (SHARE * limits.rates / (steepest @ np.abs(amplitude))).min(axis=0))
-            guess = np.clip(q + waves @ amplitude, limits.q_min, limits.q_max)
+        for each in random_displacements(limits, line.duration, t / line.duration, count):
+            guess = np.clip(q + each, limits.q_min, limits.q_max)
             motion = self._from_samples(guess, t, WIDTH, FEW, PROGRESS)
             if motion is not None:
                 found.append(motion)

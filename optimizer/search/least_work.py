@@ -1,0 +1,217 @@
+"""Least mechanical work at a fixed duration: candidates are compared by rough motions, and few are solved.
+
+The bound on mechanical work rules out little, and a motion has many local optima. Rough motions take a fifth of the
+time of solves (`many_motions`): those of tens of candidates, then of the best on more control points and from random
+guesses. They may collide, and exceed a limit by a little. So the motion of least work among those that do not collide
+is solved, with sharp corners. Then every candidate is solved whose rough motion promises less than what is found.
+
+Where no motion is found here, all candidates are solved as with other objectives: by `outer_turns` and `sharpening`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from models.robot import Array
+from optimizer.deadline import DeadlinePassed, watch
+from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
+from optimizer.methods.duration_intervals import duration_intervals
+from optimizer.methods.free_spline import TIGHT, FreeSpline
+from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.methods.sqp_method import above
+from optimizer.search.attempts import in_time, solver_of
+from optimizer.search.candidates import Candidate, Reason
+from optimizer.search.incumbent import Incumbent
+from optimizer.search.outer_turns import FAMILIES, MEMBERS, NEAR, families_of, leave
+from optimizer.search.rough_work import COARSE, Rough, RoughWork, best_of_each
+from optimizer.search.sharpening import DENSE, LAST_PROGRESS, LEAST_FREEDOM, MIDDLE, PROGRESS, follow_in_time
+from optimizer.solution import CandidateStatus
+
+# time [s] that the search needs to be sure of a motion
+LEAST_TIME = 3.0
+# candidates whose rough motions are found at a time, in order of their lower bounds
+AT_ONCE = 12
+# relative decreases that a further step must promise: on few control points, from random guesses, on more control
+# points, and on as many as the last motion
+COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 2e-3, 2e-3, 1e-3
+# motions are given up if they are expected to need more than this ratio of the least of all
+BEHIND = 1.4
+# those that need at most this ratio of the least work on few control points are solved on more of them, and so many
+CONTENDING, CONTENDERS = 1.35, 8
+# random guesses of the two best candidates, and how many of their motions are solved on more control points
+RESTARTS, FOLLOWED = 8, 6
+# of candidates without collisions, those that need at most this ratio of the least are followed, and so many
+NEAR_BEST, RIVALS = 1.03, 2
+# with as many control points as the last motion, they are given up if they need more than this ratio of the least work
+BEHIND_BEST = 1.005
+# on as many control points as the last motion, and with sharp corners, a motion needs about this ratio of its work
+PROMISE = 0.97
+# a motion that collides must be below this multiple of the best energy without clearance constraints, and below this
+# one before its corners are sharpened
+WORTH, WORTH_SHARPENING = 1.05, 1.04
+
+
+def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> bool:
+    """Find motions as the module says; `explore` solves the candidates that are left open. False if none was found.
+
+    Does nothing with another objective, a free duration, constraints along the path, or a tight bound, for which every
+    candidate is solved; nor with little time, as the first motion comes late.
+    """
+    asked = incumbent.problem
+    if incumbent.deadline.left < LEAST_TIME or not incumbent.prepared.kernel.compiled:
+        return False
+    families = families_of(incumbent)
+    fixed = asked.duration_max is not None and asked.duration_min == asked.duration_max
+    free = incumbent.prepared.path is None and not asked.passes and asked.tool_path is None
+    if not (families and fixed and free) or any(each.attempt for family in families for each in family):
+        return False
+    work = _LeastWork(incumbent, families, RoughWork(incumbent.prepared, float(asked.duration_max or 0.0)))
+    waiting = [each for family in families for each in family[1:]]
+    try:
+        with watch(incumbent.deadline):
+            work.search()
+    except DeadlinePassed:
+        incumbent.cut_short = True
+    if incumbent.best() is None:
+        return False
+    left = [each for each in waiting if each.status is CandidateStatus.UNVISITED]
+    for each in left:
+        each.deferred = True
+    explore()
+    leave(incumbent, left)
+    return True
+
+
+@dataclass(eq=False)
+class _LeastWork:
+    """The search. `rough` are the motions of least work that are known of its candidates by their ids, `tried` the
+    candidates that were solved, `behind` those that turned out to need more than another one on the way."""
+
+    incumbent: Incumbent
+    families: list[list[Candidate]]
+    work: RoughWork
+    rough: dict[int, Rough] = field(default_factory=dict)
+    tried: set[int] = field(default_factory=set)
+    behind: set[int] = field(default_factory=set)
+
+    def search(self) -> None:
+        """Find rough motions, solve the best, then those that promise less."""
+        self._screen()
+        if not self.rough:
+            return
+        least = min(each.work for each in self.rough.values())
+        contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
+        contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+        again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, RESTARTS)]
+        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[:FOLLOWED]
+        again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
+        self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)))
+        self._solve_promising()
+        self._prune()
+
+    def _screen(self) -> None:
+        """Rough motions of one member of each family, then of the best families' others."""
+        firsts = sorted((family[0] for family in self.families), key=lambda each: each.lower_bound)
+        for k in range(0, len(firsts), AT_ONCE):
+            self._find(firsts[k : k + AT_ONCE], lines=True)
+        works = [self._work_of(family[0]) for family in self.families]
+        near = [k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)]
+        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]], lines=False)
+
+    def _find(self, candidates: Sequence[Candidate], lines: bool) -> None:
+        """Find rough motions of those candidates whose bounds do not rule them out."""
+        least = min((each.work for each in self.rough.values()), default=np.inf)
+        open_ = [each for each in candidates if each.lower_bound < least]
+        guesses = self.work.first(open_) + (self.work.straight(open_) if lines else [])
+        self._note(self.work.solved(guesses, COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
+
+    def _note(self, found: list[Rough]) -> list[Rough]:
+        """Keep the motions of least work of each candidate; returns what was found."""
+        for each in best_of_each(found):
+            if each.work < self._work_of(each.candidate):
+                self.rough[id(each.candidate)] = each
+        return found
+
+    def _work_of(self, candidate: Candidate) -> float:
+        known = self.rough.get(id(candidate))
+        return np.inf if known is None else known.work
+
+    def _known(self) -> list[Rough]:
+        """The rough motions that are known, that of least work first."""
+        return sorted(self.rough.values(), key=lambda each: each.work)
+
+    def _clear(self, found: list[Rough]) -> list[Rough]:
+        """Of motions in order of work, the first that does not collide, and those of other candidates near it."""
+        clear: dict[int, Rough] = {}
+        for each in found:
+            best = next(iter(clear.values()), None)
+            if best is not None and (each.work > NEAR_BEST * best.work or len(clear) > RIVALS):
+                break
+            roomy = self.work.duration >= LEAST_FREEDOM * each.candidate.shortest
+            if roomy and id(each.candidate) not in clear and self._is_clear(each):
+                clear[id(each.candidate)] = each
+        return list(clear.values())
+
+    def _is_clear(self, rough: Rough) -> bool:
+        return self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
+
+    def _follow(self, clear: list[Rough]) -> None:
+        """Follow motions to sharp corners, and solve the best; if it has no motion within the limits, the next."""
+        (first, last), best = SHARPER_WIDTHS, np.inf
+        followed = self.work.solved(clear, MIDDLE, first, PROGRESS, BEHIND)
+        for each in self.work.solved(followed, DENSE, first, DENSE_PROGRESS, NEAR_BEST):
+            if each.work > BEHIND_BEST * best:
+                self.behind.add(id(each.candidate))
+            elif self._solved(each, each.points, last, LAST_PROGRESS).spline is not None:
+                # if there is none, there may be one with rounder corners
+                best = min(best, each.work)
+                self.tried.add(id(each.candidate))
+
+    def _solve_promising(self) -> None:
+        """Solve the candidates whose rough motions promise less than what is known, the most promising first."""
+        for rough in self._known():
+            candidate, best = rough.candidate, self.incumbent.best()
+            known = np.inf if best is None or best.energy is None else best.energy
+            if id(candidate) in self.tried | self.behind or PROMISE * rough.work >= known:
+                continue
+            self.tried.add(id(candidate))
+            result = self._solved(rough, rough.on(MIDDLE), WIDTH, PROGRESS, above(known, WORTH))
+            if result.spline is not None and (candidate.energy or np.inf) < above(known, WORTH_SHARPENING):
+                follow_in_time(self.incumbent, candidate, known)
+
+    def _solved(self, rough: Rough, points: Array, width: float, progress: float, below: float = np.inf) -> SolveResult:
+        """A candidate's solve from control points (n, nq) [rad], which it keeps; from nothing if that fails while no
+        motion is known, or time is so short that knots must be at the switches of jerk."""
+        incumbent, candidate = self.incumbent, rough.candidate
+        interval = duration_intervals(incumbent.prepared, candidate.q_goal, width=width)[0]
+        solver = solver_of(incumbent, candidate, interval)
+        assert isinstance(solver, FreeSpline)
+        solver.best_known = below
+        result = SolveResult(SolveStatus.FAILED, "time is too short for evenly spaced control points")
+        if self.work.duration >= TIGHT * candidate.shortest or len(points) == DENSE:
+            result = in_time(incumbent, partial(solver.solve_points, points, self.work.duration, progress))
+        if result.status is SolveStatus.FAILED and len(points) != DENSE:
+            result = in_time(incumbent, solver.solve)
+        incumbent.cut_short |= result.cut_short
+        if result.spline is not None:
+            incumbent.accept_if_better(candidate, result, incumbent.prepared.energy(result.spline))
+        elif len(points) != DENSE and result.status in (SolveStatus.FAILED, SolveStatus.PRUNED):
+            candidate.attempt = result
+            candidate.settle(CandidateStatus(result.status.value), Reason.METHOD, result.reason)
+        if candidate.status is not CandidateStatus.UNVISITED:
+            incumbent.tell_tried(candidate)
+        return result
+
+    def _prune(self) -> None:
+        """Rule out the candidates whose rough motions do not promise less than what is known."""
+        best = self.incumbent.best()
+        if best is None or best.energy is None:
+            return
+        for each in self._known():
+            behind = id(each.candidate) in self.behind or PROMISE * each.work >= best.energy
+            if behind and each.candidate.status is CandidateStatus.UNVISITED:
+                each.candidate.settle(CandidateStatus.PRUNED, Reason.ROUGHLY)

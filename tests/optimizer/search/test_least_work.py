@@ -1,0 +1,127 @@
+"""Least mechanical work at a fixed duration: what becomes of the candidates, and when others find it."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.robot import Array
+from optimizer.deadline import Deadline
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.search.candidates import Reason
+from optimizer.search.least_work import explore_least_work
+from optimizer.search.rough_work import COARSE, RoughWork, best_of_each
+from optimizer.search.run import Run
+from optimizer.solution import CandidateStatus, Solution
+from optimizer.trajectories import bspline
+from tests.optimizer.moves import GOAL, START, fixed, problem, tcp_pose
+
+DURATION = 3.0
+# share by which local optima of two searches differ
+LOCAL = 0.02
+
+
+def run(**given: Any) -> Run:
+    found = Run(problem(goal=tcp_pose(GOAL), **{"objective": "mechanical", **fixed(DURATION)} | given))
+    found.prepare()
+    return found
+
+
+@cache
+def answer(collisions: bool) -> Solution:
+    return optimize(problem(goal=tcp_pose(GOAL), objective="mechanical", collisions=collisions, **fixed(DURATION)))
+
+
+def rough_work(own: Run) -> RoughWork:
+    return RoughWork(own.incumbent.prepared, DURATION)
+
+
+@pytest.mark.parametrize("collisions", [False, True])
+def test_what_becomes_of_the_candidates(collisions: bool) -> None:
+    found = answer(collisions)
+    work = found.energy.mechanical.total
+    assert found.certificate.valid
+    assert found.duration == pytest.approx(DURATION)
+    assert min(each.energy for each in found.candidates if each.energy is not None) == work
+    for each in found.candidates:
+        if each.status is CandidateStatus.UNVISITED:
+            assert each.reason == Reason.FAMILY.value and each.lower_bound < work
+        if each.reason == Reason.ROUGHLY.value:
+            assert each.status is CandidateStatus.PRUNED
+        if each.reason == Reason.BOUND.value:
+            assert each.lower_bound >= work
+    left = any(each.status is CandidateStatus.UNVISITED for each in found.candidates)
+    assert found.status == ("feasible" if left else "optimal")
+
+
+@pytest.mark.long
+def test_as_good_as_if_all_are_solved() -> None:
+    every = optimize(problem(goal=tcp_pose(GOAL), objective="mechanical", bound="tight", **fixed(DURATION)))
+    assert answer(False).energy.mechanical.total <= every.energy.mechanical.total * (1 + LOCAL)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"objective": "electrical"},
+        {"bound": "tight"},
+        {"method": "time_scaling"},
+        {"duration_min": None},
+        {"deadline": 2.0},
+    ],
+)
+def test_others_are_explored_as_before(given: dict[str, Any]) -> None:
+    own = run(**given)
+    assert not explore_least_work(own.incumbent, lambda: pytest.fail("explored"))
+    assert own.incumbent.best() is None
+
+
+def test_time_that_is_over_on_the_way() -> None:
+    """Nothing is lost: every candidate can still be solved, or counts as not reached."""
+    own = run()
+    instants = iter(np.arange(0.0, 1e3, 0.05).tolist())
+    own.incumbent.end = Deadline.after(4.0, lambda: next(instants))
+    assert not explore_least_work(own.incumbent, lambda: None)
+    assert own.incumbent.cut_short
+    statuses = {each.status for each in own.incumbent.candidates if each.holdable}
+    assert statuses <= {CandidateStatus.UNVISITED, CandidateStatus.INFEASIBLE}
+    assert not any(each.deferred for each in own.incumbent.candidates)
+
+
+def test_guesses_rest_at_their_ends() -> None:
+    own = run()
+    candidate = own.incumbent.candidates[0]
+    work = rough_work(own)
+    guesses = [*work.first([candidate]), *work.straight([candidate]), *work.random(candidate, 3)]
+    assert len(guesses) == 5
+    rest = bspline.REST_POINTS
+    for each in guesses:
+        assert each.points.shape == (COARSE, 6)
+        assert (each.points[:rest] == candidate.q_start).all()
+        assert (each.points[-rest:] == candidate.q_goal).all()
+        finer = each.on(24)
+        assert (finer[:rest] == candidate.q_start).all() and (finer[-rest:] == candidate.q_goal).all()
+
+
+def test_rough_work_is_that_of_the_motion() -> None:
+    """By few nodes and without penalties, it is nearly the exact work; and the best of each candidate comes first."""
+    own = run()
+    prepared: PreparedProblem = own.incumbent.prepared
+    chosen = [each for each in own.incumbent.candidates if each.holdable and each.shortest < DURATION / 2][:2]
+    work = rough_work(own)
+    found = work.solved([*work.first(chosen), *work.straight(chosen)], COARSE, 0.5, 1e-2, np.inf)
+    assert [each.work for each in found] == sorted(each.work for each in found)
+    for each in found:
+        exact = prepared.objective_of(prepared.energy(each.spline(DURATION)))
+        assert each.work == pytest.approx(exact, rel=0.05)
+    best = best_of_each(found)
+    assert len(best) == len(chosen)
+    for each in best:
+        others: list[Array] = [other.points for other in found if other.candidate is each.candidate]
+        assert each.work == min(other.work for other in found if other.candidate is each.candidate)
+        assert len(others) == 2
+        assert (each.points[0] == START).all()
