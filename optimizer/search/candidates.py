@@ -42,7 +42,7 @@ class Reason(Enum):
     ENOUGH_SOLVED = "the method solves no more candidates"
     BOUND = "its lower bound is not below the best energy found"
     FAMILY = "not solved: others that differ from it by full turns of the outer joints alone were"
-    ROUGHLY = "compared by a rough motion, which promises no less energy than the best motion found"
+    ROUGHLY = "not solved: its rough motion promises no less energy than the best motion found"
     INVALID_END = "the arm cannot be at one of its ends"
     TOO_SLOW = "takes longer than allowed"
     METHOD = "as the method says"

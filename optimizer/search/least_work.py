@@ -79,9 +79,12 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
     if incumbent.best() is None:
         return False
     left = [each for each in waiting if each.status is CandidateStatus.UNVISITED]
-    for each in left:
+    behind = work.not_promising()
+    for each in [*left, *behind]:
         each.deferred = True
     explore()
+    # neither proves that they need more than the answer
+    leave(incumbent, behind, Reason.ROUGHLY)
     leave(incumbent, left)
     return True
 
@@ -111,7 +114,6 @@ class _LeastWork:
         again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
         self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)))
         self._solve_promising()
-        self._prune()
 
     def _screen(self) -> None:
         """Rough motions of one member of each family, then of the best families' others."""
@@ -206,12 +208,13 @@ class _LeastWork:
             incumbent.tell_tried(candidate)
         return result
 
-    def _prune(self) -> None:
-        """Rule out the candidates whose rough motions do not promise less than what is known."""
+    def not_promising(self) -> list[Candidate]:
+        """The candidates that are left whose rough motions do not promise less than what is known."""
         best = self.incumbent.best()
-        if best is None or best.energy is None:
-            return
-        for each in self._known():
-            behind = id(each.candidate) in self.behind or PROMISE * each.work >= best.energy
-            if behind and each.candidate.status is CandidateStatus.UNVISITED:
-                each.candidate.settle(CandidateStatus.PRUNED, Reason.ROUGHLY)
+        known = np.inf if best is None or best.energy is None else best.energy
+        return [
+            each.candidate
+            for each in self._known()
+            if each.candidate.status is CandidateStatus.UNVISITED
+            and (id(each.candidate) in self.behind or PROMISE * each.work >= known)
+        ]

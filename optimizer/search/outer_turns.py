@@ -104,8 +104,9 @@ def _release(candidates: Sequence[Candidate]) -> None:
         each.deferred = False
 
 
-def leave(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
-    """Say why those that still wait are not solved, unless the deadline ended the search."""
+def leave(incumbent: Incumbent, waiting: Sequence[Candidate], reason: Reason = Reason.FAMILY) -> None:
+    """Say why those that still wait are not solved, unless the deadline ended the search: their bound, or this
+    reason."""
     left = [each for each in waiting if each.deferred]
     _release(left)
     best = incumbent.best()
@@ -116,4 +117,4 @@ def leave(incumbent: Incumbent, waiting: Sequence[Candidate]) -> None:
             if each.lower_bound >= best.energy:
                 each.settle(CandidateStatus.PRUNED, Reason.BOUND)
             else:
-                each.settle(CandidateStatus.UNVISITED, Reason.FAMILY)
+                each.settle(CandidateStatus.UNVISITED, reason)
