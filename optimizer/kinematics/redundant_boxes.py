@@ -26,10 +26,15 @@ from math import hypot
 import numpy as np
 
 from models.robot import Array, Mask
-from optimizer.kinematics.redundant_pose import RedundantPose, to_cosine
+from optimizer.kinematics.redundant_pose import RedundantPose, angle_waves
+from optimizer.kinematics.spinors import Complex
 
 # what cosines [1] and half sides [rad] are widened by, for rounding; the former is a root's
 COSINE, ROUNDING = 1e-14, 1e-9
+# a range is kept as its least value, negative, and its greatest: what bounds one from above does so with the other
+_SIGNS = np.array([[-1.0], [1.0]])
+# a squared radius [m²] and a radius [m] that divide nothing by zero
+_NO_SQUARE, _NO_RADIUS = 1e-300, 1e-150
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,99 +60,102 @@ class HeldBoxes:
 def boxes_of(pose: RedundantPose, cells: Cells) -> tuple[Array, Array]:
     """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells, which are in the intervals of
     their sheets."""
-    found = held_boxes(pose, cells)
-    return found.centre, found.half
+    centre, half, _ = _boxes(pose, cells, 0.0)
+    return centre.T, half.T
 
 
 def held_boxes(pose: RedundantPose, cells: Cells, blur: float = 0.0) -> HeldBoxes:
     """The boxes around the configurations that cells, anywhere on the circle, have of all poses within `blur` [m]."""
-    form = pose.form
-    low, high, (side, elbow, wrist) = cells.low, cells.high, cells.sheet.T
-    middle, half = (low + high) / 2, (high - low) / 2
+    centre, half, cosines = _boxes(pose, cells, blur)
+    held = cosines.min(axis=0) >= -1
+    return HeldBoxes(centre.T, half.T, np.asarray(held), np.asarray(held & (cosines.max(axis=0) <= 1)))
+
+
+def _boxes(pose: RedundantPose, cells: Cells, blur: float) -> tuple[Array, Array, Array]:
+    """Middles and half sides (7, n) [rad] of the boxes of `held_boxes`, and the ranges (4, n) of the cosines of θ and
+    ψ."""
+    form, (side, elbow, wrist) = pose.form, cells.sheet.T
+    middle, half = (cells.low + cells.high) / 2, np.minimum((cells.high - cells.low) / 2, np.pi)
+    c, s = np.cos(half / 2), np.sin(half / 2)
+    moved = 2 * hypot(*pose.shoulder[:2].tolist()) * s + blur
+    seventh = angle_waves(np.cos(middle), np.sin(middle))
     mean, size, waves = pose.range_waves
-    ahead = waves @ np.array([np.ones(len(low)), np.cos(middle), np.sin(middle)])
-    (distance, v_z), v = _wave_ranges(mean, size, ahead[:2], ahead[2:4], half), ahead[4:]
+    ahead = waves @ seventh
+    v, (distance, v_z) = ahead[4:], _wave_ranges(mean, size, ahead[:2], ahead[2:4], 1 - 2 * s * s, 2 * s * c)
     if blur:
-        length = np.sqrt(np.maximum(distance, 0.0))
-        distance = np.array([np.maximum(length[0] - blur, 0.0), length[1] + blur]) ** 2
-        v_z = v_z + np.array([[-blur], [blur]])
-    cos = (form.squares - distance[::-1]) / (2 * form.rho * form.nu)
-    # an angle at most this much beyond its cosine's: arccos is steepest, as a root, at 1
-    theta_low, theta_high = np.arccos(to_cosine(np.array([cos[1] + COSINE, cos[0] - COSINE])))
-    theta, theta_half = elbow * (theta_low + theta_high) / 2, (theta_high - theta_low) / 2
+        length = np.sqrt(np.maximum(distance * _SIGNS, 0.0))
+        distance = _SIGNS * np.maximum(length + blur * _SIGNS, 0.0) ** 2
+        v_z = v_z + blur
+    cos = (distance[::-1] + form.squares * _SIGNS) / (2 * form.rho * form.nu) + COSINE
+    theta, theta_half = _angles(cos)
+    theta *= elbow
+    fourth = angle_waves(np.cos(theta), np.sin(theta))
     mean, size, waves = form.range_waves
-    ahead = waves @ np.array([np.ones(len(low)), np.cos(theta), np.sin(theta)])
-    (along,), S = _wave_ranges(mean, size, ahead[:1], ahead[1:2], theta_half), ahead[2:]
-    cos_psi = _wrist_cosine(form.fifth_in_6[2], form.inclined, along, v_z, _radii(distance, v_z))
-    psi, psi_half = _angles(cos_psi)
-    beta, beta_half = _angles(_wrist_cosine(form.fifth_in_6[2], form.inclined, v_z, along, _radii(distance, along)))
-    v_azimuth, S_azimuth = np.arctan2(np.array([v[1], S[1]]), np.array([v[0], S[0]]))
-    last = np.empty((4, len(low)))
-    last[0], last[1] = form.q4_at_zero - theta, S_azimuth - form.sixth_azimuth + wrist * beta
-    last[2], last[3] = wrist * psi - v_azimuth + form.fifth_azimuth, middle
-    centre = pose.completed(last, side)
-    moved = 2 * hypot(*pose.shoulder[:2]) * np.sin(np.minimum(half, np.pi) / 2) + blur
-    turned = _turned(np.array([form.rho * theta_half, moved]), np.hypot(*np.array([[S[0], v[0]], [S[1], v[1]]])))
-    sides = np.zeros((len(low), 7))
-    sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, beta_half + turned[0], psi_half + turned[1], half
-    sides = with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
-    held = (cos[0] <= 1 + COSINE) & (cos[1] >= -1 - COSINE) & (cos_psi[0] <= 1) & (cos_psi[1] >= -1)
-    inside = (np.abs(np.array([*cos, *cos_psi])) <= 1).all(axis=0)
-    return HeldBoxes(centre, sides, np.asarray(held), np.asarray(inside))
+    ahead = waves @ fourth
+    S, (along,) = ahead[2:], _wave_ranges(mean, size, ahead[:1], ahead[1:2], np.cos(theta_half), np.sin(theta_half))
+    cos_wrist = _wrist_cosines(form.fifth_in_6[2], form.inclined, np.array([along, v_z]).transpose(1, 0, 2), distance)
+    (psi, beta), wrist_half = _angles(cos_wrist)
+    azimuth = np.arctan2(np.array([v[1], S[1]]), np.array([v[0], S[0]]))
+    last = np.empty((4, len(middle)))
+    last[0], last[1] = form.q4_at_zero - theta, azimuth[1] - form.sixth_azimuth + wrist * beta
+    last[2], last[3] = wrist * psi - azimuth[0] + form.fifth_azimuth, middle
+    centre = pose.completed(last, _backwards(last, fourth, form.q4_at_zero, seventh), side)
+    sides = np.empty((7, len(middle)))
+    sides[3], sides[6], sides[5:3:-1] = theta_half, half, wrist_half
+    sides[5:3:-1] += _turned(np.array([moved, form.rho * theta_half]), np.hypot([v[0], S[0]], [v[1], S[1]]))
+    sides[3:] = np.minimum(sides[3:] + ROUNDING, np.pi)
+    with_shoulder(pose, centre, sides)
+    return centre, sides, np.concatenate([cos, cos_wrist[:, 0]])
 
 
-def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
-    """The half sides (n, 7) [rad] with those of the first three joints, which those of the others bound."""
-    turn = sides[:, 3:].sum(axis=1)
-    chi = pose.form.lean(centre[:, 1])
-    sides[:, 1] = np.minimum(turn, np.pi)
-    sides[:, 0] = sides[:, 2] = _turned(np.sin(np.minimum(turn, np.pi / 2)), np.abs(np.sin(chi))) + ROUNDING
-    sides[:, [0, 2]] = np.where(turn[:, None] < np.pi / 2, np.minimum(sides[:, [0, 2]], np.pi), np.pi)
-    return sides
+def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> None:
+    """Sets the half sides of the first three joints, which those of the others bound; all (7, n) [rad]."""
+    turn = np.add.reduce(sides[3:], axis=0)
+    lean = np.abs(np.sin(pose.form.lean(centre[1])))
+    # once the sine of the turn is 1, the first and the third joint may have any angle
+    around = _turned(np.sin(np.minimum(turn, np.pi / 2)), lean)
+    sides[0] = sides[2] = np.minimum(around + ROUNDING, np.pi)
+    sides[1] = np.minimum(turn, np.pi)
 
 
-def _wave_ranges(mean: Array, size: Array, ahead: Array, aside: Array, half: Array) -> Array:
-    """Least and greatest (m, 2, n) of waves mean + size cos x, with mean and size (m, 1), x within `half` (n,) of where
-    size cos x is `ahead` and size sin x is `aside` (m, n); widened for rounding."""
-    half = np.minimum(half, np.pi)
-    c, s = np.cos(half), np.sin(half)
-    ends, rise, first = ahead * c, np.abs(aside) * s, size * c
-    found = np.empty((len(mean), 2, len(half)))
-    found[:, 0] = mean - COSINE + np.where(ahead <= -first, -size, ends - rise)
-    found[:, 1] = mean + COSINE + np.where(ahead >= first, size, ends + rise)
+def _backwards(last: Array, fourth: Array, at_zero: float, seventh: Array) -> Complex:
+    """e^{-iq} (4, n) of the last four joints (4, n), with `angle_waves` of `at_zero` less the fourth, and of the
+    seventh."""
+    found = np.empty(last.shape, dtype=complex)
+    found.real[1:3], found.imag[1:3] = np.cos(last[1:3]), -np.sin(last[1:3])
+    found.real[3], found.imag[3] = seventh[1], -seventh[2]
+    found.real[0], found.imag[0] = fourth[1], fourth[2]
+    found[0] *= complex(np.cos(at_zero), -np.sin(at_zero))
     return found
 
 
-def _angles(cosine: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Middles and half ranges (n,) [rad] of angles with cosines in a range, two (n,)."""
-    wide, narrow = np.arccos(to_cosine(np.array(cosine)))
-    return (wide + narrow) / 2, (wide - narrow) / 2
+def _wave_ranges(mean: Array, size: Array, ahead: Array, aside: Array, cos: Array, sin: Array) -> Array:
+    """Ranges (m, 2, n) of waves mean + size cos x, with mean and size (m, 1), x within an angle of at most π, of these
+    cosines and sines (n,), of where size cos x is `ahead` and size sin x is `aside` (m, n); widened for rounding."""
+    ends, first = ahead[:, None] * _SIGNS, (size * cos)[:, None]
+    turned = ends * cos + (np.abs(aside) * sin)[:, None]
+    return np.where(ends >= first, size[:, None], turned) + (mean[:, None] * _SIGNS + COSINE)
 
 
-def _radii(distance: Array, along: Array) -> tuple[Array, Array]:
-    """Range of sqrt(|v|² - x²) [m], the distance from an axis, by those (2, n) of |v|² and of x along the axis."""
-    ends = np.abs(along)
-    largest = np.maximum(ends[0], ends[1])
-    smallest = np.where(along[0] * along[1] <= 0, 0.0, np.minimum(ends[0], ends[1]))
-    return (
-        np.sqrt(np.maximum(distance[0] - largest**2, 0.0)),
-        np.sqrt(np.maximum(distance[1] - smallest**2, 0.0)),
-    )
+def _angles(cosine: Array) -> tuple[Array, Array]:
+    """Middles and half ranges (…, n) [rad] of angles with cosines in ranges (2, …, n)."""
+    wide, narrow = np.arccos(np.minimum(np.maximum(cosine, -1.0), 1.0)) / 2
+    # the first is of the negative cosine: of what is left to π
+    wide = np.pi / 2 - wide
+    return wide + narrow, wide - narrow
 
 
-def _wrist_cosine(cosine: float, sine: float, x: Array, y: Array, radius: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Range (n,) of (x - e y) / (r sine), with e the given cosine, by those (2, n) of x, y and r; widened for rounding.
-
-    With c and v_z for x and y it is that of the cosine of ψ, with v_z and c that of β.
-    """
-    ends = [cosine * y[0], cosine * y[1]]
-    least, most = x[0] - np.maximum(*ends), x[1] - np.minimum(*ends)
-    near, far = (np.maximum(each * sine, 1e-300) for each in radius)
-    low = np.where(least < 0, least / near, least / far)
-    high = np.where(most > 0, most / near, most / far)
-    return low - COSINE, high + COSINE
+def _wrist_cosines(cosine: float, sine: float, x: Array, distance: Array) -> Array:
+    """Ranges (2, 2, n) of (x - e y) / (r sine), with e the given cosine and r the root of |v|² - y², by those of c and
+    v_z as x and as y, and those (2, n) of |v|²; widened for rounding. First that of the cosine of ψ, then of β."""
+    y = x[:, ::-1]
+    largest, smallest = np.maximum(y[0], y[1]), np.maximum(-np.minimum(y[0], y[1]), 0.0)
+    near, far = -distance[0] - largest * largest, distance[1] - smallest * smallest
+    near, far = (np.sqrt(np.maximum(each, _NO_SQUARE)) for each in (near, far))
+    most = (x + abs(cosine) * (y[::-1] if cosine > 0 else y)) / sine
+    return np.asarray(most / np.where(most > 0, near, far) + COSINE)
 
 
 def _turned(moved: Array, radius: Array) -> Array:
     """Half range (n,) [rad] of the azimuth of what is moved by at most `moved` (n,) from `radius` (n,)."""
-    return np.where(moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, 1e-300), 1.0)), np.pi)
+    return np.where(moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, _NO_RADIUS), 1.0)), np.pi)

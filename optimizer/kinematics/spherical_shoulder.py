@@ -29,6 +29,7 @@ import pinocchio as pin
 
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
+from optimizer.kinematics.spinors import Complex, unitary
 
 # greatest distance [m] of axes that meet, and cosine of axes at right angles
 EQUAL = 1e-9
@@ -69,14 +70,12 @@ class SphericalShoulder:
         return form if min(form.rho * form.nu, form.inclined) > EQUAL else None
 
     @cached_property
-    def rotations(self) -> tuple[Array, ...]:
-        """Those (3, 3) of the placements."""
-        return tuple(self.placements[:, :3, :3])
-
-    @cached_property
-    def carriers(self) -> tuple[Array, ...]:
-        """`carrier` (9, 3) of each of them."""
-        return tuple(map(carrier, self.rotations))
+    def backwards(self) -> tuple[Complex, Complex, Complex]:
+        """What carries spinors of the rotation from a link to link 3 to the link before: to links 5, 6 and 7, each from
+        behind the turn of the joint between. The first one is for (1, e^{-iq4}), with the way from link 3 to joint 4.
+        """
+        third, *others = (unitary(each).conj().T for each in self.placements[3:, :3, :3])
+        return others[0] * third[:, 0], others[1], others[2]
 
     @cached_property
     def _wrist_in_4(self) -> Array:
@@ -165,6 +164,16 @@ class SphericalShoulder:
         lean = self.placements[1][:3, :3] @ [-first[1], first[0], 0.0]
         return float(np.arctan2(lean[1], lean[0]))
 
+    @cached_property
+    def twist(self) -> float:
+        """ψ [rad] at a third angle of zero, in R_z(φ) R_y(χ) R_z(ψ) for the rotation from joint 1 to link 3, with φ the
+        azimuth of the lean."""
+        R = self.placements[1, :3, :3] @ self.placements[2, :3, :3]
+        # the image of x before the turn by ψ, seen from link 3
+        azimuth, chi = self.lean_azimuth, self.lean_at_zero
+        ahead = R.T @ [np.cos(chi) * np.cos(azimuth), np.cos(chi) * np.sin(azimuth), -np.sin(chi)]
+        return -float(np.arctan2(ahead[1], ahead[0]))
+
     def lean(self, q2: Array) -> Array:
         """χ (n,) [rad] at the second angle q2 (n,)."""
         return np.asarray(q2 + self.lean_at_zero)
@@ -208,14 +217,6 @@ class SphericalShoulder:
         c, s = self.rho * np.cos(towards), self.rho * np.sin(towards)
         waves = np.array([[-n[0], -n[1], self._shoulder_in_3[2] - n[2]], [c, s, 0.0], [-s, c, 0.0]])
         return np.asarray(waves @ self.placements[4][:3, :3])
-
-
-def carrier(R: Array) -> Array:
-    """Matrix (9, 3) that turns a vector by -q about z, then by the transpose of R (3, 3): three rows for the part that
-    goes with cos q, three for that with sin q, and three for what stays."""
-    x, y, z = R
-    none = np.zeros(3)
-    return np.vstack([np.array([x, y, none]).T, np.array([-y, x, none]).T, np.array([none, none, z]).T])
 
 
 def wave_parts(waves: Array) -> tuple[Array, Array, Array]:
