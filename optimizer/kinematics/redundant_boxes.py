@@ -21,7 +21,7 @@ Blurred boxes hold the configurations of every pose of the same orientation that
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot
+from math import cos, hypot, sin
 
 import numpy as np
 
@@ -74,38 +74,41 @@ def held_boxes(pose: RedundantPose, cells: Cells, blur: float = 0.0) -> HeldBoxe
 def _boxes(pose: RedundantPose, cells: Cells, blur: float) -> tuple[Array, Array, Array]:
     """Middles and half sides (7, n) [rad] of the boxes of `held_boxes`, and the ranges (4, n) of the cosines of θ and
     ψ."""
-    form, (side, elbow, wrist) = pose.form, cells.sheet.T
+    form, (side, elbow, wrist), n = pose.form, cells.sheet.T, len(cells.low)
     middle, half = (cells.low + cells.high) / 2, np.minimum((cells.high - cells.low) / 2, np.pi)
     c, s = np.cos(half / 2), np.sin(half / 2)
-    moved = 2 * hypot(*pose.shoulder[:2].tolist()) * s + blur
+    chord = 2 * s
+    moved = hypot(*pose.shoulder[:2].tolist()) * chord + blur
     seventh = angle_waves(np.cos(middle), np.sin(middle))
-    mean, size, waves = pose.range_waves
-    ahead = waves @ seventh
-    v, (distance, v_z) = ahead[4:], _wave_ranges(mean, size, ahead[:2], ahead[2:4], 1 - 2 * s * s, 2 * s * c)
+    ranges, v = _wave_ranges(pose.range_waves, seventh, 1 - chord * s, chord * c)
     if blur:
-        length = np.sqrt(np.maximum(distance * _SIGNS, 0.0))
-        distance = _SIGNS * np.maximum(length + blur * _SIGNS, 0.0) ** 2
-        v_z = v_z + blur
-    cos = (distance[::-1] + form.squares * _SIGNS) / (2 * form.rho * form.nu) + COSINE
-    theta, theta_half = _angles(cos)
+        length = np.sqrt(np.maximum(ranges[0] * _SIGNS, 0.0))
+        ranges[0] = _SIGNS * np.maximum(length + blur * _SIGNS, 0.0) ** 2
+        ranges[1] += blur
+    distance, along = ranges[0], np.empty((2, 2, n))
+    cos_elbow = (distance[::-1] + form.squares * _SIGNS) / (2 * form.rho * form.nu) + COSINE
+    theta, theta_half = _angles(cos_elbow)
     theta *= elbow
     fourth = angle_waves(np.cos(theta), np.sin(theta))
-    mean, size, waves = form.range_waves
-    ahead = waves @ fourth
-    S, (along,) = ahead[2:], _wave_ranges(mean, size, ahead[:1], ahead[1:2], np.cos(theta_half), np.sin(theta_half))
-    cos_wrist = _wrist_cosines(form.fifth_in_6[2], form.inclined, np.array([along, v_z]).transpose(1, 0, 2), distance)
-    (psi, beta), wrist_half = _angles(cos_wrist)
-    azimuth = np.arctan2(np.array([v[1], S[1]]), np.array([v[0], S[0]]))
-    last = np.empty((4, len(middle)))
-    last[0], last[1] = form.q4_at_zero - theta, azimuth[1] - form.sixth_azimuth + wrist * beta
-    last[2], last[3] = wrist * psi - azimuth[0] + form.fifth_azimuth, middle
+    (along[0],), S = _wave_ranges(form.range_waves, fourth, np.cos(theta_half), np.sin(theta_half))
+    along[1] = ranges[1]
+    cos_wrist = _wrist_cosines(form.fifth_in_6[2], form.inclined, along, distance)
+    wrist_angle, wrist_half = _angles(cos_wrist)
+    wrist_angle *= wrist
+    across = np.concatenate([v, S]).reshape(2, 2, n)
+    azimuth = np.arctan2(across[:, 1], across[:, 0])
+    last = np.empty((4, n))
+    last[0], last[3] = form.q4_at_zero - theta, middle
+    last[1], last[2] = azimuth[1] + wrist_angle[1] - form.sixth_azimuth, wrist_angle[0] - azimuth[0] + form.fifth_azimuth
     centre = pose.completed(last, _backwards(last, fourth, form.q4_at_zero, seventh), side)
-    sides = np.empty((7, len(middle)))
-    sides[3], sides[6], sides[5:3:-1] = theta_half, half, wrist_half
-    sides[5:3:-1] += _turned(np.array([moved, form.rho * theta_half]), np.hypot([v[0], S[0]], [v[1], S[1]]))
-    sides[3:] = np.minimum(sides[3:] + ROUNDING, np.pi)
+    sides, moves = np.empty((7, n)), np.empty((2, n))
+    moves[0], moves[1] = moved, form.rho * theta_half
+    sides[3], sides[6] = theta_half, half
+    np.add(_turned(moves, np.hypot(across[:, 0], across[:, 1])), wrist_half, out=sides[5:3:-1])
+    sides[3:] += ROUNDING
+    np.minimum(sides[3:], np.pi, out=sides[3:])
     with_shoulder(pose, centre, sides)
-    return centre, sides, np.concatenate([cos, cos_wrist[:, 0]])
+    return centre, sides, np.concatenate([cos_elbow, cos_wrist[0]])
 
 
 def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> None:
@@ -113,47 +116,63 @@ def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> None:
     turn = np.add.reduce(sides[3:], axis=0)
     lean = np.abs(np.sin(pose.form.lean(centre[1])))
     # once the sine of the turn is 1, the first and the third joint may have any angle
-    around = _turned(np.sin(np.minimum(turn, np.pi / 2)), lean)
-    sides[0] = sides[2] = np.minimum(around + ROUNDING, np.pi)
-    sides[1] = np.minimum(turn, np.pi)
+    around = _turned(np.sin(np.minimum(turn, np.pi / 2)), lean) + ROUNDING
+    sides[0], sides[1], sides[2] = around, turn, around
+    np.minimum(sides[:3], np.pi, out=sides[:3])
 
 
 def _backwards(last: Array, fourth: Array, at_zero: float, seventh: Array) -> Complex:
     """e^{-iq} (4, n) of the last four joints (4, n), with `angle_waves` of `at_zero` less the fourth, and of the
     seventh."""
     found = np.empty(last.shape, dtype=complex)
-    found.real[1:3], found.imag[1:3] = np.cos(last[1:3]), -np.sin(last[1:3])
-    found.real[3], found.imag[3] = seventh[1], -seventh[2]
-    found.real[0], found.imag[0] = fourth[1], fourth[2]
-    found[0] *= complex(np.cos(at_zero), -np.sin(at_zero))
+    real, imag = found.real, found.imag
+    real[1:3], imag[1:3] = np.cos(last[1:3]), -np.sin(last[1:3])
+    real[3], imag[3] = seventh[1], -seventh[2]
+    real[0], imag[0] = fourth[1], fourth[2]
+    found[0] *= complex(cos(at_zero), -sin(at_zero))
     return found
 
 
-def _wave_ranges(mean: Array, size: Array, ahead: Array, aside: Array, cos: Array, sin: Array) -> Array:
-    """Ranges (m, 2, n) of waves mean + size cos x, with mean and size (m, 1), x within an angle of at most π, of these
-    cosines and sines (n,), of where size cos x is `ahead` and size sin x is `aside` (m, n); widened for rounding."""
-    ends, first = ahead[:, None] * _SIGNS, (size * cos)[:, None]
-    turned = ends * cos + (np.abs(aside) * sin)[:, None]
-    return np.where(ends >= first, size[:, None], turned) + (mean[:, None] * _SIGNS + COSINE)
+def _wave_ranges(parts: tuple[Array, Array, Array], turns: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
+    """Ranges (m, 2, n) of the waves of `parts`, as `wave_ranges` has them, with the angle off that of `angle_waves` (3,
+    n) by at most one of these cosines and sines (n,), up to π; widened for rounding. And the other waves there."""
+    mean, size, waves = parts
+    m, now = len(mean), waves @ turns
+    ends = now[: 2 * m].reshape(m, 2, -1)
+    top = ends * cos
+    top += (np.abs(now[2 * m : 3 * m]) * sin)[:, None]
+    # the greatest value is at the crest of the wave, if that is near
+    np.copyto(top, size, where=ends >= size * cos)
+    top += mean
+    return top, now[3 * m :]
 
 
 def _angles(cosine: Array) -> tuple[Array, Array]:
-    """Middles and half ranges (…, n) [rad] of angles with cosines in ranges (2, …, n)."""
-    wide, narrow = np.arccos(np.minimum(np.maximum(cosine, -1.0), 1.0)) / 2
+    """Middles and half ranges (…, n) [rad] of angles with cosines in ranges (…, 2, n)."""
+    beyond = np.minimum(np.maximum(cosine, -1.0), 1.0)
+    np.arccos(beyond, out=beyond)
+    beyond *= 0.5
     # the first is of the negative cosine: of what is left to π
-    wide = np.pi / 2 - wide
+    wide, narrow = np.pi / 2 - beyond[..., 0, :], beyond[..., 1, :]
     return wide + narrow, wide - narrow
 
 
 def _wrist_cosines(cosine: float, sine: float, x: Array, distance: Array) -> Array:
     """Ranges (2, 2, n) of (x - e y) / (r sine), with e the given cosine and r the root of |v|² - y², by those of c and
     v_z as x and as y, and those (2, n) of |v|²; widened for rounding. First that of the cosine of ψ, then of β."""
-    y = x[:, ::-1]
-    largest, smallest = np.maximum(y[0], y[1]), np.maximum(-np.minimum(y[0], y[1]), 0.0)
-    near, far = -distance[0] - largest * largest, distance[1] - smallest * smallest
-    near, far = (np.sqrt(np.maximum(each, _NO_SQUARE)) for each in (near, far))
-    most = (x + abs(cosine) * (y[::-1] if cosine > 0 else y)) / sine
-    return np.asarray(most / np.where(most > 0, near, far) + COSINE)
+    y, radius = x[::-1], np.empty(x.shape)
+    largest, smallest = np.maximum(y[:, 0], y[:, 1]), np.maximum(-np.minimum(y[:, 0], y[:, 1]), 0.0)
+    near, far = radius[0], radius[1]
+    np.add(distance[0], largest * largest, out=near)
+    np.negative(near, out=near)
+    np.subtract(distance[1], smallest * smallest, out=far)
+    np.maximum(radius, _NO_SQUARE, out=radius)
+    np.sqrt(radius, out=radius)
+    most = abs(cosine) * (y[:, ::-1] if cosine > 0 else y)
+    most += x
+    most /= sine * np.where(most > 0, near[:, None], far[:, None])
+    most += COSINE
+    return np.asarray(most)
 
 
 def _turned(moved: Array, radius: Array) -> Array:

@@ -7,7 +7,7 @@ change with the root of the distance from it. With q7 = middle - half cos u they
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -134,41 +134,49 @@ def within(
     owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
     right = CurveStack.of([curves[k] for k in owner[0]])
     lower, upper = np.array([curves[k].arcs[0] for k in owner[0]]).T
+    room = _Room.of(q_min, q_max)
     # parts of the curves of pairs, and which of the two are not decided there
     pair, undecided = np.arange(len(lower)), np.ones((2, len(lower)), dtype=bool)
     kept = list[Array]()
     for count in PARTS:
-        ends = lower[:, None] + ((upper - lower) / count)[:, None] * np.arange(count + 1)
-        ends[:, -1] = upper
-        lower, upper = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-        pair, undecided = np.repeat(pair, count), np.repeat(undecided, count, axis=1)
-        held, inside, aligned = _judged(right, pair, lower, upper, q_min, q_max)
+        ends = lower + np.arange(count + 1)[:, None] * ((upper - lower) / count)
+        ends[-1] = upper
+        q7 = right.last_angle(ends, pair)
+        pair, undecided = np.concatenate([pair] * count), np.concatenate([undecided] * count, axis=1)
+        lower, upper = ends[:-1].ravel(), ends[1:].ravel()
+        cells = Cells(q7[:-1].ravel(), q7[1:].ravel(), right.sheet[pair])
+        held, inside, aligned = _judged(right.pose, cells, room)
         undecided &= held
-        side, row = np.nonzero(undecided & inside)
+        side, row = (undecided & inside).nonzero()
         kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[row]]))
         undecided &= ~inside
-        left = np.flatnonzero(undecided.any(axis=0))
-        pair, lower, upper, undecided = pair[left], lower[left], upper[left], undecided[:, left]
+        (left,) = (undecided[0] | undecided[1]).nonzero()
+        pair, lower, upper, undecided, aligned = pair[left], lower[left], upper[left], undecided[:, left], aligned[left]
         if not len(pair):
             break
-    side, row = np.nonzero(undecided)
-    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[left][row]]))
+    side, row = undecided.nonzero()
+    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[row]]))
     parts = np.concatenate(kept, axis=1)
     passing = sorted(set(parts[0, parts[3] > 0].tolist()))
     arcs = joined(parts[:3], len(curves))
-    cut = [replace(curve, arcs=own) for curve, own in zip(curves, arcs, strict=True) if own]
+    cut = [
+        RedundantCurve(curve.pose, curve.sheet, curve.interval, curve.label, own)
+        for curve, own in zip(curves, arcs, strict=True)
+        if own
+    ]
     return cut, [curves[int(k)] for k in passing]
 
 
 def joined(parts: Array, count: int) -> list[list[tuple[float, float]]]:
     """The arcs of each of so many curves that parts (3, n) make up: index of a curve, lower and upper end."""
-    owner, lower, upper = parts[:, np.lexsort((parts[1], parts[0]))]
+    # a curve's ends are less than 8 apart
+    owner, lower, upper = parts[:, (8 * parts[0] + parts[1]).argsort()]
     goes_on = (owner[1:] == owner[:-1]) & (lower[1:] == upper[:-1])
-    starts, stops = np.append(True, ~goes_on), np.append(~goes_on, True)
+    starts, stops = np.ones(len(owner), dtype=bool), np.ones(len(owner), dtype=bool)
+    np.logical_not(goes_on, out=starts[1:]), np.logical_not(goes_on, out=stops[:-1])
     found: list[list[tuple[float, float]]] = [[] for _ in range(count)]
-    if len(owner):
-        for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
-            found[int(k)].append((low, high))
+    for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
+        found[int(k)].append((low, high))
     return found
 
 
@@ -203,26 +211,40 @@ class CurveStack:
         return boxes_of(self.pose, Cells(low, high, self.sheet[rows]))
 
 
-def _judged(
-    curves: CurveStack, rows: NDArray[np.intp], low: Array, high: Array, q_min: Array, q_max: Array
-) -> tuple[Mask, Mask, Mask]:
-    """Which parts, low … high (n,) of curves (n,) on the right shoulder, may have members within the limits, and which
-    have no others; (2, n) each, the second row for their counterparts with the left shoulder. Then which (n,) may have
-    a member whose third axis is in line with the first."""
-    start, end = curves.last_angle(np.array([low, high]), rows)
-    right, half = boxes_of(curves.pose, Cells(start, end, curves.sheet[rows]))
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """Middles (10, 1) and half widths (10, 1) [rad] of what limits leave the seven joints, then the first three again.
+    A joint that may turn all around has no width that its angle could exceed."""
+
+    middle: Array
+    width: Array
+
+    @classmethod
+    def of(cls, q_min: Array, q_max: Array) -> _Room:
+        """Within limits (7,) [rad]."""
+        joints = [*range(7), 0, 1, 2]
+        middle, width = (q_min + q_max)[joints, None] / 2, (q_max - q_min)[joints, None] / 2 + ROUNDING
+        width[width >= np.pi] = np.inf
+        return cls(middle, width)
+
+
+def _judged(pose: RedundantPose, cells: Cells, room: _Room) -> tuple[Mask, Mask, Mask]:
+    """Which cells (n,) with the right shoulder may have members within the limits, and which have no others; (2, n)
+    each, the second row for their counterparts with the left shoulder. Then which (n,) may have a member whose third
+    axis is in line with the first."""
+    right, half = boxes_of(pose, cells)
+    q, sides = np.empty((10, len(half))), np.empty((2, 10, len(half)))
     # with the other shoulder, the third axis leans to the other side; the last four joints are the same
-    joints = np.array([*range(7), 0, 1, 2])
-    q, half = right.T[joints], half.T[joints]
-    q[8] = -q[1] - 2 * curves.pose.form.lean_at_zero
-    q[[7, 9]] += np.pi
-    middle, width = ((q_min + q_max) / 2)[joints, None], ((q_max - q_min) / 2 + ROUNDING)[joints, None]
-    away = np.abs(wrapped(q - middle))
-    held, inside = (
-        np.array([each[:3].all(axis=0), each[7:].all(axis=0)]) & each[3:7].all(axis=0)
-        for each in (away <= width + half, (away + half <= width) | (width >= np.pi))
-    )
-    return np.asarray(held), np.asarray(inside), np.asarray(half[0] >= np.pi)
+    q[:7], q[7:] = right.T, right.T[:3]
+    q[7:10:2] += np.pi
+    q[8] = -q[8] - 2 * pose.form.lean_at_zero
+    sides[0, :7], sides[0, 7:] = half.T, half.T[:3]
+    np.negative(sides[0], out=sides[1])
+    beyond = np.abs(wrapped(q - room.middle)) - room.width
+    within = beyond <= sides
+    last = np.logical_and.reduce(within[:, 3:7], axis=1)
+    first, mirrored = (last & np.logical_and.reduce(within[:, k : k + 3], axis=1) for k in (0, 7))
+    return np.array([first[0], mirrored[0]]), np.array([first[1], mirrored[1]]), np.asarray(half[:, 0] >= np.pi)
 
 
 def last_angle(u: Array, interval: Array, whole: Mask) -> Array:

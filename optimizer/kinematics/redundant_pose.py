@@ -75,10 +75,8 @@ class RedundantPose:
 
     @cached_property
     def range_waves(self) -> tuple[Array, Array, Array]:
-        """`wave_parts` of |v|² and v_z: means and sizes (2, 1), and the coefficients (6, 3) of their parts and of v_x
-        and v_y."""
-        mean, size, parts = wave_parts(self.waves)
-        return mean, size, np.concatenate([parts, self._wrist_waves[:2]])
+        """`wave_parts` of |v|² and v_z, and of v_x and v_y."""
+        return wave_parts(self.waves, self._wrist_waves[:2])
 
     def cosines(self, q7: Array, elbow: Array) -> tuple[Array, Array, Array]:
         """cos θ (n,), and of cos ψ the numerator and the denominator [m] (n,), at q7 (n,) and signs of the elbow (n,).

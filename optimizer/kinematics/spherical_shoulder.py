@@ -35,6 +35,8 @@ from optimizer.kinematics.spinors import Complex, unitary
 EQUAL = 1e-9
 # distance [m] from the fifth axis at which the shoulder is on it; angles from which it is sought there, and steps
 ALIGNED, ALIGNED_STARTS, ALIGNED_STEPS = 1e-12, 8, 20
+# what ranges of waves are widened by, for rounding [m² or m]
+WIDENED = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +131,8 @@ class SphericalShoulder:
 
     @cached_property
     def range_waves(self) -> tuple[Array, Array, Array]:
-        """`wave_parts` of c: mean and size (1, 1), and the coefficients (4, 3) of its parts and of x and y of S."""
-        mean, size, parts = wave_parts(np.array([self.along_fifth]))
-        return mean, size, np.vstack([parts, self.shoulder_waves.T[:2]])
+        """`wave_parts` of c, and of x and y of S."""
+        return wave_parts(np.array([self.along_fifth]), self.shoulder_waves.T[:2])
 
     @cached_property
     def inclined(self) -> float:
@@ -219,13 +220,21 @@ class SphericalShoulder:
         return np.asarray(waves @ self.placements[4][:3, :3])
 
 
-def wave_parts(waves: Array) -> tuple[Array, Array, Array]:
-    """Of waves a + b cos x + c sin x, (m, 3), means a and sizes |(b, c)| (m, 1), and coefficients (2m, 3) of two parts:
-    where a wave is a + size cos y, those of size cos y for all waves, then those of size sin y."""
-    a, b, c = waves.T
-    none = np.zeros_like(a)
-    ahead, aside = np.array([none, b, c]).T, np.array([none, -c, b]).T
-    return a[:, None], np.hypot(b, c)[:, None], np.vstack([ahead, aside])
+def wave_parts(waves: Array, others: Array) -> tuple[Array, Array, Array]:
+    """What bounds waves a + b cos x + c sin x, (m, 3), with other ones (k, 3).
+
+    Means (m, 2, 1), negative and positive, widened for rounding. Sizes |(b, c)| (m, 1, 1). And coefficients (3m + k,
+    3): where a wave is a + size cos y, those of -size cos y and size cos y, wave by wave, then those of size sin y,
+    then those of the others.
+    """
+    m = len(waves)
+    parts = np.zeros((3 * m + len(others), 3))
+    parts[1 : 2 * m : 2, 1:] = waves[:, 1:]
+    parts[: 2 * m : 2, 1:] = -waves[:, 1:]
+    parts[2 * m : 3 * m, 1], parts[2 * m : 3 * m, 2] = -waves[:, 2], waves[:, 1]
+    parts[3 * m :] = others
+    mean = waves[:, 0, None] * (-1.0, 1.0) + WIDENED
+    return mean[:, :, None], np.hypot(waves[:, 1], waves[:, 2])[:, None, None], parts
 
 
 def _meeting(P: Array) -> tuple[float, float] | None:
