@@ -27,6 +27,8 @@ NEAREST, FAR, MEMBERS, STEPS, STEP = 1e-9, 1e-2, 16, 3, 1e-6
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
 
+Rows = NDArray[np.intp]
+
 
 @dataclass(frozen=True, eq=False)
 class RedundantCurve:
@@ -133,51 +135,57 @@ def within(
         return [], []
     owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
     right = CurveStack.of([curves[k] for k in owner[0]])
-    lower, upper = np.array([curves[k].arcs[0] for k in owner[0]]).T
-    room = _Room.of(q_min, q_max)
-    # parts of the curves of pairs, and which of the two are not decided there
-    pair, undecided = np.arange(len(lower)), np.ones((2, len(lower)), dtype=bool)
-    kept = list[Array]()
-    for count in PARTS:
-        ends = lower + np.arange(count + 1)[:, None] * ((upper - lower) / count)
-        ends[-1] = upper
-        q7 = right.last_angle(ends, pair)
-        pair, undecided = np.concatenate([pair] * count), np.concatenate([undecided] * count, axis=1)
-        lower, upper = ends[:-1].ravel(), ends[1:].ravel()
-        cells = Cells(q7[:-1].ravel(), q7[1:].ravel(), right.sheet[pair])
-        held, inside, aligned = _judged(right.pose, cells, room)
-        undecided &= held
-        side, row = (undecided & inside).nonzero()
-        kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[row]]))
-        undecided &= ~inside
-        (left,) = (undecided[0] | undecided[1]).nonzero()
-        pair, lower, upper, undecided, aligned = pair[left], lower[left], upper[left], undecided[:, left], aligned[left]
-        if not len(pair):
-            break
-    side, row = undecided.nonzero()
-    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[row]]))
-    parts = np.concatenate(kept, axis=1)
-    passing = sorted(set(parts[0, parts[3] > 0].tolist()))
-    arcs = joined(parts[:3], len(curves))
+    kept, passing = _kept(right, np.array([curves[k].arcs[0] for k in owner[0]]), _Room.of(q_min, q_max))
+    found: list[list[tuple[float, float]]] = [[] for _ in curves]
+    for k, arc in zip(owner.ravel()[kept[0]].tolist(), kept[1], strict=True):
+        found[k].append(arc)
     cut = [
         RedundantCurve(curve.pose, curve.sheet, curve.interval, curve.label, own)
-        for curve, own in zip(curves, arcs, strict=True)
+        for curve, own in zip(curves, found, strict=True)
         if own
     ]
-    return cut, [curves[int(k)] for k in passing]
+    return cut, [curves[k] for k in sorted(owner[passing].tolist())]
 
 
-def joined(parts: Array, count: int) -> list[list[tuple[float, float]]]:
-    """The arcs of each of so many curves that parts (3, n) make up: index of a curve, lower and upper end."""
-    # a curve's ends are less than 8 apart
-    owner, lower, upper = parts[:, (8 * parts[0] + parts[1]).argsort()]
-    goes_on = (owner[1:] == owner[:-1]) & (lower[1:] == upper[:-1])
-    starts, stops = np.ones(len(owner), dtype=bool), np.ones(len(owner), dtype=bool)
-    np.logical_not(goes_on, out=starts[1:]), np.logical_not(goes_on, out=stops[:-1])
-    found: list[list[tuple[float, float]]] = [[] for _ in range(count)]
-    for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
-        found[int(k)].append((low, high))
-    return found
+def _kept(curves: CurveStack, arcs: Array, room: _Room) -> tuple[tuple[Rows, list[tuple[float, float]]], Mask]:
+    """Where curves on the right shoulder, on their arcs (m, 2), and their counterparts with the left one may be within
+    limits: rows (k,) of all the curves (2 m), and k arcs. And which (2, m) may have members there whose third axis is
+    in line with the first."""
+    m, (coarse, fine) = len(arcs), PARTS
+    whole, ends = _cut(arcs, coarse), np.empty((m, coarse * fine + 1))
+    ends[:, :-1] = _cut(np.stack([whole[:, :-1], whole[:, 1:]], axis=2).reshape(-1, 2), fine)[:, :-1].reshape(m, -1)
+    ends[:, -1] = arcs[:, 1]
+    q7 = curves.last_angle(ends.T, np.arange(m)).T
+    sheet = curves.sheet[np.arange(m).repeat(coarse)]
+    cells = Cells(q7[:, :-fine:fine].ravel(), q7[:, fine::fine].ravel(), sheet)
+    held, inside, aligned = _judged(curves.pose, cells, room)
+    decided = held & inside
+    passing = (decided & aligned).reshape(2, m, coarse).any(axis=2)
+    # of each part, which of its own parts may be within the limits
+    parts = np.empty((2, m * coarse, fine), dtype=bool)
+    parts[:] = decided[:, :, None]
+    open_ = held > inside
+    (left,) = (open_[0] | open_[1]).nonzero()
+    if len(left):
+        low, high = q7[:, :-1].reshape(-1, fine)[left], q7[:, 1:].reshape(-1, fine)[left]
+        held, _, aligned = _judged(curves.pose, Cells(low.ravel(), high.ravel(), sheet[left.repeat(fine)]), room)
+        held = held.reshape(2, -1, fine) & open_[:, left, None]
+        parts[:, left] |= held
+        side, row = (held & aligned.reshape(-1, fine)).any(axis=2).nonzero()
+        passing[side, left[row] // coarse] = True
+    # an arc starts where the parts change, and ends where they change again
+    padded = np.zeros((2 * m, coarse * fine + 2), dtype=bool)
+    padded[:, 1:-1] = parts.reshape(2 * m, -1)
+    row, at = (padded[:, 1:] != padded[:, :-1]).nonzero()
+    bounds = ends[row % m, at].tolist()
+    return (row[::2], list(zip(bounds[::2], bounds[1::2], strict=True))), passing
+
+
+def _cut(arcs: Array, count: int) -> Array:
+    """The ends (m, count + 1) of equal parts of arcs (m, 2)."""
+    ends = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) / count * np.arange(count + 1)
+    ends[:, -1] = arcs[:, 1]
+    return np.asarray(ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,11 +207,11 @@ class CurveStack:
             np.array([curve.sheet for curve in curves]),
         )
 
-    def last_angle(self, u: Array, rows: NDArray[np.intp]) -> Array:
+    def last_angle(self, u: Array, rows: Rows) -> Array:
         """q7 (…, n) [rad] at parameters u (…, n) of curves (n,)."""
         return last_angle(u, self.interval[:, rows], self.whole[rows])
 
-    def boxes(self, rows: NDArray[np.intp], parameter: Array, half: Array) -> tuple[Array, Array]:
+    def boxes(self, rows: Rows, parameter: Array, half: Array) -> tuple[Array, Array]:
         """Boxes as of `SelfMotion`, each of the curve whose row (n,) is given."""
         ends = np.array([parameter - half, parameter + half])
         ends = np.where(self.whole[rows], ends, np.clip(ends, 0.0, np.pi))
