@@ -7,26 +7,20 @@ import numpy as np
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
 
-# added to the diagonal of a system that may be singular
+# length of a row [m or 1] below which it counts as one of the others
 TINY = 1e-14
 # steps, and the error of any joint [rad] that needs no other
 STEPS, LEFT = 5, 1e-12
 # length [rad] of no step
 NONE = 1e-300
-# rows and columns of the products that make up two cross products, side by side
-_BLOCK = np.array([0, 0, 0, 3, 3, 3])
-_FIRST = np.array([1, 2, 0, 1, 2, 0])
-_SECOND = np.array([2, 0, 1, 2, 0, 1]) + _BLOCK
 
 
 def step_across(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array]:
     """Steps (n, nq) [rad] from q (n, nq), across the directions `along` (n, nq), to where the flange is at T (4, 4);
     and the tangents (n, nq) of its curve at q, with 1 for their product with `along`. Both to first order."""
-    reached, jacobian = chain.flange_and_jacobian(q)
-    sides = np.zeros((*q.shape, 2))
-    sides[:, :-1, 0], sides[:, -1, 1] = nearly_error(reached, T), 1.0
-    found = np.asarray(np.linalg.solve(_system(jacobian, along), sides), dtype=float)
-    return found[:, :, 0], found[:, :, 1]
+    reached, jacobian = chain.flange_and_columns(q)
+    system = _System(jacobian, along, nearly_error(reached, T), 0.0)
+    return system.solution.T, system.tangent.T
 
 
 def step_to(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tuple[Array, Array]:
@@ -35,63 +29,104 @@ def step_to(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tup
 
     Newton's step and what the second order adds to it. With a ratio r of the two, what is left is some r² of the step.
     """
-    reached, jacobian = chain.flange_and_jacobian(q)
-    system, sides = _system(jacobian, along), np.empty((*q.shape, 1))
-    sides[:, :-1, 0], sides[:, -1, 0] = nearly_error(reached, T), ahead
-    move: Array = np.linalg.solve(system, sides)[:, :, 0].astype(float, copy=False)
-    sides[:, :-1, 0], sides[:, -1, 0] = second_order(jacobian, move), 0.0
-    more = np.linalg.solve(system, sides)[:, :, 0]
-    first, second = np.maximum(np.abs(move).max(axis=1), NONE), np.abs(more).max(axis=1)
-    small = second < first / 2
-    return np.asarray(move - np.where(small[:, None], more, 0.0)), np.where(small, second**2 / first, first)
+    reached, jacobian = chain.flange_and_columns(q)
+    system = _System(jacobian, along, nearly_error(reached, T), ahead)
+    move = system.solution
+    more = system.solved(second_order(jacobian, move))
+    first, second = (np.maximum.reduce(np.abs(each), axis=0) for each in (move, more))
+    first, small = np.maximum(first, NONE), second < first / 2
+    return (move - np.where(small, more, 0.0)).T, np.where(small, second**2 / first, first)
 
 
-def _system(jacobian: Array, along: Array) -> Array:
-    """Matrices (n, nq, nq) of Jacobians (n, nq - 1, nq) above directions (n, nq), next to singular ones at worst."""
-    system = np.concatenate([jacobian, along[:, None]], axis=1)
-    return np.asarray(system + TINY * np.eye(along.shape[1]))
+class _System:
+    """Equations J x = error (6, n) and along x = ahead (n,), with Jacobians (6, nq, n) and directions (n, nq), of which
+    there are nq.
+
+    The rows are made orthonormal one after the other (Gram and Schmidt, modified): n systems at a time, without a
+    choice of pivots. Each row has its right side as last element.
+    """
+
+    def __init__(self, jacobian: Array, along: Array, error: Array, ahead: Array | float) -> None:
+        _, nq, n = jacobian.shape
+        rows = np.empty((nq, nq + 1, n))
+        rows[:-1, :-1], rows[:-1, -1] = jacobian, error
+        rows[-1, :-1], rows[-1, -1] = along.T, ahead
+        self._rows, self._lengths, self._shares = rows, list[Array](), list[Array]()
+        for k in range(nq):
+            row, rest = rows[k], rows[k + 1 :]
+            length = np.sqrt(np.add.reduce(row[:-1] * row[:-1], axis=0))
+            np.maximum(length, TINY, out=length)
+            row /= length
+            share = np.add.reduce(rest[:, :-1] * row[:-1], axis=1)
+            rest -= share[:, None] * row
+            self._lengths.append(length)
+            self._shares.append(share)
+
+    @property
+    def solution(self) -> Array:
+        """x (nq, n)."""
+        return np.asarray(np.add.reduce(self._rows[:, -1:] * self._rows[:, :-1], axis=0))
+
+    @property
+    def tangent(self) -> Array:
+        """x (nq, n) with errors of 0 and 1 ahead."""
+        return np.asarray(self._rows[-1, :-1] / self._lengths[-1])
+
+    def solved(self, error: Array) -> Array:
+        """x (nq, n) with other errors (6, n) and nothing ahead."""
+        side = np.zeros((len(self._rows), error.shape[1]))
+        side[:-1] = error
+        for k, (length, share) in enumerate(zip(self._lengths, self._shares, strict=True)):
+            side[k] /= length
+            side[k + 1 :] -= share * side[k]
+        return np.asarray(np.add.reduce(side[:, None] * self._rows[:, :-1], axis=0))
 
 
 def second_order(jacobian: Array, move: Array) -> Array:
-    """The part (n, 6) [m, rad] of second order in the motion of the flange with a geometric Jacobian (n, 6, nq) along
-    moves (n, nq) [rad]: of its place, and of the rotation vector.
+    """The part (6, n) [m, rad] of second order in the motion of the flange with a geometric Jacobian (6, nq, n) along
+    moves (nq, n) [rad]: of its place, and of the rotation vector.
 
     A joint turns all behind it, and so what a later one does: the second derivative by joints i <= j of the place is
     z_i × v_j, with v_j the velocity by joint j. The rotation vector has half the sum of z_i × z_j over i < j (Baker,
     Campbell, Hausdorff).
     """
-    parts = jacobian * move[:, None, :]
-    z = parts[:, 3:]
-    # of the products of all components, the difference of two is one of the cross product
-    products = (np.cumsum(z, axis=2) - z / 2) @ parts.transpose(0, 2, 1)
-    found = products[:, _FIRST, _SECOND] - products[:, _SECOND % 3, _FIRST + _BLOCK]
-    found[:, 3:] /= 2
-    return np.asarray(found)
+    parts = jacobian * move
+    z = parts[3:]
+    x, y, z = np.cumsum(z, axis=1) - z / 2
+    u, v, w = parts.reshape(2, 3, *move.shape).transpose(1, 0, 2, 3)
+    found = np.empty((2, 3, move.shape[1]))
+    for k, product in enumerate((y * w - z * v, z * u - x * w, x * v - y * u)):
+        np.add.reduce(product, axis=1, out=found[:, k])
+    found[1] /= 2
+    return found.reshape(6, -1)
 
 
 def onto(chain: Chain, q: Array, along: Array, T: Array) -> Array:
     """The configurations (n, nq) [rad] with the flange at T (4, 4) next to q (n, nq), across `along` (n, nq)."""
-    q = q.copy()
-    rows = np.arange(len(q))
-    for _ in range(STEPS):
+    move, left = step_to(chain, q, along, np.zeros(len(q)), T)
+    q = q + move
+    for _ in range(STEPS - 1):
+        (rows,) = (left > LEFT).nonzero()
         if not len(rows):
             break
-        move, left = step_to(chain, q[rows], along[rows], np.zeros(len(rows)), T)
+        move, left_there = step_to(chain, q[rows], along[rows], np.zeros(len(rows)), T)
         q[rows] += move
-        rows = rows[left > LEFT]
+        left = np.zeros(len(q))
+        left[rows] = left_there
     return q
 
 
 def nearly_error(reached: Array, T: Array) -> Array:
-    """`pose_error` (n, 6) of poses (n, 4, 4) against T (4, 4), with the sine of its angle: the same but for its cube.
+    """`pose_error` (6, n) of poses (3, n, 4), as of `flange_and_columns`, against T (4, 4), with the sine of its angle:
+    the same but for its cube.
 
-    Of both poses' rotations it is half the sum of the products of their columns, so that one product gives it all.
+    Of both poses' rotations it is half the sum of the products of their columns.
     """
-    weights = np.zeros((3, 4, 6))
-    R = T[:3, :3] / 2
-    for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        weights[x, 3, x] = -1.0
-        weights[y, :3, 3 + x], weights[z, :3, 3 + x] = R[z], -R[y]
-    error = reached[:, :3].reshape(len(reached), 12) @ weights.reshape(12, 6)
-    error[:, :3] += T[:3, 3]
-    return np.asarray(error)
+    weights = np.zeros((4, 4))
+    weights[:3, :3], weights[3, 3] = T[:3, :3].T / 2, -1.0
+    x, y, z = (reached.reshape(-1, 4) @ weights).reshape(reached.shape).transpose(0, 2, 1)
+    error = np.empty((6, reached.shape[1]))
+    error[0], error[1], error[2] = x[3], y[3], z[3]
+    error[:3] += T[:3, 3, None]
+    error[3], error[4], error[5] = y[2] - z[1], z[0] - x[2], x[1] - y[0]
+    return error

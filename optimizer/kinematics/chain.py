@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -43,64 +42,46 @@ class Chain:
 
     def flange(self, q: Array) -> Array:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
-        waves = self._waves
-        parts = np.cos(q)[..., None, None] * waves[0]
-        parts += np.sin(q)[..., None, None] * waves[1]
-        parts += waves[2]
-        # products of neighbours, and so on: few calls for few configurations
-        while (count := parts.shape[1]) > 1:
-            pairs = parts[:, : count - 1 : 2] @ parts[:, 1::2]
-            parts = np.concatenate([pairs, parts[:, -1:]], axis=1) if count % 2 else pairs
-        return np.asarray(parts[:, 0])
-
-    @cached_property
-    def _waves(self) -> Array:
-        """Coefficients (3, nq, 4, 4) of cos q, sin q and 1 in the pose of each link in the frame before it.
-
-        The flange stands for the last link.
-        """
-        P = self.placements
-        waves = np.zeros((3, *P.shape))
-        waves[0, :, :, :2] = P[:, :, :2]
-        waves[1, :, :, 0], waves[1, :, :, 1] = P[:, :, 1], -P[:, :, 0]
-        waves[2, :, :, 2:] = P[:, :, 2:]
-        waves[:, -1] = waves[:, -1] @ self.T_last_flange
-        return waves
+        return _poses(self._frames(q)[1])
 
     def flange_and_jacobian(self, q: Array) -> tuple[Array, Array]:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad], and its geometric Jacobian (n, 6, nq)."""
-        n, nq = q.shape
-        c, s = np.cos(q.T), np.sin(q.T)
-        # component by component, all configurations in a row: long products in place of many small ones. Of each joint
-        # y, -x, x, y, z and its place seen from the joint before; the third and the fourth are then turned
-        carriers, to_flange = self._carriers
-        parts = np.empty((nq, 6, 3, n))
-        rows = parts.reshape(nq, 6, 3 * n)
-        parts[0] = carriers[0][:, :, None]
-        for k in range(nq):
-            if k:
-                np.matmul(carriers[k], rows[k - 1, 2:5], out=rows[k])
-            turned, aside = parts[k, 2:4], parts[k, :2]
-            turned *= c[k]
-            aside *= s[k]
-            turned += aside
-        last = (to_flange @ rows[-1, 2:5]).reshape(4, 3, n)
-        place = np.cumsum(parts[:, 5], axis=0)
-        flange = place[-1] + last[3]
-        axis, arm = parts[:, 4], flange - place
-        J, T = np.empty((n, 6, nq)), np.empty((n, 4, 4))
-        by_row, (x, y, z), (u, v, w) = J.transpose(1, 2, 0), axis.transpose(1, 0, 2), arm.transpose(1, 0, 2)
-        by_row[0], by_row[1], by_row[2] = y * w - z * v, z * u - x * w, x * v - y * u
-        by_row[3:] = axis.transpose(1, 0, 2)
-        T[:, :3, :3], T[:, :3, 3], T[:, 3] = last[:3].transpose(2, 1, 0), flange.T, (0.0, 0.0, 0.0, 1.0)
-        return T, J
+        flange, jacobian = self.flange_and_columns(q)
+        return _poses(flange), np.ascontiguousarray(jacobian.transpose(2, 0, 1))
 
-    @cached_property
-    def _carriers(self) -> tuple[Array, Array]:
-        """For each joint, y, -x, x, y, z and the origin of its placement as rows (nq, 6, 3); x, y, z and the origin of
-        the flange on the last link (4, 3)."""
-        x, y, z, origin = self.placements[:, :3].transpose(2, 0, 1)
-        return np.stack([y, -x, x, y, z, origin], axis=1), self.T_last_flange[:3].T.copy()
+    def flange_and_columns(self, q: Array) -> tuple[Array, Array]:
+        """The same with all configurations in a row, for long products in place of many small ones: x, y, z and the
+        place of the flange by components (3, n, 4), and the Jacobian (6, nq, n)."""
+        frames, flange = self._frames(q)
+        jacobian = np.empty((6, *q.shape[::-1]))
+        axis = jacobian[3:]
+        axis[:] = frames[..., 2].transpose(1, 0, 2)
+        u, v, w = flange[:, None, :, 3] - frames[..., 3].transpose(1, 0, 2)
+        x, y, z = axis
+        jacobian[0], jacobian[1], jacobian[2] = y * w - z * v, z * u - x * w, x * v - y * u
+        return flange, jacobian
+
+    def _frames(self, q: Array) -> tuple[Array, Array]:
+        """The links' frames (nq, 3, n, 4) and the flange's (3, n, 4) at q (n, nq) [rad], as of `flange_and_columns`."""
+        n, nq = q.shape
+        turns, angles = np.empty((nq, n), dtype=complex), q.T
+        turns.real, turns.imag = np.cos(angles), -np.sin(angles)
+        frames = np.empty((nq, 3, n, 4))
+        rows, across = frames.reshape(nq, 3 * n, 4), frames.view(complex)[..., 0]
+        frames[0] = self.placements[0, :3, None]
+        # x + iy of a frame turned about its z
+        across[0] *= turns[0]
+        for k in range(1, nq):
+            np.matmul(rows[k - 1], self.placements[k], out=rows[k])
+            np.multiply(across[k], turns[k], out=across[k])
+        return frames, (rows[-1] @ self.T_last_flange).reshape(3, n, 4)
+
+
+def _poses(frames: Array) -> Array:
+    """Poses (n, 4, 4) by their components (3, n, 4)."""
+    T = np.empty((frames.shape[1], 4, 4))
+    T[:, :3], T[:, 3] = frames.transpose(1, 0, 2), (0.0, 0.0, 0.0, 1.0)
+    return T
 
 
 def pose_error(T_reached: Array, T: Array) -> Array:

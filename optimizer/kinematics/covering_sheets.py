@@ -31,7 +31,6 @@ from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.joint_axes import JointAxes
 from optimizer.kinematics.nearby_arm import NearbyArm
 from optimizer.kinematics.redundant_boxes import Cells, HeldBoxes, held_boxes
-from optimizer.kinematics.redundant_curve import joined
 from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.kinematics.spherical_shoulder import SphericalShoulder
 
@@ -146,4 +145,16 @@ def _arcs(pose: RedundantPose, signs: Array, blur: float) -> list[list[tuple[flo
         kept.append(np.array([sheet[inside], low[inside], high[inside]]))
         sheet, low, high = sheet[open_], low[open_], high[open_]
     kept.append(np.array([sheet, low, high]))
-    return joined(np.concatenate(kept, axis=1), len(signs))
+    return _joined(np.concatenate(kept, axis=1), len(signs))
+
+
+def _joined(parts: Array, count: int) -> list[list[tuple[float, float]]]:
+    """The arcs of each of so many curves that parts (3, n) make up: index of a curve, lower and upper end."""
+    owner, lower, upper = parts[:, np.lexsort((parts[1], parts[0]))]
+    goes_on = (owner[1:] == owner[:-1]) & (lower[1:] == upper[:-1])
+    starts, stops = np.append(True, ~goes_on), np.append(~goes_on, True)
+    found: list[list[tuple[float, float]]] = [[] for _ in range(count)]
+    if len(owner):
+        for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
+            found[int(k)].append((low, high))
+    return found

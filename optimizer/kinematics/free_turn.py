@@ -73,7 +73,8 @@ class FreeTurn:
         centre, sides = self.at(parameter), np.full((len(parameter), 7), LOOPS if self.joint == 4 else ROUNDING)
         sides[:, self.joint] += half
         if self.joint == 4:
-            return centre, with_shoulder(self.pose, centre, sides)
+            with_shoulder(self.pose, centre.T, sides.T)
+            return centre, sides
         sides[:, 2] += half
         return centre, sides
 
@@ -89,7 +90,7 @@ def stretched(pose: RedundantPose, label: Label) -> list[FreeTurn]:
     for theta in pose.form.aligned:
         S = pose.form.shoulder_about_fifth(np.array([theta]))[0]
         for q7 in (phase + spread, phase - spread):
-            v = pose.from_wrist(np.array([q7]))[0]
+            v = pose.from_wrist(np.array([q7]))[:, 0]
             if abs(float(np.linalg.norm(v)) - abs(float(S[2]))) < STRETCHED:
                 psi = 0.0 if S[2] > 0 else np.pi
                 found += [FreeTurn(pose, (q7, theta, psi), side, 4, label) for side in (1.0, -1.0)]
@@ -140,8 +141,7 @@ def _may_be_zero(lean: NDArray[np.complex128]) -> Mask:
 def _lean(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> NDArray[np.complex128]:
     """The lean (n,), a complex number, of the third axis from the first at parameters u (n,) of curves (n,)."""
     q7 = curves.last_angle(u, rows)
-    x, y, _ = curves.pose.third_axis(q7, *curves.pose.angles(q7, *curves.sheet[rows, 1:].T))
-    return np.asarray(x + 1j * y)
+    return curves.pose.third_axis(q7, *curves.pose.angles(q7, *curves.sheet[rows, 1:].T))
 
 
 def _zeros(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:

@@ -86,7 +86,7 @@ class RedundantArm:
 
     def _misses(self, pose: RedundantPose, q7: Array, theta: Array) -> Array:
         """Distances (n,) [m] of v from where the wrist's fifth axis can have it, at angles (n,)."""
-        form, v, S = self.form, pose.from_wrist(q7), self.form.shoulder_about_fifth(theta)
+        form, v, S = self.form, pose.from_wrist(q7).T, self.form.shoulder_about_fifth(theta)
         # about the sixth axis, S is on the ring that the fifth axis leaves it: from angle - cone to angle + cone of it
         length = np.linalg.norm(S, axis=1)
         cone = np.arctan2(np.hypot(S[:, 0], S[:, 1]), S[:, 2])

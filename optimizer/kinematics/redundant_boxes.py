@@ -21,15 +21,20 @@ Blurred boxes hold the configurations of every pose of the same orientation that
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot
+from math import cos, hypot, sin
 
 import numpy as np
 
 from models.robot import Array, Mask
-from optimizer.kinematics.redundant_pose import RedundantPose, to_cosine
+from optimizer.kinematics.redundant_pose import RedundantPose, angle_waves
+from optimizer.kinematics.spinors import Complex
 
 # what cosines [1] and half sides [rad] are widened by, for rounding; the former is a root's
 COSINE, ROUNDING = 1e-14, 1e-9
+# a range is kept as its least value, negative, and its greatest: what bounds one from above does so with the other
+_SIGNS = np.array([[-1.0], [1.0]])
+# a squared radius [m²] and a radius [m] that divide nothing by zero
+_NO_SQUARE, _NO_RADIUS = 1e-300, 1e-150
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,99 +60,121 @@ class HeldBoxes:
 def boxes_of(pose: RedundantPose, cells: Cells) -> tuple[Array, Array]:
     """Middles and half sides (n, 7) [rad] of boxes around the configurations of cells, which are in the intervals of
     their sheets."""
-    found = held_boxes(pose, cells)
-    return found.centre, found.half
+    centre, half, _ = _boxes(pose, cells, 0.0)
+    return centre.T, half.T
 
 
 def held_boxes(pose: RedundantPose, cells: Cells, blur: float = 0.0) -> HeldBoxes:
     """The boxes around the configurations that cells, anywhere on the circle, have of all poses within `blur` [m]."""
-    form = pose.form
-    low, high, (side, elbow, wrist) = cells.low, cells.high, cells.sheet.T
-    middle, half = (low + high) / 2, (high - low) / 2
-    mean, size, waves = pose.range_waves
-    ahead = waves @ np.array([np.ones(len(low)), np.cos(middle), np.sin(middle)])
-    (distance, v_z), v = _wave_ranges(mean, size, ahead[:2], ahead[2:4], half), ahead[4:]
+    centre, half, cosines = _boxes(pose, cells, blur)
+    held = cosines.min(axis=0) >= -1
+    return HeldBoxes(centre.T, half.T, np.asarray(held), np.asarray(held & (cosines.max(axis=0) <= 1)))
+
+
+def _boxes(pose: RedundantPose, cells: Cells, blur: float) -> tuple[Array, Array, Array]:
+    """Middles and half sides (7, n) [rad] of the boxes of `held_boxes`, and the ranges (4, n) of the cosines of θ and
+    ψ."""
+    form, (side, elbow, wrist), n = pose.form, cells.sheet.T, len(cells.low)
+    middle, half = (cells.low + cells.high) / 2, np.minimum((cells.high - cells.low) / 2, np.pi)
+    c, s = np.cos(half / 2), np.sin(half / 2)
+    chord = 2 * s
+    moved = hypot(*pose.shoulder[:2].tolist()) * chord + blur
+    seventh = angle_waves(np.cos(middle), np.sin(middle))
+    ranges, v = _wave_ranges(pose.range_waves, seventh, 1 - chord * s, chord * c)
     if blur:
-        length = np.sqrt(np.maximum(distance, 0.0))
-        distance = np.array([np.maximum(length[0] - blur, 0.0), length[1] + blur]) ** 2
-        v_z = v_z + np.array([[-blur], [blur]])
-    cos = (form.squares - distance[::-1]) / (2 * form.rho * form.nu)
-    # an angle at most this much beyond its cosine's: arccos is steepest, as a root, at 1
-    theta_low, theta_high = np.arccos(to_cosine(np.array([cos[1] + COSINE, cos[0] - COSINE])))
-    theta, theta_half = elbow * (theta_low + theta_high) / 2, (theta_high - theta_low) / 2
-    mean, size, waves = form.range_waves
-    ahead = waves @ np.array([np.ones(len(low)), np.cos(theta), np.sin(theta)])
-    (along,), S = _wave_ranges(mean, size, ahead[:1], ahead[1:2], theta_half), ahead[2:]
-    cos_psi = _wrist_cosine(form.fifth_in_6[2], form.inclined, along, v_z, _radii(distance, v_z))
-    psi, psi_half = _angles(cos_psi)
-    beta, beta_half = _angles(_wrist_cosine(form.fifth_in_6[2], form.inclined, v_z, along, _radii(distance, along)))
-    v_azimuth, S_azimuth = np.arctan2(np.array([v[1], S[1]]), np.array([v[0], S[0]]))
-    last = np.empty((4, len(low)))
-    last[0], last[1] = form.q4_at_zero - theta, S_azimuth - form.sixth_azimuth + wrist * beta
-    last[2], last[3] = wrist * psi - v_azimuth + form.fifth_azimuth, middle
-    centre = pose.completed(last, side)
-    moved = 2 * hypot(*pose.shoulder[:2]) * np.sin(np.minimum(half, np.pi) / 2) + blur
-    turned = _turned(np.array([form.rho * theta_half, moved]), np.hypot(*np.array([[S[0], v[0]], [S[1], v[1]]])))
-    sides = np.zeros((len(low), 7))
-    sides[:, 3], sides[:, 4], sides[:, 5], sides[:, 6] = theta_half, beta_half + turned[0], psi_half + turned[1], half
-    sides = with_shoulder(pose, centre, np.minimum(sides + ROUNDING, np.pi))
-    held = (cos[0] <= 1 + COSINE) & (cos[1] >= -1 - COSINE) & (cos_psi[0] <= 1) & (cos_psi[1] >= -1)
-    inside = (np.abs(np.array([*cos, *cos_psi])) <= 1).all(axis=0)
-    return HeldBoxes(centre, sides, np.asarray(held), np.asarray(inside))
+        length = np.sqrt(np.maximum(ranges[0] * _SIGNS, 0.0))
+        ranges[0] = _SIGNS * np.maximum(length + blur * _SIGNS, 0.0) ** 2
+        ranges[1] += blur
+    distance, along = ranges[0], np.empty((2, 2, n))
+    cos_elbow = (distance[::-1] + form.squares * _SIGNS) / (2 * form.rho * form.nu) + COSINE
+    theta, theta_half = _angles(cos_elbow)
+    theta *= elbow
+    fourth = angle_waves(np.cos(theta), np.sin(theta))
+    (along[0],), S = _wave_ranges(form.range_waves, fourth, np.cos(theta_half), np.sin(theta_half))
+    along[1] = ranges[1]
+    cos_wrist = _wrist_cosines(form.fifth_in_6[2], form.inclined, along, distance)
+    wrist_angle, wrist_half = _angles(cos_wrist)
+    wrist_angle *= wrist
+    across = np.concatenate([v, S]).reshape(2, 2, n)
+    azimuth = np.arctan2(across[:, 1], across[:, 0])
+    last = np.empty((4, n))
+    last[0], last[3] = form.q4_at_zero - theta, middle
+    last[1], last[2] = azimuth[1] + wrist_angle[1] - form.sixth_azimuth, wrist_angle[0] - azimuth[0] + form.fifth_azimuth
+    centre = pose.completed(last, _backwards(last, fourth, form.q4_at_zero, seventh), side)
+    sides, moves = np.empty((7, n)), np.empty((2, n))
+    moves[0], moves[1] = moved, form.rho * theta_half
+    sides[3], sides[6] = theta_half, half
+    np.add(_turned(moves, np.hypot(across[:, 0], across[:, 1])), wrist_half, out=sides[5:3:-1])
+    sides[3:] += ROUNDING
+    np.minimum(sides[3:], np.pi, out=sides[3:])
+    with_shoulder(pose, centre, sides)
+    return centre, sides, np.concatenate([cos_elbow, cos_wrist[0]])
 
 
-def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> Array:
-    """The half sides (n, 7) [rad] with those of the first three joints, which those of the others bound."""
-    turn = sides[:, 3:].sum(axis=1)
-    chi = pose.form.lean(centre[:, 1])
-    sides[:, 1] = np.minimum(turn, np.pi)
-    sides[:, 0] = sides[:, 2] = _turned(np.sin(np.minimum(turn, np.pi / 2)), np.abs(np.sin(chi))) + ROUNDING
-    sides[:, [0, 2]] = np.where(turn[:, None] < np.pi / 2, np.minimum(sides[:, [0, 2]], np.pi), np.pi)
-    return sides
+def with_shoulder(pose: RedundantPose, centre: Array, sides: Array) -> None:
+    """Sets the half sides of the first three joints, which those of the others bound; all (7, n) [rad]."""
+    turn = np.add.reduce(sides[3:], axis=0)
+    lean = np.abs(np.sin(pose.form.lean(centre[1])))
+    # once the sine of the turn is 1, the first and the third joint may have any angle
+    around = _turned(np.sin(np.minimum(turn, np.pi / 2)), lean) + ROUNDING
+    sides[0], sides[1], sides[2] = around, turn, around
+    np.minimum(sides[:3], np.pi, out=sides[:3])
 
 
-def _wave_ranges(mean: Array, size: Array, ahead: Array, aside: Array, half: Array) -> Array:
-    """Least and greatest (m, 2, n) of waves mean + size cos x, with mean and size (m, 1), x within `half` (n,) of where
-    size cos x is `ahead` and size sin x is `aside` (m, n); widened for rounding."""
-    half = np.minimum(half, np.pi)
-    c, s = np.cos(half), np.sin(half)
-    ends, rise, first = ahead * c, np.abs(aside) * s, size * c
-    found = np.empty((len(mean), 2, len(half)))
-    found[:, 0] = mean - COSINE + np.where(ahead <= -first, -size, ends - rise)
-    found[:, 1] = mean + COSINE + np.where(ahead >= first, size, ends + rise)
+def _backwards(last: Array, fourth: Array, at_zero: float, seventh: Array) -> Complex:
+    """e^{-iq} (4, n) of the last four joints (4, n), with `angle_waves` of `at_zero` less the fourth, and of the
+    seventh."""
+    found = np.empty(last.shape, dtype=complex)
+    real, imag = found.real, found.imag
+    real[1:3], imag[1:3] = np.cos(last[1:3]), -np.sin(last[1:3])
+    real[3], imag[3] = seventh[1], -seventh[2]
+    real[0], imag[0] = fourth[1], fourth[2]
+    found[0] *= complex(cos(at_zero), -sin(at_zero))
     return found
 
 
-def _angles(cosine: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Middles and half ranges (n,) [rad] of angles with cosines in a range, two (n,)."""
-    wide, narrow = np.arccos(to_cosine(np.array(cosine)))
-    return (wide + narrow) / 2, (wide - narrow) / 2
+def _wave_ranges(parts: tuple[Array, Array, Array], turns: Array, cos: Array, sin: Array) -> tuple[Array, Array]:
+    """Ranges (m, 2, n) of the waves of `parts`, as `wave_ranges` has them, with the angle off that of `angle_waves` (3,
+    n) by at most one of these cosines and sines (n,), up to π; widened for rounding. And the other waves there."""
+    mean, size, waves = parts
+    m, now = len(mean), waves @ turns
+    ends = now[: 2 * m].reshape(m, 2, -1)
+    top = ends * cos
+    top += (np.abs(now[2 * m : 3 * m]) * sin)[:, None]
+    # the greatest value is at the crest of the wave, if that is near
+    np.copyto(top, size, where=ends >= size * cos)
+    top += mean
+    return top, now[3 * m :]
 
 
-def _radii(distance: Array, along: Array) -> tuple[Array, Array]:
-    """Range of sqrt(|v|² - x²) [m], the distance from an axis, by those (2, n) of |v|² and of x along the axis."""
-    ends = np.abs(along)
-    largest = np.maximum(ends[0], ends[1])
-    smallest = np.where(along[0] * along[1] <= 0, 0.0, np.minimum(ends[0], ends[1]))
-    return (
-        np.sqrt(np.maximum(distance[0] - largest**2, 0.0)),
-        np.sqrt(np.maximum(distance[1] - smallest**2, 0.0)),
-    )
+def _angles(cosine: Array) -> tuple[Array, Array]:
+    """Middles and half ranges (…, n) [rad] of angles with cosines in ranges (…, 2, n)."""
+    beyond = np.minimum(np.maximum(cosine, -1.0), 1.0)
+    np.arccos(beyond, out=beyond)
+    beyond *= 0.5
+    # the first is of the negative cosine: of what is left to π
+    wide, narrow = np.pi / 2 - beyond[..., 0, :], beyond[..., 1, :]
+    return wide + narrow, wide - narrow
 
 
-def _wrist_cosine(cosine: float, sine: float, x: Array, y: Array, radius: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Range (n,) of (x - e y) / (r sine), with e the given cosine, by those (2, n) of x, y and r; widened for rounding.
-
-    With c and v_z for x and y it is that of the cosine of ψ, with v_z and c that of β.
-    """
-    ends = [cosine * y[0], cosine * y[1]]
-    least, most = x[0] - np.maximum(*ends), x[1] - np.minimum(*ends)
-    near, far = (np.maximum(each * sine, 1e-300) for each in radius)
-    low = np.where(least < 0, least / near, least / far)
-    high = np.where(most > 0, most / near, most / far)
-    return low - COSINE, high + COSINE
+def _wrist_cosines(cosine: float, sine: float, x: Array, distance: Array) -> Array:
+    """Ranges (2, 2, n) of (x - e y) / (r sine), with e the given cosine and r the root of |v|² - y², by those of c and
+    v_z as x and as y, and those (2, n) of |v|²; widened for rounding. First that of the cosine of ψ, then of β."""
+    y, radius = x[::-1], np.empty(x.shape)
+    largest, smallest = np.maximum(y[:, 0], y[:, 1]), np.maximum(-np.minimum(y[:, 0], y[:, 1]), 0.0)
+    near, far = radius[0], radius[1]
+    np.add(distance[0], largest * largest, out=near)
+    np.negative(near, out=near)
+    np.subtract(distance[1], smallest * smallest, out=far)
+    np.maximum(radius, _NO_SQUARE, out=radius)
+    np.sqrt(radius, out=radius)
+    most = abs(cosine) * (y[:, ::-1] if cosine > 0 else y)
+    most += x
+    most /= sine * np.where(most > 0, near[:, None], far[:, None])
+    most += COSINE
+    return np.asarray(most)
 
 
 def _turned(moved: Array, radius: Array) -> Array:
     """Half range (n,) [rad] of the azimuth of what is moved by at most `moved` (n,) from `radius` (n,)."""
-    return np.where(moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, 1e-300), 1.0)), np.pi)
+    return np.where(moved < radius, np.arcsin(np.minimum(moved / np.maximum(radius, _NO_RADIUS), 1.0)), np.pi)

@@ -7,7 +7,7 @@ change with the root of the distance from it. With q7 = middle - half cos u they
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,8 @@ PARTS = (40, 8)
 NEAREST, FAR, MEMBERS, STEPS, STEP = 1e-9, 1e-2, 16, 3, 1e-6
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
+
+Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,43 +135,57 @@ def within(
         return [], []
     owner = np.array([[k for k, curve in enumerate(curves) if curve.sheet[0] * side > 0] for side in (1.0, -1.0)])
     right = CurveStack.of([curves[k] for k in owner[0]])
-    lower, upper = np.array([curves[k].arcs[0] for k in owner[0]]).T
-    # parts of the curves of pairs, and which of the two are not decided there
-    pair, undecided = np.arange(len(lower)), np.ones((2, len(lower)), dtype=bool)
-    kept = list[Array]()
-    for count in PARTS:
-        ends = lower[:, None] + ((upper - lower) / count)[:, None] * np.arange(count + 1)
-        ends[:, -1] = upper
-        lower, upper = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-        pair, undecided = np.repeat(pair, count), np.repeat(undecided, count, axis=1)
-        held, inside, aligned = _judged(right, pair, lower, upper, q_min, q_max)
-        undecided &= held
-        side, row = np.nonzero(undecided & inside)
-        kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[row]]))
-        undecided &= ~inside
-        left = np.flatnonzero(undecided.any(axis=0))
-        pair, lower, upper, undecided = pair[left], lower[left], upper[left], undecided[:, left]
-        if not len(pair):
-            break
-    side, row = np.nonzero(undecided)
-    kept.append(np.array([owner[side, pair[row]], lower[row], upper[row], aligned[left][row]]))
-    parts = np.concatenate(kept, axis=1)
-    passing = sorted(set(parts[0, parts[3] > 0].tolist()))
-    arcs = joined(parts[:3], len(curves))
-    cut = [replace(curve, arcs=own) for curve, own in zip(curves, arcs, strict=True) if own]
-    return cut, [curves[int(k)] for k in passing]
+    kept, passing = _kept(right, np.array([curves[k].arcs[0] for k in owner[0]]), _Room.of(q_min, q_max))
+    found: list[list[tuple[float, float]]] = [[] for _ in curves]
+    for k, arc in zip(owner.ravel()[kept[0]].tolist(), kept[1], strict=True):
+        found[k].append(arc)
+    cut = [
+        RedundantCurve(curve.pose, curve.sheet, curve.interval, curve.label, own)
+        for curve, own in zip(curves, found, strict=True)
+        if own
+    ]
+    return cut, [curves[k] for k in sorted(owner[passing].tolist())]
 
 
-def joined(parts: Array, count: int) -> list[list[tuple[float, float]]]:
-    """The arcs of each of so many curves that parts (3, n) make up: index of a curve, lower and upper end."""
-    owner, lower, upper = parts[:, np.lexsort((parts[1], parts[0]))]
-    goes_on = (owner[1:] == owner[:-1]) & (lower[1:] == upper[:-1])
-    starts, stops = np.append(True, ~goes_on), np.append(~goes_on, True)
-    found: list[list[tuple[float, float]]] = [[] for _ in range(count)]
-    if len(owner):
-        for k, low, high in zip(owner[starts].tolist(), lower[starts].tolist(), upper[stops].tolist(), strict=True):
-            found[int(k)].append((low, high))
-    return found
+def _kept(curves: CurveStack, arcs: Array, room: _Room) -> tuple[tuple[Rows, list[tuple[float, float]]], Mask]:
+    """Where curves on the right shoulder, on their arcs (m, 2), and their counterparts with the left one may be within
+    limits: rows (k,) of all the curves (2 m), and k arcs. And which (2, m) may have members there whose third axis is
+    in line with the first."""
+    m, (coarse, fine) = len(arcs), PARTS
+    whole, ends = _cut(arcs, coarse), np.empty((m, coarse * fine + 1))
+    ends[:, :-1] = _cut(np.stack([whole[:, :-1], whole[:, 1:]], axis=2).reshape(-1, 2), fine)[:, :-1].reshape(m, -1)
+    ends[:, -1] = arcs[:, 1]
+    q7 = curves.last_angle(ends.T, np.arange(m)).T
+    sheet = curves.sheet[np.arange(m).repeat(coarse)]
+    cells = Cells(q7[:, :-fine:fine].ravel(), q7[:, fine::fine].ravel(), sheet)
+    held, inside, aligned = _judged(curves.pose, cells, room)
+    decided = held & inside
+    passing = (decided & aligned).reshape(2, m, coarse).any(axis=2)
+    # of each part, which of its own parts may be within the limits
+    parts = np.empty((2, m * coarse, fine), dtype=bool)
+    parts[:] = decided[:, :, None]
+    open_ = held > inside
+    (left,) = (open_[0] | open_[1]).nonzero()
+    if len(left):
+        low, high = q7[:, :-1].reshape(-1, fine)[left], q7[:, 1:].reshape(-1, fine)[left]
+        held, _, aligned = _judged(curves.pose, Cells(low.ravel(), high.ravel(), sheet[left.repeat(fine)]), room)
+        held = held.reshape(2, -1, fine) & open_[:, left, None]
+        parts[:, left] |= held
+        side, row = (held & aligned.reshape(-1, fine)).any(axis=2).nonzero()
+        passing[side, left[row] // coarse] = True
+    # an arc starts where the parts change, and ends where they change again
+    padded = np.zeros((2 * m, coarse * fine + 2), dtype=bool)
+    padded[:, 1:-1] = parts.reshape(2 * m, -1)
+    row, at = (padded[:, 1:] != padded[:, :-1]).nonzero()
+    bounds = ends[row % m, at].tolist()
+    return (row[::2], list(zip(bounds[::2], bounds[1::2], strict=True))), passing
+
+
+def _cut(arcs: Array, count: int) -> Array:
+    """The ends (m, count + 1) of equal parts of arcs (m, 2)."""
+    ends = arcs[:, :1] + (arcs[:, 1:] - arcs[:, :1]) / count * np.arange(count + 1)
+    ends[:, -1] = arcs[:, 1]
+    return np.asarray(ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,11 +207,11 @@ class CurveStack:
             np.array([curve.sheet for curve in curves]),
         )
 
-    def last_angle(self, u: Array, rows: NDArray[np.intp]) -> Array:
+    def last_angle(self, u: Array, rows: Rows) -> Array:
         """q7 (…, n) [rad] at parameters u (…, n) of curves (n,)."""
         return last_angle(u, self.interval[:, rows], self.whole[rows])
 
-    def boxes(self, rows: NDArray[np.intp], parameter: Array, half: Array) -> tuple[Array, Array]:
+    def boxes(self, rows: Rows, parameter: Array, half: Array) -> tuple[Array, Array]:
         """Boxes as of `SelfMotion`, each of the curve whose row (n,) is given."""
         ends = np.array([parameter - half, parameter + half])
         ends = np.where(self.whole[rows], ends, np.clip(ends, 0.0, np.pi))
@@ -203,26 +219,40 @@ class CurveStack:
         return boxes_of(self.pose, Cells(low, high, self.sheet[rows]))
 
 
-def _judged(
-    curves: CurveStack, rows: NDArray[np.intp], low: Array, high: Array, q_min: Array, q_max: Array
-) -> tuple[Mask, Mask, Mask]:
-    """Which parts, low … high (n,) of curves (n,) on the right shoulder, may have members within the limits, and which
-    have no others; (2, n) each, the second row for their counterparts with the left shoulder. Then which (n,) may have
-    a member whose third axis is in line with the first."""
-    start, end = curves.last_angle(np.array([low, high]), rows)
-    right, half = boxes_of(curves.pose, Cells(start, end, curves.sheet[rows]))
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """Middles (10, 1) and half widths (10, 1) [rad] of what limits leave the seven joints, then the first three again.
+    A joint that may turn all around has no width that its angle could exceed."""
+
+    middle: Array
+    width: Array
+
+    @classmethod
+    def of(cls, q_min: Array, q_max: Array) -> _Room:
+        """Within limits (7,) [rad]."""
+        joints = [*range(7), 0, 1, 2]
+        middle, width = (q_min + q_max)[joints, None] / 2, (q_max - q_min)[joints, None] / 2 + ROUNDING
+        width[width >= np.pi] = np.inf
+        return cls(middle, width)
+
+
+def _judged(pose: RedundantPose, cells: Cells, room: _Room) -> tuple[Mask, Mask, Mask]:
+    """Which cells (n,) with the right shoulder may have members within the limits, and which have no others; (2, n)
+    each, the second row for their counterparts with the left shoulder. Then which (n,) may have a member whose third
+    axis is in line with the first."""
+    right, half = boxes_of(pose, cells)
+    q, sides = np.empty((10, len(half))), np.empty((2, 10, len(half)))
     # with the other shoulder, the third axis leans to the other side; the last four joints are the same
-    joints = np.array([*range(7), 0, 1, 2])
-    q, half = right.T[joints], half.T[joints]
-    q[8] = -q[1] - 2 * curves.pose.form.lean_at_zero
-    q[[7, 9]] += np.pi
-    middle, width = ((q_min + q_max) / 2)[joints, None], ((q_max - q_min) / 2 + ROUNDING)[joints, None]
-    away = np.abs(wrapped(q - middle))
-    held, inside = (
-        np.array([each[:3].all(axis=0), each[7:].all(axis=0)]) & each[3:7].all(axis=0)
-        for each in (away <= width + half, (away + half <= width) | (width >= np.pi))
-    )
-    return np.asarray(held), np.asarray(inside), np.asarray(half[0] >= np.pi)
+    q[:7], q[7:] = right.T, right.T[:3]
+    q[7:10:2] += np.pi
+    q[8] = -q[8] - 2 * pose.form.lean_at_zero
+    sides[0, :7], sides[0, 7:] = half.T, half.T[:3]
+    np.negative(sides[0], out=sides[1])
+    beyond = np.abs(wrapped(q - room.middle)) - room.width
+    within = beyond <= sides
+    last = np.logical_and.reduce(within[:, 3:7], axis=1)
+    first, mirrored = (last & np.logical_and.reduce(within[:, k : k + 3], axis=1) for k in (0, 7))
+    return np.array([first[0], mirrored[0]]), np.array([first[1], mirrored[1]]), np.asarray(half[:, 0] >= np.pi)
 
 
 def last_angle(u: Array, interval: Array, whole: Mask) -> Array:

@@ -14,7 +14,8 @@ import numpy as np
 
 from models.robot import Array, Limits
 from optimizer.kinematics.angles import wrapped
-from optimizer.kinematics.spherical_shoulder import SphericalShoulder, carrier, wave_parts
+from optimizer.kinematics.spherical_shoulder import SphericalShoulder, wave_parts
+from optimizer.kinematics.spinors import Complex, unitary
 
 # zeros of the polynomial this near the unit circle may be angles; nearer to each other than APART [rad] they are one
 NEAR_CIRCLE, APART = 1e-4, 1e-9
@@ -48,33 +49,34 @@ class RedundantPose:
         return self.form.shoulder_in_7(self.T)
 
     def from_wrist(self, q7: Array) -> Array:
-        """v (n, 3) [m] at q7 (n,) [rad]."""
-        (still, cos, sin), c, s = self._wrist_waves, np.cos(q7)[:, None], np.sin(q7)[:, None]
-        return np.asarray(still + c * cos + s * sin)
+        """v (3, n) [m] at q7 (n,) [rad]."""
+        return np.asarray(self._wrist_waves @ angle_waves(np.cos(q7), np.sin(q7)))
 
     @cached_property
-    def _wrist_waves(self) -> tuple[Array, Array, Array]:
-        """Coefficients (3,) [m] of 1, cos q7 and sin q7 in v."""
-        x, y, z = self.shoulder
+    def _wrist_waves(self) -> Array:
+        """Coefficients (3, 3) [m] of 1, cos q7 and sin q7 in v, as columns."""
+        x, y, z = self.shoulder.tolist()
         P = self.form.placements[6]
-        R = P[:3, :3]
-        still = P[:3, 3] - [0.0, 0.0, self.form.sixth] + R[:, 2] * z
-        return still, R[:, 0] * x + R[:, 1] * y, R[:, 1] * x - R[:, 0] * y
+        waves = np.empty((3, 3))
+        waves[:, 0] = P[:3, 3] + P[:3, 2] * z
+        waves[2, 0] -= self.form.sixth
+        waves[:, 1], waves[:, 2] = P[:3, 0] * x + P[:3, 1] * y, P[:3, 1] * x - P[:3, 0] * y
+        return waves
 
     @cached_property
-    def waves(self) -> tuple[Array, Array]:
-        """Coefficients (3,) of 1, cos q7 and sin q7 in |v|² [m²] and in v_z [m]."""
-        still, cos, sin = self._wrist_waves
-        # cos and sin are at right angles, and as long as each other
-        square = np.array([still @ still + cos @ cos, 2 * still @ cos, 2 * still @ sin])
-        return square, np.array([still[2], cos[2], sin[2]])
+    def waves(self) -> Array:
+        """Coefficients (2, 3) of 1, cos q7 and sin q7 in |v|² [m²] and in v_z [m]."""
+        v = self._wrist_waves
+        # the parts of cos and sin are at right angles, and as long as each other
+        square = v[:, 0] @ v
+        waves = np.array([2 * square, v[2]])
+        waves[0, 0] = square[0] + v[:, 1] @ v[:, 1]
+        return waves
 
     @cached_property
     def range_waves(self) -> tuple[Array, Array, Array]:
-        """`wave_parts` of |v|² and v_z: means and sizes (2, 1), and the coefficients (6, 3) of their parts and of v_x
-        and v_y."""
-        mean, size, parts = wave_parts(np.array(self.waves))
-        return mean, size, np.vstack([parts, np.array(self._wrist_waves).T[:2]])
+        """`wave_parts` of |v|² and v_z, and of v_x and v_y."""
+        return wave_parts(self.waves, self._wrist_waves[:2])
 
     def cosines(self, q7: Array, elbow: Array) -> tuple[Array, Array, Array]:
         """cos θ (n,), and of cos ψ the numerator and the denominator [m] (n,), at q7 (n,) and signs of the elbow (n,).
@@ -111,49 +113,60 @@ class RedundantPose:
         free = {} if free is None else free
         if 4 in free:
             last[1] = free[4]
-        return self.completed(last, shoulder, free.get(0))
+        return np.ascontiguousarray(self.completed(last, backwards(last), shoulder, free.get(0)).T)
 
     def wrist(self, q7: Array, theta: Array, psi: Array) -> Array:
         """The last four joint positions (4, n) [rad] at the given angles (n,)."""
-        form, v, S = self.form, self.from_wrist(q7).T, self.form.shoulder_about_fifth(theta).T
+        form, v = self.form, self.from_wrist(q7)
+        S = form.shoulder_waves.T @ angle_waves(np.cos(theta), np.sin(theta))
         last = np.empty((4, len(q7)))
         last[0], last[3] = form.q4_at_zero - theta, q7
         last[2] = psi - np.arctan2(v[1], v[0]) + form.fifth_azimuth
         # the fifth angle is between the azimuths of S, seen from both sides
-        x, y, _ = form.rotations[5] @ _turned(v, np.cos(last[2]), np.sin(last[2]))
+        c, s = np.cos(last[2]), np.sin(last[2])
+        v[0], v[1] = c * v[0] - s * v[1], s * v[0] + c * v[1]
+        x, y = form.placements[5, :2, :3] @ v
         last[1] = np.arctan2(S[1] * x - S[0] * y, S[0] * x + S[1] * y)
         return last
 
-    def completed(self, last: Array, shoulder: Array, q1: Array | None = None) -> Array:
-        """Configurations (n, 7) [rad] in [-π, π] with the last four joints (4, n) and signs of the shoulder (n,)."""
-        form, q = self.form, np.empty((7, last.shape[1]))
+    def completed(self, last: Array, back: Complex, shoulder: Array, q1: Array | None = None) -> Array:
+        """Joint positions (7, n) [rad] in [-π, π] with the last four (4, n), of which `back` (4, n) are the numbers
+        e^{-iq}, and signs of the shoulder (n,)."""
+        form, q, spinor = self.form, np.empty((7, len(shoulder))), self._spinors(back)
+        size, phase = np.abs(spinor), np.arctan2(spinor.imag, spinor.real)
+        # the other shoulder has the third axis lean to the other side; the turns left half of the last angles out
+        left, out = np.pi / 2 * (1 - shoulder), np.add.reduce(last, axis=0)
+        azimuth = phase[1] - phase[0] if q1 is None else q1 + form.lean_azimuth - left
+        if q1 is None:
+            turn = phase[0] + phase[1]
+        else:
+            half = np.exp(0.5j * azimuth)
+            turn = 2 * np.angle(size[0] * half * spinor[0] + size[1] * half.conj() * spinor[1])
+        q[0], q[2] = azimuth + (left - form.lean_azimuth), left - form.twist - turn - out
+        q[1] = 2 * shoulder * np.arctan2(size[1], size[0]) - form.lean_at_zero
         q[3:] = last
-        first, third = self._axes(last, [0, 2]).transpose(1, 0, 2)
-        q[1] = shoulder * np.arctan2(np.hypot(third[0], third[1]), third[2]) - form.lean_at_zero
-        q[0] = np.arctan2(shoulder * third[1], shoulder * third[0]) - form.lean_azimuth if q1 is None else q1
-        # what is left of the first axis of link 3 is turned by the third angle
-        c, s = np.cos(q[:2]), np.sin(q[:2])
-        for j in (0, 1):
-            first = _carried(form.carriers[j + 1], first, c[j], s[j])
-        q[2] = np.arctan2(first[1], first[0])
-        return np.ascontiguousarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi).T)
+        return np.asarray(np.minimum(np.maximum(wrapped(q), -np.pi), np.pi))
 
-    def third_axis(self, q7: Array, theta: Array, psi: Array) -> Array:
-        """The third axis (3, n) in the frame of joint 1 at q1 = 0, at angles (n,)."""
-        return self._axes(self.wrist(q7, theta, psi), [2])[:, 0]
+    def third_axis(self, q7: Array, theta: Array, psi: Array) -> Complex:
+        """The third axis in the frame of joint 1 at q1 = 0, x + iy (n,), at angles (n,)."""
+        ahead, aside = self._spinors(backwards(self.wrist(q7, theta, psi)))
+        return np.asarray(2 * ahead.conj() * aside)
 
-    def _axes(self, last: Array, which: list[int]) -> Array:
-        """Axes (3, k, n) of link 3, 0 … 2 its x, y, z, in the frame of joint 1 at q1 = 0, at the last joints (4, n)."""
-        c, s = np.cos(last), np.sin(last)
-        seen = self.form.rotations[3][which].T[:, :, None]
-        for j, each in enumerate((*self.form.carriers[4:], self._from_last)):
-            seen = _carried(each, seen, c[j], s[j])
-        return np.asarray(seen)
+    def _spinors(self, back: Complex) -> Complex:
+        """Spinors (2, n), but for factors, of the rotation from joint 1 at q1 = 0 to link 3, with e^{-iq} of the last
+        four joints (4, n)."""
+        first, *others = self.form.backwards
+        spinor = np.ones((2, back.shape[1]), dtype=complex)
+        spinor[1] = back[0]
+        for turn, each in zip(back[1:], (first, *others), strict=True):
+            spinor = each @ spinor
+            spinor[1] *= turn
+        return np.asarray(self._from_last @ spinor)
 
     @cached_property
-    def _from_last(self) -> Array:
-        """What carries vectors from the last link to joint 1 at q1 = 0: see `carrier`."""
-        return carrier(self.orientation.T @ self.form.rotations[0])
+    def _from_last(self) -> Complex:
+        """What carries spinors from the last link to joint 1 at q1 = 0."""
+        return unitary(self.form.placements[0, :3, :3].T @ self.orientation)
 
     def elbows(self, limits: Limits | None) -> list[float]:
         """The signs of θ with which the fourth joint may be within the limits."""
@@ -247,17 +260,18 @@ def to_cosine(x: Array) -> Array:
     return np.asarray(np.minimum(np.maximum(x, -1.0), 1.0))
 
 
-def _turned(v: Array, c: Array, s: Array) -> Array:
-    """Vectors (3, …, n), each turned about z by the angle of cosine c and sine s (n,)."""
-    turned = np.empty(v.shape)
-    turned[0], turned[1], turned[2] = c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]
-    return turned
+def angle_waves(c: Array, s: Array) -> Array:
+    """1, cosine and sine (3, n) of angles (n,), of these two."""
+    waves = np.empty((3, len(c)))
+    waves[0], waves[1], waves[2] = 1.0, c, s
+    return waves
 
 
-def _carried(carrier: Array, v: Array, c: Array, s: Array) -> Array:
-    """Vectors (3, …, n), seen from behind a joint whose angle has cosine c and sine s (n,)."""
-    ahead, aside, along = (carrier @ v.reshape(3, -1)).reshape(3, *v.shape)
-    return np.asarray(ahead * c + aside * s + along)
+def backwards(q: Array) -> Complex:
+    """The numbers e^{-iq} of angles q [rad]."""
+    found = np.empty(q.shape, dtype=complex)
+    found.real, found.imag = np.cos(q), -np.sin(q)
+    return found
 
 
 def _wave(coefficients: Array) -> Array:

@@ -29,11 +29,14 @@ import pinocchio as pin
 
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
+from optimizer.kinematics.spinors import Complex, unitary
 
 # greatest distance [m] of axes that meet, and cosine of axes at right angles
 EQUAL = 1e-9
 # distance [m] from the fifth axis at which the shoulder is on it; angles from which it is sought there, and steps
 ALIGNED, ALIGNED_STARTS, ALIGNED_STEPS = 1e-12, 8, 20
+# what ranges of waves are widened by, for rounding [m² or m]
+WIDENED = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,14 +72,12 @@ class SphericalShoulder:
         return form if min(form.rho * form.nu, form.inclined) > EQUAL else None
 
     @cached_property
-    def rotations(self) -> tuple[Array, ...]:
-        """Those (3, 3) of the placements."""
-        return tuple(self.placements[:, :3, :3])
-
-    @cached_property
-    def carriers(self) -> tuple[Array, ...]:
-        """`carrier` (9, 3) of each of them."""
-        return tuple(map(carrier, self.rotations))
+    def backwards(self) -> tuple[Complex, Complex, Complex]:
+        """What carries spinors of the rotation from a link to link 3 to the link before: to links 5, 6 and 7, each from
+        behind the turn of the joint between. The first one is for (1, e^{-iq4}), with the way from link 3 to joint 4.
+        """
+        third, *others = (unitary(each).conj().T for each in self.placements[3:, :3, :3])
+        return others[0] * third[:, 0], others[1], others[2]
 
     @cached_property
     def _wrist_in_4(self) -> Array:
@@ -130,9 +131,8 @@ class SphericalShoulder:
 
     @cached_property
     def range_waves(self) -> tuple[Array, Array, Array]:
-        """`wave_parts` of c: mean and size (1, 1), and the coefficients (4, 3) of its parts and of x and y of S."""
-        mean, size, parts = wave_parts(np.array([self.along_fifth]))
-        return mean, size, np.vstack([parts, self.shoulder_waves.T[:2]])
+        """`wave_parts` of c, and of x and y of S."""
+        return wave_parts(np.array([self.along_fifth]), self.shoulder_waves.T[:2])
 
     @cached_property
     def inclined(self) -> float:
@@ -164,6 +164,16 @@ class SphericalShoulder:
         first = self.placements[1][2]
         lean = self.placements[1][:3, :3] @ [-first[1], first[0], 0.0]
         return float(np.arctan2(lean[1], lean[0]))
+
+    @cached_property
+    def twist(self) -> float:
+        """ψ [rad] at a third angle of zero, in R_z(φ) R_y(χ) R_z(ψ) for the rotation from joint 1 to link 3, with φ the
+        azimuth of the lean."""
+        R = self.placements[1, :3, :3] @ self.placements[2, :3, :3]
+        # the image of x before the turn by ψ, seen from link 3
+        azimuth, chi = self.lean_azimuth, self.lean_at_zero
+        ahead = R.T @ [np.cos(chi) * np.cos(azimuth), np.cos(chi) * np.sin(azimuth), -np.sin(chi)]
+        return -float(np.arctan2(ahead[1], ahead[0]))
 
     def lean(self, q2: Array) -> Array:
         """χ (n,) [rad] at the second angle q2 (n,)."""
@@ -210,21 +220,21 @@ class SphericalShoulder:
         return np.asarray(waves @ self.placements[4][:3, :3])
 
 
-def carrier(R: Array) -> Array:
-    """Matrix (9, 3) that turns a vector by -q about z, then by the transpose of R (3, 3): three rows for the part that
-    goes with cos q, three for that with sin q, and three for what stays."""
-    x, y, z = R
-    none = np.zeros(3)
-    return np.vstack([np.array([x, y, none]).T, np.array([-y, x, none]).T, np.array([none, none, z]).T])
+def wave_parts(waves: Array, others: Array) -> tuple[Array, Array, Array]:
+    """What bounds waves a + b cos x + c sin x, (m, 3), with other ones (k, 3).
 
-
-def wave_parts(waves: Array) -> tuple[Array, Array, Array]:
-    """Of waves a + b cos x + c sin x, (m, 3), means a and sizes |(b, c)| (m, 1), and coefficients (2m, 3) of two parts:
-    where a wave is a + size cos y, those of size cos y for all waves, then those of size sin y."""
-    a, b, c = waves.T
-    none = np.zeros_like(a)
-    ahead, aside = np.array([none, b, c]).T, np.array([none, -c, b]).T
-    return a[:, None], np.hypot(b, c)[:, None], np.vstack([ahead, aside])
+    Means (m, 2, 1), negative and positive, widened for rounding. Sizes |(b, c)| (m, 1, 1). And coefficients (3m + k,
+    3): where a wave is a + size cos y, those of -size cos y and size cos y, wave by wave, then those of size sin y,
+    then those of the others.
+    """
+    m = len(waves)
+    parts = np.zeros((3 * m + len(others), 3))
+    parts[1 : 2 * m : 2, 1:] = waves[:, 1:]
+    parts[: 2 * m : 2, 1:] = -waves[:, 1:]
+    parts[2 * m : 3 * m, 1], parts[2 * m : 3 * m, 2] = -waves[:, 2], waves[:, 1]
+    parts[3 * m :] = others
+    mean = waves[:, 0, None] * (-1.0, 1.0) + WIDENED
+    return mean[:, :, None], np.hypot(waves[:, 1], waves[:, 2])[:, None, None], parts
 
 
 def _meeting(P: Array) -> tuple[float, float] | None:

@@ -24,7 +24,7 @@ def test_what_two_orders_leave_goes_with_the_cube_of_the_step() -> None:
         for step in STEPS:
             move = step * rng.uniform(-1.0, 1.0, q.shape)
             twist = pose_error(T, chain.flange(q + move))
-            left = twist - (jacobian @ move[:, :, None])[:, :, 0] - second_order(jacobian, move)
+            left = twist - (jacobian @ move[:, :, None])[:, :, 0] - second_order(jacobian.transpose(1, 2, 0), move.T).T
             assert np.abs(left).max() < THIRD_ORDER * step**3
 
 
