@@ -26,8 +26,8 @@ class StopRequest(Request):
         "Name of the stop, different from those of the others. Null: its number, from 1.", None, "pick", default=None
     )
     target: Target | None = described(
-        "Joint positions, a pose of the TCP, or one of several targets. The orientation of a single pose may be free in "
-        "part: it is then chosen for the whole round, and the answer is `feasible`.",
+        "Joint positions, a pose of the TCP, or one of several targets. The orientation of a single pose may be free "
+        "in part: it is then chosen for the whole round, and the answer is `feasible`.",
         None,
         {"pose": {"position": [0.4, -0.2, 0.1], "quaternion": [0.0, 1.0, 0.0, 0.0]}},
         default=None,
