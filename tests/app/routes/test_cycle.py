@@ -127,10 +127,19 @@ REFUSED: dict[str, tuple[str, list[Any] | None, dict[str, Any]]] = {
         {"stops": [{"name": "2", "target": {"q": HOME}}, {"target": {"q": HOME}}]},
     ),
     "joints": ("validation", ["body", "stops", 0, "target", "q"], {"stops": [{"target": {"q": [0.0]}}]}),
-    "free orientation": (
+    "free orientation of one of several": (
         "validation",
         ["body", "stops", 0, "target"],
-        {"stops": [{"target": {"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}}}]},
+        {
+            "stops": [
+                {"target": {"any_of": [{"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}}, {"q": HOME}]}}
+            ]
+        },
+    ),
+    "free orientation at the start": (
+        "validation",
+        ["body", "start"],
+        {"start": {"pose": {"position": [0.4, 0.0, 0.3], "orientation": "free"}}},
     ),
     "overloaded": (
         "validation",
