@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import acos, remainder, tau
+from math import acos, atan2, hypot, remainder, tau
 
 import numpy as np
 
@@ -210,20 +210,22 @@ class RedundantPose:
 
     @cached_property
     def _excesses(self) -> Array:
-        """The excess (2, k) at the edges, then between each and the next, for both elbows; without edges, anywhere."""
-        edges = self._edges
-        middles = (np.append(edges[1:], edges[:1] + 2 * np.pi) + edges) / 2
-        q7 = np.concatenate([edges, middles]) if len(edges) else np.zeros(1)
-        return self._excess(np.tile(q7, 2), np.repeat([1.0, -1.0], len(q7))).reshape(2, -1)
+        """The excess (2, k) at the edges, then between each and the next, for both elbows; without edges, anywhere.
 
-    def _excess(self, q7: Array, elbow: Array) -> Array:
-        """The lesser of sin²θ and of sin²ψ r²/|v|² at q7 (n,); negative off the sheets of these elbows (n,)."""
-        form, square = self.form, self.waves[0]
-        c, s = np.cos(q7), np.sin(q7)
-        distance = square[0] + square[1] * c + square[2] * s
+        That is the lesser of sin²θ and of sin²ψ r²/|v|²: negative off the sheets.
+        """
+        form, edges, q7 = self.form, self._edges, np.zeros(max(2 * len(self._edges), 1))
+        if len(edges):
+            q7[: len(edges)], q7[len(edges) : -1] = edges, (edges[1:] + edges[:-1]) / 2
+            q7[-1] = (edges[0] + 2 * np.pi + edges[-1]) / 2
+        distance, v_z = self.waves @ angle_waves(np.cos(q7), np.sin(q7))
         cos = (form.squares - distance) / (2 * form.rho * form.nu)
-        _, along, reach = self.cosines(q7, elbow)
-        return np.asarray(np.minimum(1 - cos**2, (reach**2 - along**2) / np.maximum(distance, TINY)))
+        clipped = to_cosine(cos)
+        k0, kc, ks = form.along_fifth
+        aside = ks * np.sqrt((1 - clipped) * (1 + clipped))
+        along = k0 + kc * clipped - form.fifth_in_6[2] * v_z + np.array([aside, -aside])
+        reach = form.inclined**2 * np.maximum(distance - v_z * v_z, 0.0)
+        return np.asarray(np.minimum(1 - cos * cos, (reach - along * along) / np.maximum(distance, TINY)))
 
     @cached_property
     def _edges(self) -> Array:
@@ -239,20 +241,18 @@ class RedundantPose:
         P = _sum(form.inclined**2 * _sum(d2, -np.convolve(v_z, v_z)), -np.convolve(flat, flat), -(ks**2) * sin2)
         if abs(ks) > ROUNDING:
             P = _sum(np.convolve(P, P), -4 * ks**2 * np.convolve(np.convolve(flat, flat), sin2))
-        found = np.sort(np.concatenate([_angles(P), self._straight()]))
-        if not len(found):
-            return found
-        return np.asarray(found[np.append(True, np.diff(found) > APART)])
+        found = sorted([*_angles(P), *self._straight()])
+        return np.array([each for k, each in enumerate(found) if k == 0 or each - found[k - 1] > APART])
 
-    def _straight(self) -> Array:
-        """Angles (k,) [rad] at which the elbow is stretched or folded, or nearly: |cos θ| = 1."""
-        square, reach = self.waves[0], 2 * self.form.rho * self.form.nu
-        size, phase = float(np.hypot(square[1], square[2])), float(np.arctan2(square[2], square[1]))
+    def _straight(self) -> list[float]:
+        """Angles [rad] at which the elbow is stretched or folded, or nearly: |cos θ| = 1."""
+        still, ahead, aside = self.waves[0].tolist()
+        reach, size, phase = 2 * self.form.rho * self.form.nu, hypot(ahead, aside), atan2(aside, ahead)
         if size <= NEGLIGIBLE * reach:
-            return np.zeros(0)
-        cosines = (self.form.squares - square[0] + np.array([reach, -reach])) / size
-        turned = np.arccos(to_cosine(cosines[np.abs(cosines) < 1 + NEAR_CIRCLE**2 / 2]))
-        return np.asarray(wrapped(np.concatenate([phase + turned, phase - turned])))
+            return []
+        cosines = [(self.form.squares - still + each) / size for each in (reach, -reach)]
+        turned = [acos(min(max(each, -1.0), 1.0)) for each in cosines if abs(each) < 1 + NEAR_CIRCLE**2 / 2]
+        return [remainder(phase + side * each, tau) for side in (1.0, -1.0) for each in turned]
 
 
 def to_cosine(x: Array) -> Array:
@@ -274,13 +274,13 @@ def backwards(q: Array) -> Complex:
     return found
 
 
-def _wave(coefficients: Array) -> Array:
+def _wave(coefficients: Array) -> Complex:
     """Of a + b cos q + c sin q, the coefficients (3,) of the powers -1, 0, 1 of exp(iq)."""
     a, b, c = coefficients
     return np.array([(b + 1j * c) / 2, a, (b - 1j * c) / 2])
 
 
-def _sum(*polynomials: Array) -> Array:
+def _sum(*polynomials: Array | Complex) -> Complex:
     """The sum of polynomials in exp(iq) and exp(-iq), each with its constant in the middle."""
     size = max(map(len, polynomials))
     total = np.zeros(size, dtype=complex)
@@ -290,12 +290,18 @@ def _sum(*polynomials: Array) -> Array:
     return total
 
 
-def _angles(polynomial: Array) -> Array:
-    """The angles q (k,) [rad] at which a polynomial in exp(iq) and exp(-iq) is zero, or nearly."""
-    least = NEGLIGIBLE * np.abs(polynomial).max()
-    while len(polynomial) > 1 and abs(polynomial[-1]) <= least:
-        polynomial = polynomial[1:-1]
-    if len(polynomial) < 3:
-        return np.zeros(0)
-    roots = np.roots(polynomial[::-1])
-    return np.asarray(np.angle(roots[np.abs(np.abs(roots) - 1) < NEAR_CIRCLE]))
+def _angles(polynomial: Complex) -> list[float]:
+    """The angles q [rad] at which a polynomial in exp(iq) and exp(-iq) is zero, or nearly."""
+    size: list[float] = np.abs(polynomial).tolist()
+    least, k = NEGLIGIBLE * max(size), 0
+    while 2 * k < len(size) - 1 and size[-1 - k] <= least:
+        k += 1
+    if len(size) - 2 * k < 3:
+        return []
+    falling = polynomial[::-1][k : len(size) - k]
+    # the eigenvalues of its companion are its zeros
+    companion = np.eye(len(falling) - 1, k=-1, dtype=complex)
+    companion[0] = -falling[1:] / falling[0]
+    roots = np.linalg.eigvals(companion)
+    near: list[float] = np.angle(roots[np.abs(np.abs(roots) - 1) < NEAR_CIRCLE]).tolist()
+    return near
