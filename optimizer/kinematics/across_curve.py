@@ -7,7 +7,7 @@ import numpy as np
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
 
-# length of a row [m or 1] below which it counts as one of the others
+# added to the diagonal of a system that may be singular
 TINY = 1e-14
 # steps, and the error of any joint [rad] that needs no other
 STEPS, LEFT = 5, 1e-12
@@ -19,8 +19,10 @@ def step_across(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, 
     """Steps (n, nq) [rad] from q (n, nq), across the directions `along` (n, nq), to where the flange is at T (4, 4);
     and the tangents (n, nq) of its curve at q, with 1 for their product with `along`. Both to first order."""
     reached, jacobian = chain.flange_and_columns(q)
-    system = _System(jacobian, along, nearly_error(reached, T), 0.0)
-    return system.solution.T, system.tangent.T
+    sides = np.zeros((*q.shape, 2))
+    sides[:, :-1, 0], sides[:, -1, 1] = nearly_error(reached, T).T, 1.0
+    found = np.asarray(np.linalg.solve(_system(jacobian, along), sides), dtype=float)
+    return found[:, :, 0], found[:, :, 1]
 
 
 def step_to(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tuple[Array, Array]:
@@ -30,56 +32,23 @@ def step_to(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tup
     Newton's step and what the second order adds to it. With a ratio r of the two, what is left is some r² of the step.
     """
     reached, jacobian = chain.flange_and_columns(q)
-    system = _System(jacobian, along, nearly_error(reached, T), ahead)
-    move = system.solution
-    more = system.solved(second_order(jacobian, move))
-    first, second = (np.maximum.reduce(np.abs(each), axis=0) for each in (move, more))
+    system, sides = _system(jacobian, along), np.empty((*q.shape, 1))
+    sides[:, :-1, 0], sides[:, -1, 0] = nearly_error(reached, T).T, ahead
+    move: Array = np.linalg.solve(system, sides)[:, :, 0].astype(float, copy=False)
+    sides[:, :-1, 0], sides[:, -1, 0] = second_order(jacobian, move.T).T, 0.0
+    more = np.linalg.solve(system, sides)[:, :, 0]
+    first, second = (np.maximum.reduce(np.abs(each), axis=1) for each in (move, more))
     first, small = np.maximum(first, NONE), second < first / 2
-    return (move - np.where(small, more, 0.0)).T, np.where(small, second**2 / first, first)
+    return np.asarray(move - np.where(small[:, None], more, 0.0)), np.where(small, second**2 / first, first)
 
 
-class _System:
-    """Equations J x = error (6, n) and along x = ahead (n,), with Jacobians (6, nq, n) and directions (n, nq), of which
-    there are nq.
-
-    The rows are made orthonormal one after the other (Gram and Schmidt, modified): n systems at a time, without a
-    choice of pivots. Each row has its right side as last element.
-    """
-
-    def __init__(self, jacobian: Array, along: Array, error: Array, ahead: Array | float) -> None:
-        _, nq, n = jacobian.shape
-        rows = np.empty((nq, nq + 1, n))
-        rows[:-1, :-1], rows[:-1, -1] = jacobian, error
-        rows[-1, :-1], rows[-1, -1] = along.T, ahead
-        self._rows, self._lengths, self._shares = rows, list[Array](), list[Array]()
-        for k in range(nq):
-            row, rest = rows[k], rows[k + 1 :]
-            length = np.sqrt(np.add.reduce(row[:-1] * row[:-1], axis=0))
-            np.maximum(length, TINY, out=length)
-            row /= length
-            share = np.add.reduce(rest[:, :-1] * row[:-1], axis=1)
-            rest -= share[:, None] * row
-            self._lengths.append(length)
-            self._shares.append(share)
-
-    @property
-    def solution(self) -> Array:
-        """x (nq, n)."""
-        return np.asarray(np.add.reduce(self._rows[:, -1:] * self._rows[:, :-1], axis=0))
-
-    @property
-    def tangent(self) -> Array:
-        """x (nq, n) with errors of 0 and 1 ahead."""
-        return np.asarray(self._rows[-1, :-1] / self._lengths[-1])
-
-    def solved(self, error: Array) -> Array:
-        """x (nq, n) with other errors (6, n) and nothing ahead."""
-        side = np.zeros((len(self._rows), error.shape[1]))
-        side[:-1] = error
-        for k, (length, share) in enumerate(zip(self._lengths, self._shares, strict=True)):
-            side[k] /= length
-            side[k + 1 :] -= share * side[k]
-        return np.asarray(np.add.reduce(side[:, None] * self._rows[:, :-1], axis=0))
+def _system(jacobian: Array, along: Array) -> Array:
+    """Matrices (n, nq, nq) of Jacobians (6, nq, n) above directions (n, nq), next to singular ones at worst."""
+    n, nq = along.shape
+    system = np.empty((n, nq, nq))
+    system[:, :-1], system[:, -1] = jacobian.transpose(2, 0, 1), along
+    system.reshape(n, -1)[:, :: nq + 1] += TINY
+    return system
 
 
 def second_order(jacobian: Array, move: Array) -> Array:

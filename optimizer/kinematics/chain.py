@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -42,7 +43,29 @@ class Chain:
 
     def flange(self, q: Array) -> Array:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
-        return _poses(self._frames(q)[1])
+        waves = self._waves
+        parts = np.cos(q)[..., None, None] * waves[0]
+        parts += np.sin(q)[..., None, None] * waves[1]
+        parts += waves[2]
+        # products of neighbours, and so on: few calls for few configurations
+        while (count := parts.shape[1]) > 1:
+            pairs = parts[:, : count - 1 : 2] @ parts[:, 1::2]
+            parts = np.concatenate([pairs, parts[:, -1:]], axis=1) if count % 2 else pairs
+        return np.asarray(parts[:, 0])
+
+    @cached_property
+    def _waves(self) -> Array:
+        """Coefficients (3, nq, 4, 4) of cos q, sin q and 1 in the pose of each link in the frame before it.
+
+        The flange stands for the last link.
+        """
+        P = self.placements
+        waves = np.zeros((3, *P.shape))
+        waves[0, :, :, :2] = P[:, :, :2]
+        waves[1, :, :, 0], waves[1, :, :, 1] = P[:, :, 1], -P[:, :, 0]
+        waves[2, :, :, 2:] = P[:, :, 2:]
+        waves[:, -1] = waves[:, -1] @ self.T_last_flange
+        return waves
 
     def flange_and_jacobian(self, q: Array) -> tuple[Array, Array]:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad], and its geometric Jacobian (n, 6, nq)."""

@@ -87,11 +87,14 @@ def _points(curves: CurveStack) -> tuple[list[Array], Array]:
         if not len(cut):
             break
         # the points between those of each cut step
-        before = np.repeat(cut, parts[cut] - 1)
-        nth = np.arange(1, len(before) + 1) - np.repeat(np.cumsum(parts[cut] - 1) - parts[cut] + 1, parts[cut] - 1)
+        more = parts[cut] - 1
+        before, total = cut.repeat(more), np.cumsum(more)
+        nth = np.arange(1, len(before) + 1) - (total - more).repeat(more)
         between = u[before] + nth / parts[before] * (u[before + 1] - u[before])
-        q = np.insert(q, before + 1, _at(curves, between, rows[before]), axis=0)
-        u, rows = np.insert(u, before + 1, between), np.insert(rows, before + 1, rows[before])
+        # where each point comes from: those of before first, then those between
+        place = np.concatenate([np.arange(len(q)), before]).argsort(kind="stable")
+        q = np.concatenate([q, _at(curves, between, rows[before])])[place]
+        u, rows = np.concatenate([u, between])[place], np.concatenate([rows, rows[before]])[place]
     else:
         steps, length, bend = _steps(q, rows)
     kept = _kept(length, bend, rows)

@@ -160,7 +160,7 @@ def _kept(curves: CurveStack, arcs: Array, room: _Room) -> tuple[tuple[Rows, lis
     cells = Cells(q7[:, :-fine:fine].ravel(), q7[:, fine::fine].ravel(), sheet)
     held, inside, aligned = _judged(curves.pose, cells, room)
     decided = held & inside
-    passing = np.asarray((decided & aligned).reshape(2, m, coarse).any(axis=2))
+    passing: Mask = np.logical_or.reduce((decided & aligned).reshape(2, m, coarse), axis=2)
     # of each part, which of its own parts may be within the limits
     parts = np.empty((2, m * coarse, fine), dtype=bool)
     parts[:] = decided[:, :, None]
@@ -171,7 +171,7 @@ def _kept(curves: CurveStack, arcs: Array, room: _Room) -> tuple[tuple[Rows, lis
         held, _, aligned = _judged(curves.pose, Cells(low.ravel(), high.ravel(), sheet[left.repeat(fine)]), room)
         held = held.reshape(2, -1, fine) & open_[:, left, None]
         parts[:, left] |= held
-        side, row = np.nonzero((held & aligned.reshape(-1, fine)).any(axis=2))
+        side, row = np.logical_or.reduce(held & aligned.reshape(-1, fine), axis=2).nonzero()
         passing[side, left[row] // coarse] = True
     # an arc starts where the parts change, and ends where they change again
     padded = np.zeros((2 * m, coarse * fine + 2), dtype=bool)

@@ -78,26 +78,15 @@ class RedundantPose:
         """`wave_parts` of |v|² and v_z, and of v_x and v_y."""
         return wave_parts(self.waves, self._wrist_waves[:2])
 
-    def cosines(self, q7: Array, elbow: Array) -> tuple[Array, Array, Array]:
-        """cos θ (n,), and of cos ψ the numerator and the denominator [m] (n,), at q7 (n,) and signs of the elbow (n,).
-
-        The first is clipped to [-1, 1].
-        """
-        form, (square, height) = self.form, self.waves
-        c, s = np.cos(q7), np.sin(q7)
-        distance = square[0] + square[1] * c + square[2] * s
-        v_z = height[0] + height[1] * c + height[2] * s
-        cos = to_cosine((form.squares - distance) / (2 * form.rho * form.nu))
-        k0, kc, ks = form.along_fifth
-        along = k0 + kc * cos + ks * elbow * np.sqrt((1 - cos) * (1 + cos))
-        radius = np.sqrt(np.maximum(distance - v_z**2, 0.0))
-        return cos, along - form.fifth_in_6[2] * v_z, form.inclined * radius
-
     def angles(self, q7: Array, elbow: Array, wrist: Array) -> tuple[Array, Array]:
         """θ and ψ (n,) [rad] at q7 (n,) on sheets of these signs (n,); cosines beyond 1 count as 1."""
-        cos, along, reach = self.cosines(q7, elbow)
-        theta = elbow * np.arccos(cos)
-        return theta, wrist * np.arctan2(np.sqrt(np.maximum((reach - along) * (reach + along), 0.0)), along)
+        form, (distance, v_z) = self.form, self.waves @ angle_waves(np.cos(q7), np.sin(q7))
+        cos = to_cosine((form.squares - distance) / (2 * form.rho * form.nu))
+        k0, kc, ks = form.along_fifth
+        along = k0 + kc * cos + ks * elbow * np.sqrt((1 - cos) * (1 + cos)) - form.fifth_in_6[2] * v_z
+        reach = form.inclined * np.sqrt(np.maximum(distance - v_z * v_z, 0.0))
+        across = np.sqrt(np.maximum((reach - along) * (reach + along), 0.0))
+        return elbow * np.arccos(cos), wrist * np.arctan2(across, along)
 
     def configurations(self, q7: Array, sheet: Array) -> Array:
         """Configurations (n, 7) [rad] in [-π, π] at q7 (n,) on sheets (n, 3)."""
@@ -280,7 +269,7 @@ def _wave(coefficients: Array) -> Complex:
     return np.array([(b + 1j * c) / 2, a, (b - 1j * c) / 2])
 
 
-def _sum(*polynomials: Complex) -> Complex:
+def _sum(*polynomials: Array | Complex) -> Complex:
     """The sum of polynomials in exp(iq) and exp(-iq), each with its constant in the middle."""
     size = max(map(len, polynomials))
     total = np.zeros(size, dtype=complex)

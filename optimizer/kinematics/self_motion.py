@@ -20,8 +20,6 @@ from optimizer.problem.branches import BranchLabel, Label
 ROUNDING = 1e-10
 # an arc shorter than this is one configuration, up to rounding [rad]
 POINT = 1e-4
-# share of a piece by which rounding may have an arc longer than so many pieces
-ROUNDED = 1e-6
 
 
 class SelfMotion(Protocol):
@@ -76,7 +74,7 @@ def spread(motion: SelfMotion, count: int) -> Array:
         if upper - lower < POINT:
             found.append((lower + upper) / 2)
             continue
-        pieces = max(2, ceil(count * (upper - lower) / length - ROUNDED))
+        pieces = max(2, ceil(count * (upper - lower) / length))
         step, closed = (upper - lower) / pieces, upper - lower > 2 * np.pi - POINT
         # plain numbers: several times as fast as arrays of so few
         found += [lower + step * k for k in range(pieces)]
