@@ -22,6 +22,7 @@ import pinocchio as pin
 from models.robot import Array
 from optimizer.deadline import Clock, Deadline
 from optimizer.exceptions import (
+    DeadlineExceeded,
     InvalidProblem,
     JoulepathError,
     NoReachableTarget,
@@ -107,30 +108,39 @@ def with_free_orientations(asked: WorkRound, search: Search, clock: Clock) -> Ro
 def _first(
     asked: WorkRound, free: Mapping[str, Stop], search: Search, end: Deadline
 ) -> tuple[dict[str, list[Turns]], RoundSolution]:
-    """The round with full turns at some orientations of each stop, which has the bound over all of them, and these."""
+    """The round with full turns at some orientations of each stop, which has the bound over all of them, and these.
+
+    If there is no time for it, the one without full turns.
+    """
     all_around = {name: _all_around(stop) for name, stop in free.items()}
     # many orientations need nearly the same energy: that none of those tried is better would take long to prove
     asked = replace(asked, rough=any(stop.path is None for stop in free.values()))
     if not asked.windings or not asked.rough:
-        return all_around, _bounded(asked, all_around, search, end)
-    found_at = {name: turns[0] for name, turns in all_around.items()}
-    # what has no round without full turns may have one with them
-    with suppress(NoSequence, NoTrajectory):
+        return all_around, _bounded(asked, all_around, search, FIRST * end.left)
+    found, found_at = None, {name: turns[0] for name, turns in all_around.items()}
+    # what has no round without full turns, or none in so short a time, may have one with them
+    with suppress(NoSequence, NoTrajectory, DeadlineExceeded):
         rough = replace(_at(asked, all_around), windings=False, compared=False)
         found = search(replace(rough, deadline=max(ROUGH * end.left, LEAST_TIME)))
         found_at = _found_at(found, all_around)
+    share = 1.0 if found is None else FIRST
     tried = {name: _evenly_from(turns, found_at[name]) for name, turns in all_around.items()}
     try:
-        return tried, _bounded(asked, tried, search, end)
-    except InvalidProblem:
-        # the configurations are too many
-        only = {name: turns[:1] for name, turns in tried.items()}
-        return only, _bounded(asked, only, search, end)
+        try:
+            return tried, _bounded(asked, tried, search, share * end.left)
+        except InvalidProblem:
+            # the configurations are too many
+            only = {name: turns[:1] for name, turns in tried.items()}
+            return only, _bounded(asked, only, search, share * end.left)
+    except DeadlineExceeded:
+        if found is None:
+            raise
+        return all_around, found
 
 
-def _bounded(asked: WorkRound, tried: Mapping[str, Sequence[Turns]], search: Search, end: Deadline) -> RoundSolution:
-    """The round at some orientations of each stop, with the bound over all of them."""
-    return search(replace(_at(asked, tried, bounded=True), deadline=max(FIRST * end.left, LEAST_TIME)))
+def _bounded(asked: WorkRound, tried: Mapping[str, Sequence[Turns]], search: Search, time: float) -> RoundSolution:
+    """The round at some orientations of each stop, with the bound over all of them, in so much time [s]."""
+    return search(replace(_at(asked, tried, bounded=True), deadline=max(time, LEAST_TIME)))
 
 
 def _evenly_from(turns: Sequence[Turns], at: Turns) -> list[Turns]:

@@ -212,7 +212,7 @@ class RoundSearch(LazySearch):
     @property
     def leaves_better(self) -> bool:
         """Whether some chain has a bound below the best one, where legs weigh more than their bounds: through passes,
-        and in a round of many stops."""
+        and in a rough round or one of many stops."""
         if self.routes_left or not (self.asked.passes or self._is_rough):
             return self.routes_left
         return self.leaves_chains

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -42,6 +43,8 @@ OVERRUN = 0.1
 TILT, ON_MANIFOLD, EXACT = 0.3, 1e-8, 1e-9
 # relative: by so much a round at given orientations may be better than one at chosen ones, which are local optima
 CHOSEN = 1e-3
+# s: less than any motion takes
+FAR_TOO_SHORT = 1e-3
 
 
 def down(at: tuple[float, float, float]) -> Pose:
@@ -207,3 +210,20 @@ def test_a_stop_out_of_reach_at_every_orientation_is_one_pose() -> None:
     with pytest.raises(UnreachablePose) as refusal:
         optimize_round(free_stops(stops=[far]))
     assert refusal.value.target == "stops/pick"
+
+
+@pytest.mark.usefixtures("few_angles")
+def test_without_time_for_full_turns_the_round_without_them_is_the_answer() -> None:
+    def search(asked: WorkRound) -> RoundSolution:
+        if asked.windings:
+            raise DeadlineExceeded([])
+        return optimize_round(asked)
+
+    asked = free_stops(windings=True)
+    found = free_orientations.with_free_orientations(asked, search, time.perf_counter)
+    assert_true(asked, found)
+    assert found.status == "feasible"
+    assert_reached(found, asked.arm, "pick", (0.5, -0.2, 0.1))
+    # with nothing known, the refusal says that there was no time
+    with pytest.raises(DeadlineExceeded):
+        optimize_round(replace(asked, deadline=FAR_TOO_SHORT))
