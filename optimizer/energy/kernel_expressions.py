@@ -11,7 +11,7 @@ import numpy as np
 
 from models.robot import Array, Drives, FrictionLaw, Robot
 from optimizer.energy.inverse_dynamics import SymbolicPayload, inverse_dynamics
-from optimizer.energy.losses import drawn_power, friction_torque, power_flow, smooth_abs
+from optimizer.energy.losses import drawn_power, flow_with, friction_torque, smooth_abs
 
 # Held while expressions are built, turned into functions, mapped or freed. CasADi works on them without Python's global
 # lock, all expressions share constants and caches, and only some of its builds guard these against other threads.
@@ -136,7 +136,8 @@ def build(robot: Robot) -> list[ca.Function]:
     `torque`(y, p) → tau: rigid body and rotor torque [N·m].
     `value`(y, p) → cost [W], tau_limited [N·m]: the torque that is limited, see `limited_torque`.
     `node`(y, multiplier, weight, p) → cost, tau_limited, gradient of the cost, Jacobian of tau_limited (nq, 3 nq), and
-    the Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_limited. y = (q, v, a) stacked.
+    the Hessian (3 nq, 3 nq) of weight · cost + multiplier · tau_limited, without what the smoothed reversal of friction
+    makes concave. y = (q, v, a) stacked.
     """
     with SYMBOLICS:
         return _functions(robot)
@@ -168,20 +169,36 @@ def _functions(robot: Robot) -> list[ca.Function]:
 def _power(par: Parameters, tau: ca.SX, v: ca.SX, a: ca.SX, multiplier: ca.SX) -> _Power:
     """Cost and friction at torque tau, speed v and acceleration a, differentiated before these are put in."""
     nq = tau.numel()
-    t, w, x = (ca.SX.sym(name, nq) for name in "twx")
+    t, w, x, lost = (ca.SX.sym(name, nq) for name in ("t", "w", "x", "lost"))
     inner = ca.vertcat(t, w, x)
-    cost = _cost(par, t, w, x)
+    law = friction_torque(par.friction, par.drives, t, w, x, ca)
+    by_friction = _cost(par, t, w, lost)
+    cost, worth = ca.substitute([by_friction, ca.gradient(by_friction, lost)], [lost], [law])
     bend, slope = ca.hessian(cost, inner)
-    friction = (1 - par.link_side) * friction_torque(par.friction, par.drives, t, w, x, ca)
+    bend[nq : 2 * nq, nq : 2 * nq] -= ca.diag(_concave(par, worth, t, w, x))
+    friction = (1 - par.link_side) * law
     friction_bend, _ = ca.hessian(ca.dot(multiplier, friction), inner)
     local = [cost, friction, slope, bend, ca.jacobian(friction, inner), friction_bend]
     return _Power(*ca.substitute(local, [t, w, x], [tau, v, a]))
 
 
-def _cost(par: Parameters, t: ca.SX, w: ca.SX, x: ca.SX) -> ca.SX:
-    """Smoothed cost [W] for torques t, speeds w and accelerations x."""
+def _concave(par: Parameters, worth: ca.SX, t: ca.SX, w: ca.SX, x: ca.SX) -> ca.SX:
+    """What the smoothed reversal of friction takes from the cost's second derivatives by speed (nq,), where it does.
+
+    |v| is convex, v² / sqrt(v² + knee²) is not beyond its knee. `worth` (nq,) is the cost's derivative by friction.
+    """
+    dry = replace(par.friction, curved=0 * par.curved, viscous=0 * par.viscous)
+    reversal = friction_torque(dry, par.drives, t, w, x, ca)
+    curvature = worth * ca.diag(ca.jacobian(ca.diag(ca.jacobian(reversal, w)), w))
+    # the least of this and zero
+    concave: ca.SX = (curvature - ca.fabs(curvature)) / 2
+    return concave
+
+
+def _cost(par: Parameters, t: ca.SX, w: ca.SX, lost: ca.SX) -> ca.SX:
+    """Smoothed cost [W] for torques t, speeds w and friction torques `lost`."""
     # the inverter's |i| is smoothed over a tenth of an ampere per watt of width
-    flow = power_flow(t, w, x, par.drives, par.friction, 0.1 * par.width, ca)
+    flow = flow_with(lost, t, w, par.drives, 0.1 * par.width, ca)
     shared = drawn_power(par.base_power + ca.sum1(flow.joints), par.regeneration, par.width, ca)
     # one corner per joint instead of one for all: each is smoothed over its share of the width
     isolated = par.base_power + ca.sum1(drawn_power(flow.joints, 0, par.width / t.numel(), ca))

@@ -62,7 +62,11 @@ def power_flow(
     tau (..., nq) [N·m] are torques of rigid body and rotor, without friction; v [rad/s], a [rad/s²] (..., nq). `width`
     [A] smooths the |i| of the inverter.
     """
-    lost = friction_torque(friction, drives, tau, v, a, xp)
+    return flow_with(friction_torque(friction, drives, tau, v, a, xp), tau, v, drives, width, xp)
+
+
+def flow_with(lost: Any, tau: Any, v: Any, drives: Drives, width: Any = 0.0, xp: Any = np) -> PowerFlow:
+    """Losses and shaft power of every joint at friction torques `lost` (..., nq) [N·m]; see `power_flow`."""
     tau_motor = tau + lost
     i = tau_motor / drives.torque_constant
     inverter = (

@@ -21,6 +21,9 @@ DEGREE = 5
 REST_POINTS = 3
 # least number of quadrature nodes of the cost, and of grid points at which the peaks of the rates are searched
 LEAST_NODES = 31
+# least number of nodes per span: the power v · a of a constant inertia has degree 7, for which four are exact. With
+# three, motions gained energy that the quadrature lost, and the Hessian had a negative eigenvalue per joint and end
+LEAST_PER_SPAN = 4
 GRID_POINTS = 512
 # points at which path constraints are bounded; an excess between them is found afterwards and repaired
 PATH_POINTS = 96
@@ -153,7 +156,7 @@ class Basis:
         With no `grid_points`, the grid is too coarse for peaks.
         """
         spans = len(np.unique(knots)) - 1
-        nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), 3))
+        nodes, weights = quadrature(knots, max(math.ceil(least_nodes / spans), LEAST_PER_SPAN))
         edges = np.unique(knots)
         # slightly inside the span: at a repeated knot jerk jumps, and both of its values count
         per_span = 4 * max(math.ceil(grid_points / spans / 4), 4 if grid_points else 1)

@@ -14,7 +14,7 @@ from models.registry import load_figures, load_robot
 from models.robot import Array, Robot
 from optimizer.certificate import certify
 from optimizer.energy.kernel import Kernel
-from optimizer.energy.kernel_expressions import Parameters, build
+from optimizer.energy.kernel_expressions import build
 from optimizer.energy.kernel_functions import Interpreted
 from optimizer.energy.limited_torque import greatest_smooth_part, limited_torque
 from optimizer.energy.losses import drawn_power, power_flow
@@ -23,7 +23,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.arm import Payload
 from optimizer.replay.evaluate import evaluate
 from optimizer.replay.recording import Log, LogBlock
-from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, states
+from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, left_out, places, states
 from tests.optimizer.moves import PAYLOAD, ROBOT, TILTED, problem, torques
 
 LOAD = np.array([0.08, 0.2, 0.1, 0.05, 0.0, 0.15])
@@ -88,7 +88,7 @@ def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
     p = prepared.parameters(electrical=1.0)
     exact = p.copy()
     for name, value in {"knee": arm.friction_law.knee, "width": 1e-9, "bend": 0.0}.items():
-        exact[_places(name)] = value
+        exact[places(name)] = value
     q, v, a = y[:, :6], y[:, 6:12], y[:, 12:]
     tau = torques(prepared.problem, q, v, a)
     net = arm.base_power + power_flow(tau, v, a, arm.drives, arm.friction_law).joints.sum(axis=1)
@@ -98,6 +98,9 @@ def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
 
     multiplier, weight = np.random.default_rng(3).normal(size=(len(y), 6)), np.linspace(0.5, 1.5, len(y))
     _, _, gradient, jacobian, hessian = (x.copy() for x in kernel.node(y, multiplier, weight, p))
+    rigid = tau - arm.drives.rotor_inertia * a
+    dry = arm.friction_law.coulomb + arm.friction_law.load * np.sqrt(rigid**2 + p[places("bend")] ** 2)
+    hessian += left_out(kernel, y, weight, p, dry)
     for i in range(18):
         up, down = (y + sign * STEP * np.eye(18)[i] for sign in (1, -1))
         values = [[x.copy() for x in kernel.value(each, p)] for each in (up, down)]
@@ -108,13 +111,6 @@ def test_the_kernels_cost_and_its_derivatives(side: Any) -> None:
         pull = [weight[:, None] * g + np.einsum("nj,njk->nk", multiplier, rows) for _, _, g, rows, _ in sides]
         row = (pull[0] - pull[1]) / (2 * STEP)
         assert np.abs(hessian[:, i] - row).max() < DIFFERENCE * np.abs(hessian).max()
-
-
-def _places(name: str) -> Array:
-    """Indices of a parameter in the packed vector."""
-    fields = Parameters.__dataclass_fields__
-    sizes = {field: symbol.numel() for field, symbol in vars(Parameters.symbols(6)[0]).items()}
-    return np.flatnonzero(Parameters(**{n: np.full(sizes[n], n == name) for n in fields}).pack())
 
 
 @pytest.mark.parametrize("method", ["bspline", "time_scaling", "lagrange"])

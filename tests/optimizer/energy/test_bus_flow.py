@@ -21,6 +21,7 @@ from optimizer.problem.arm import Inverter, Payload
 from optimizer.problem.bus import Bus
 from optimizer.search.lower_bound import lower_bounds
 from optimizer.solution import Solution
+from tests.optimizer.energy.kernel_states import left_out
 from tests.optimizer.moves import ROBOT, limits, problem
 from tests.selection import long_but
 
@@ -235,6 +236,7 @@ def test_the_kernel_knows_the_mode(mode: Any) -> None:
     assert np.abs(cost - exact).max() < KERNEL_SMOOTHING
     weight, none = np.ones(50), np.zeros((50, 6))
     gradient, hessian = (task.kernel.node(y, none, weight, p)[i].copy() for i in (2, 4))
+    hessian += left_out(task.kernel, y, weight, p, task.friction.coulomb)
     h = 1e-6
     for k in range(18):
         step = np.zeros(18)

@@ -16,7 +16,7 @@ from optimizer.energy.kernel_cache import compile_kernel
 from optimizer.energy.kernel_expressions import Parameters, build
 from optimizer.energy.kernel_functions import Interpreted
 from optimizer.energy.losses import drawn_power, power_flow
-from tests.optimizer.energy.kernel_states import LOSSY, NODES, TASK, TORQUE, states
+from tests.optimizer.energy.kernel_states import LOSSY, NODES, TASK, TORQUE, left_out, states
 from tests.optimizer.moves import ROBOT, torques
 
 # relative to the largest candidate; compiler and virtual machine evaluate the same few thousand operations
@@ -107,7 +107,10 @@ def differences(function: str, interpreted: Kernel, y: Array, p: Array) -> list[
 
 @pytest.mark.parametrize("weights", OBJECTIVES, ids=str)
 def test_derivatives_are_the_slopes(compiled: Kernel, weights: dict[str, float]) -> None:
-    """First derivatives against differences of the values, second ones against differences of the first."""
+    """First derivatives against differences of the values, second ones against differences of the first.
+
+    Without what friction's reversal makes concave.
+    """
     y, p = states(5), TASK.parameters(**weights)
     weight, multiplier = np.linspace(0.5, 1.5, NODES), multipliers()
     _, _, gradient, jacobian, hessian = (array.copy() for array in compiled.node(y, multiplier, weight, p))
@@ -116,7 +119,8 @@ def test_derivatives_are_the_slopes(compiled: Kernel, weights: dict[str, float])
     assert np.abs(jacobian - tau_slope.transpose(0, 2, 1)).max() < DIFFERENCE * np.abs(tau_slope).max()
     _, _, gradient_slope, jacobian_slope, _ = differences("node", compiled, y, p)
     expected = weight[:, None, None] * gradient_slope + np.einsum("nj,nijk->nik", multiplier, jacobian_slope)
-    assert np.abs(hessian - expected).max() < DIFFERENCE * np.abs(expected).max()
+    concave = left_out(compiled, y, weight, p, TASK.friction.coulomb)
+    assert np.abs(hessian + concave - expected).max() < DIFFERENCE * np.abs(expected).max()
     assert np.abs(hessian - hessian.transpose(0, 2, 1)).max() < ROUNDING * np.abs(hessian).max()
 
 

@@ -22,7 +22,7 @@ from optimizer.prepared_problem import PreparedProblem
 from optimizer.problem.problem import Problem
 from optimizer.replay.evaluate import evaluate
 from optimizer.replay.recording import Log, LogBlock
-from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, states
+from tests.optimizer.energy.kernel_states import LOSSY, TORQUE, left_out, states
 from tests.optimizer.moves import GOAL, PAYLOAD, ROBOT, START, TILTED, limits, problem, torques
 
 LINK = replace(ROBOT, torque_side="link", drives=LOSSY)
@@ -67,6 +67,7 @@ def test_derivatives_are_the_slopes() -> None:
     y = states(13)
     multiplier, weight = np.random.default_rng(3).normal(size=(len(y), 6)), np.linspace(0.5, 1.5, len(y))
     _, _, _, jacobian, hessian = (array.copy() for array in kernel.node(y, multiplier, weight, p))
+    hessian += left_out(kernel, y, weight, p, LINK.friction.coulomb)
     for i in range(18):
         up, down = (y + side * STEP * np.eye(18)[i] for side in (1, -1))
         tau = [kernel.value(each, p)[1].copy() for each in (up, down)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +12,17 @@ from models.robot import Array
 from optimizer.nlp.nonlinear_program import NonlinearProgram
 from optimizer.nlp.passing import Passing
 from optimizer.nlp.sliding_ends import Slide
+from tests.optimizer.energy.kernel_states import places
 
-# s, and of a step
+# duration [s], and length of a step
 DURATION, STEP = 2.0, 1e-3
+
+
+def without_dry_friction(program: NonlinearProgram) -> NonlinearProgram:
+    """The program of an arm whose friction has no step: the Hessian leaves out what its reversal makes concave."""
+    p = program.p.copy()
+    p[places("coulomb", program.kernel.nq)] = 0.0
+    return replace(program, p=p)
 
 
 def assert_curvature(

@@ -14,7 +14,7 @@ from optimizer.trajectories import bspline
 from optimizer.trajectories.passing import deviations
 from optimizer.trajectories.spline import spline_of
 from tests.optimizer.moves import GOAL, ROBOT, START, problem
-from tests.optimizer.nlp.second_differences import assert_curvature
+from tests.optimizer.nlp.second_differences import assert_curvature, without_dry_friction
 
 ROUNDING = 1e-12
 # relative; of second differences with steps of 1e-3
@@ -65,7 +65,7 @@ def test_steps_in_the_null_space_keep_the_passes_to_second_order() -> None:
 
 
 def test_the_curvature_is_that_of_the_cost_along_the_curves_that_pass() -> None:
-    own = program()
+    own = without_dry_friction(program())
     passes = Passes(own, PASSES)
     free, at = passes.put(straight(own))
     kept = at.null_space(free.size)
