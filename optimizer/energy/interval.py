@@ -6,6 +6,7 @@ motion, a mean power times its duration; and the friction of another day. See `m
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,7 +44,7 @@ def with_interval(energy: Energy, sensitivity: Sensitivity, duration: float, arm
 def interval_of(known: Known, arm: Arm) -> EnergyInterval:
     """P5, P95, standard deviation [J], and each source's share of the variance."""
     spread, gradient = arm_spread(arm), known.sensitivity.gradient
-    low, high = _ends(_drawn(spread, known, 0))
+    low, high = _ends(_drawn(spread, known, 0)).tolist()
     parts = {name: float(gradient @ covariance @ gradient) for name, covariance in spread.covariances.items()}
     if spread.move_sd:
         parts[MOVE] = (known.duration * spread.move_sd) ** 2
@@ -54,11 +55,19 @@ def interval_of(known: Known, arm: Arm) -> EnergyInterval:
 
 def saving_interval(ours: Known, theirs: Known, arm: Arm) -> SavingInterval:
     """P5, P95 and standard deviation of 1 - ours / theirs, with errors that both motions share; 0 where theirs is 0."""
+    return saving_intervals(ours, [theirs], arm)[0]
+
+
+def saving_intervals(ours: Known, theirs: Sequence[Known], arm: Arm) -> list[SavingInterval]:
+    """The `saving_interval` to each of several energies."""
+    if not theirs:
+        return []
     spread = arm_spread(arm)
-    first, second = (_drawn(spread, each, k) for k, each in enumerate((ours, theirs)))
+    first, second = _drawn(spread, ours, 0)[:, None], np.stack([_drawn(spread, each, 1) for each in theirs], axis=1)
     size = np.abs(second)
-    saving = np.divide(second - first, size, out=np.zeros_like(size), where=size > 0)
-    return SavingInterval(*_ends(saving), float(saving.std()))
+    savings = np.divide(second - first, size, out=np.zeros_like(size), where=size > 0)
+    found = np.append(_ends(savings), savings.std(axis=0)[None], axis=0)
+    return [SavingInterval(*each) for each in found.T.tolist()]
 
 
 def _drawn(spread: Spread, known: Known, move: int) -> Array:
@@ -67,6 +76,6 @@ def _drawn(spread: Spread, known: Known, move: int) -> Array:
     return np.asarray(mean + spread.draws @ gradient + known.duration * spread.move_draws[move])
 
 
-def _ends(draws: Array) -> tuple[float, float]:
-    low, high = np.quantile(draws, [0.05, 0.95])
-    return float(low), float(high)
+def _ends(draws: Array) -> Array:
+    """P5 and P95 (2, ...) of draws (n, ...)."""
+    return np.asarray(np.quantile(draws, [0.05, 0.95], axis=0))

@@ -132,11 +132,19 @@ class Plant:
         return float(pin.computePotentialEnergy(self.model, self._data, q))
 
     def energy(self, spline: Spline) -> Energy:
-        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
+        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas.
+
+        That of the last motion is kept, as its samples are.
+        """
+        for known, energy in self._last_energy:
+            if known is spline:
+                return energy
         weights, _, v, a, tau = self._report_samples(spline)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
-        return breakdown(weights, v, a, tau, change, self.arm)
+        found = breakdown(weights, v, a, tau, change, self.arm)
+        self._last_energy[:] = [(spline, found)]
+        return found
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a spline motion hangs on the arm's figures."""
@@ -154,6 +162,10 @@ class Plant:
         found = weights, q, v, a, self.torques(q, v, a)
         self._last_report[:] = [(spline, found)]
         return found
+
+    @cached_property
+    def _last_energy(self) -> list[tuple[Spline, Energy]]:
+        return []
 
     @cached_property
     def _last_report(self) -> list[tuple[Spline, tuple[Array, Array, Array, Array, Array]]]:

@@ -41,20 +41,22 @@ def energy_sensitivity(
 ) -> Sensitivity:
     """That of a motion to the errors of `spread`; q (k, nq) [rad], the other arguments as in `losses.breakdown`."""
     rates, by_link, joints = _power_rates(q, v, a, tau, arm, spread)
-    figures, size, nq = rates.shape
+    size, figures, nq = rates.shape
     base, behind = np.full(size, arm.base_power), count(nq)
     if arm.bus.mode == "isolated":
         # by figure and joint, as PER_JOINT orders them
         root, mean = spread.root[1:behind].reshape(figures, nq, -1), spread.mean[1:behind].reshape(figures, nq)
-        means = joints + np.einsum("ckj,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
-        factors = (rates.transpose(2, 1, 0) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
+        means = joints + np.einsum("kcj,cj->kj", rates, mean) + by_link @ spread.mean[behind:]
+        factors = (rates.transpose(2, 0, 1) @ root.transpose(1, 0, 2)).transpose(1, 0, 2)
         worth, expected = _expected(means, factors + by_link @ spread.root[behind:], np.zeros(nq))
         drawn, plain = base + spread.mean[0] + expected.sum(axis=1), base + np.maximum(joints, 0.0).sum(axis=1)
         electronics, watts = np.ones(size), weights[:, None] * worth
-        gradient = np.append(np.einsum("kj,ckj->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link))
+        gradient = np.append(np.einsum("kj,kcj->cj", watts, rates).ravel(), np.einsum("kj,kjp->p", watts, by_link))
     else:
         net, taken = base + joints.sum(axis=1), _taken(arm, joints, weights)
-        flat = np.hstack([rates.transpose(1, 0, 2).reshape(size, -1), by_link.sum(axis=1)])
+        flat = rates.reshape(size, -1)
+        if by_link.shape[2]:
+            flat = np.hstack([flat, by_link.sum(axis=1)])
         means = net + spread.mean[0] + flat @ spread.mean[1:]
         electronics, drawn = _expected(means, flat @ spread.root[1:] + spread.root[0], taken)
         plain = np.maximum(net, 0.0) - taken * np.maximum(-net, 0.0)
@@ -71,7 +73,7 @@ def waiting_sensitivity(
     still = np.zeros((1, len(tau)))
     rates, by_link, _ = _power_rates(q[None], still, still, tau[None], arm, spread)
     electronics = motors + (brakes if cycle.brake_power is None else 0.0)
-    gradient = np.concatenate([[electronics], motors * rates[:, 0].ravel(), motors * by_link[0].sum(axis=0)])
+    gradient = np.concatenate([[electronics], motors * rates[0].ravel(), motors * by_link[0].sum(axis=0)])
     return Sensitivity(gradient, float(gradient @ spread.mean))
 
 
@@ -95,7 +97,7 @@ def _taken(arm: Arm, joints: Array, weights: Array) -> Array:
 
 
 def _power_rates(q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spread) -> tuple[Array, Array, Array]:
-    """Derivatives (c, k, nq) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
+    """Derivatives (k, c, nq) of each joint's power by its figures in PER_JOINT, those (k, nq, p) by the parameters of
     all links, of which p = 0 have errors where the links are known, and the power (k, nq) itself [W]."""
     drives, law = arm.drives, arm.friction_law
     u = tau + friction_torque(law, drives, tau, v, a)
@@ -120,7 +122,8 @@ def _power_rates(q: Array, v: Array, a: Array, tau: Array, arm: Arm, spread: Spr
         "inverter_linear": size,
         "inverter_quadratic": square,
     }
-    return np.stack([rates[name] for name in PER_JOINT]), by_rigid[:, :, None] * _of_links(q, v, a, arm, spread), joints
+    by_link = by_rigid[:, :, None] * _of_links(q, v, a, arm, spread)
+    return np.stack([rates[name] for name in PER_JOINT], axis=1), by_link, joints
 
 
 def _of_links(q: Array, v: Array, a: Array, arm: Arm, spread: Spread) -> Array:

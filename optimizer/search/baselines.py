@@ -20,7 +20,7 @@ import numpy as np
 
 from models.robot import Array
 from optimizer.energy.dwell import dwell_energy, holding_power, waits
-from optimizer.energy.interval import Known, arm_spread, saving_interval
+from optimizer.energy.interval import Known, arm_spread, saving_intervals
 from optimizer.energy.limited_torque import limited_torque
 from optimizer.energy.losses import breakdown
 from optimizer.energy.sensitivity import energy_sensitivity, waiting_sensitivity
@@ -103,10 +103,8 @@ def with_saving_intervals(table: list[Baseline], problem: Problem, ours: Known) 
     if problem.objective != "electrical":
         return table
     known = [Known(each.electrical, each.sensitivity, each.duration) for each in table]
-    return [
-        replace(each, saving_interval=saving_interval(ours, theirs, problem.arm))
-        for each, theirs in zip(table, known, strict=True)
-    ]
+    intervals = saving_intervals(ours, known, problem.arm)
+    return [replace(each, saving_interval=interval) for each, interval in zip(table, intervals, strict=True)]
 
 
 def guesses(problem: Problem, q_start: Array, q_goal: Array, duration: float) -> dict[BaselineName, SampledMotion]:
