@@ -36,6 +36,7 @@ from optimizer.solution import Solution
 from optimizer.trajectories import bspline
 from tests.optimizer.clocks import LAST_READINGS, CountingClock, still
 from tests.optimizer.moves import GOAL, HOME, PAYLOAD, ROBOT, START, TILTED, fixed, paper_poses, problem, tcp_pose
+from tests.optimizer.nlp.second_differences import without_dry_friction
 from tests.selection import long_but
 
 # the certificate's, of positions [m] and angles [rad]
@@ -132,7 +133,9 @@ def test_a_programme_with_its_goal_unknown_has_true_derivatives() -> None:
     space, interval = bspline.uniform(9), duration_intervals(task, GOAL)[0]
     coordinates = Coordinates.joints(START, GOAL, task.arm.active_limits)
     free_end = GoalConstraints(np.eye(6), np.full(6, -1.0), np.full(6, 1.0), 1.0)
-    program = NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=free_end)
+    program = without_dry_friction(
+        NonlinearProgram(task.kernel, space, interval.p, coordinates, 0.1, 10.0, goal_constraints=free_end)
+    )
     rng = np.random.default_rng(3)
     free = np.linspace(START, GOAL, program.free_count) + rng.normal(scale=0.1, size=(program.free_count, 6))
     assert (program.points(free)[-3:] == free[-1]).all()

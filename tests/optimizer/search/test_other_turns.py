@@ -26,8 +26,10 @@ AMPLE = 300.0
 # UR5e: the second joint has 3.0 rad to go one way around, and 3.2 rad the other
 START = np.array([-0.56, 2.62, -0.15, -2.88, -1.61, 1.48])
 GOAL = np.array([-0.53, 5.82, 0.81, -1.87, -1.16, 0.96])
-# relative: two searches that end at the tolerance of their solves
+# rad: a joint that goes another way is turned by far more
 SAME = 2e-3
+# relative: motions that nothing refines end in local optima apart, where every joint's power has a corner of its own
+LOCAL = 3e-2
 # relative: an estimate of one duration and half the instants
 ROUGH = 0.1
 
@@ -61,7 +63,7 @@ def test_the_other_way_around_is_found_where_it_needs_less() -> None:
     best, known = explored(problem), explored(replace(problem, goal=GOAL))
     one_way = explored(replace(problem, windings=False))
     assert best.energy is not None and known.energy is not None and one_way.energy is not None
-    assert best.energy <= known.energy * (1 + SAME)
+    assert best.energy <= known.energy * (1 + LOCAL)
     # friction alone would have it the other way
     assert abs(best.q_goal[1] - START[1]) > np.pi > abs(one_way.q_goal[1] - START[1])
     assert best.energy < one_way.energy
