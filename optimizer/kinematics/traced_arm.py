@@ -112,8 +112,8 @@ class TracedArm:
             return [], none
         loops, rest = self._nearby.loops(T)
         paths, good = followed(self._chain, loops, T)
-        left = np.flatnonzero(~good).tolist()
-        return paths, np.vstack([none, *map(spread_over, rest), *(spread_over(loops[k][:-1]) for k in left)])
+        left = [each[:-1] for each, held in zip(loops.each(), good.tolist(), strict=True) if not held]
+        return paths, np.vstack([none, *map(spread_over, [*rest, *left])])
 
     def _beside(self, T: Array) -> list[Array]:
         """Starts (n, 7) of the arm nearby, beside the pose T (4, 4): the arm itself may reach a little further."""
