@@ -150,10 +150,11 @@ class TracedArm:
         if not paths:
             return []
         stack, found = TracedStack.of(paths), list[TracedCurve]()
-        places, near = stack.places_and_near()
+        places, beside = stack.places_and_near()
+        near = beside.tolist()
         for row in np.argsort(places, kind="stable").tolist():
             # where a curve bends, one start may pass another unseen
-            if not any(near[row, each.row] and each.passes(paths[row].q[0]) for each in found):
+            if not any(near[row][each.row] and each.passes(paths[row].q[0]) for each in found):
                 half = float(stack.half[row])
                 label = NumberedBranch(len(found) + 1)
                 found.append(TracedCurve(self._chain, T, stack, row, label, [(-half, half)]))

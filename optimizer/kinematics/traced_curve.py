@@ -49,6 +49,10 @@ class TracedCurve:
         half = float(stack.half[0])
         return cls(chain, T, stack, 0, label, [(-half, half)])
 
+    def cut(self, arcs: list[tuple[float, float]]) -> TracedCurve:
+        """The same curve on these arcs."""
+        return TracedCurve(self.chain, self.T, self.stack, self.row, self.label, arcs)
+
     @property
     def nodes(self) -> Array:
         """The points (m, nq) [rad] that it is known by, without full turns left out."""

@@ -6,7 +6,7 @@ A cubic is within the hull of its four control points: most are inside all limit
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[Tr
         return list(curves)
     cut = _cut(curves, limits)
     return [
-        curve if arcs == curve.arcs else replace(curve, arcs=arcs)
+        curve if arcs == curve.arcs else curve.cut(arcs)
         for curve, arcs in zip(curves, cut, strict=True)
         if arcs
     ]
@@ -77,27 +77,32 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
             at = _crossings(curves[0], limits, piece, share[parts], excess[row, parts])
     gap = stack.knots[np.minimum(piece + 1, len(inside) - 1)] - stack.knots[piece]
     ends = stack.knots[piece] + at * gap
-    crossed = np.split(ends, np.searchsorted(piece, stack.last[:-1]))
+    # piece by piece, and so curve by curve
+    crossed, behind = ends.tolist(), [0, *np.searchsorted(piece, stack.last).tolist()]
     first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
-    return [_arcs(each, crossed[each.row].tolist(), first[each.row], last[each.row]) for each in curves]
+    return [_arcs(each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row])
+            for each in curves]
 
 
 def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
     """Which nodes (n,) are inside limits, and the rows of those nodes after which the cubic may cross one."""
     q, tangents = stack.nodes[:, limits.joints], stack.tangents[:, limits.joints]
+    own = wrapped(q - limits.middle)
+    inside: Mask = np.logical_and.reduce(np.abs(own) <= limits.half, axis=1)
     points = np.empty((4, len(q) - 1, len(limits.joints)))
-    points[0] = wrapped(q[:-1] - limits.middle)
+    points[0] = own[:-1]
     # the other ones without full turns left out
     third = stack.ways[:-1, None] / 3
     points[1], points[3] = points[0] + third * tangents[:-1], points[0] + (q[1:] - q[:-1])
     points[2] = points[3] - third * tangents[1:]
-    least, most = points.min(axis=0), points.max(axis=0)
-    held = ((least >= -limits.half) & (most <= limits.half)).all(axis=1)
+    least, most = np.minimum.reduce(points, axis=0), np.maximum.reduce(points, axis=0)
+    low, high = least >= -limits.half, most <= limits.half
+    held = np.logical_and.reduce(low & high, axis=1)
     beyond = 2 * np.pi - limits.half
     outside = ((least > limits.half) & (most < beyond)) | ((most < -limits.half) & (least > -beyond))
-    inside: Mask = np.asarray((np.abs(wrapped(q - limits.middle)) <= limits.half).all(axis=1))
     # of nodes on a limit, rounding may have it that hull and node differ
-    crossing = ~(held & inside[:-1] & inside[1:]) & ~(outside.any(axis=1) & ~inside[:-1] & ~inside[1:])
+    both, either = inside[:-1] & inside[1:], inside[:-1] | inside[1:]
+    crossing = ~(held & both) & (either | ~np.logical_or.reduce(outside, axis=1))
     crossing[stack.last[:-1]] = False
     return inside, np.flatnonzero(crossing)
 
