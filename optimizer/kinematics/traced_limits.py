@@ -11,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from models.robot import Array, Mask
-from optimizer.kinematics.across_curve import LEFT, step_to
+from optimizer.kinematics.across_curve import LEFT, led
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.traced_curve import TracedCurve, on_curve
 from optimizer.kinematics.traced_stack import Rows, TracedStack
 
 # parts of a piece that may cross limits, between whose ends it is held against them
 PARTS = 8
-# steps of Newton's method to where a curve crosses limits, and steps that find what it does not
-STEPS, CROSSINGS = 5, 16
-# longest step there, and distance [rad] from the cubics within which a curve is
+# steps to where a curve crosses limits, if Newton's method does not find it
+CROSSINGS = 16
+# longest step of that, and distance [rad] from the cubics within which a curve is
 NEAR = 0.05
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
@@ -154,11 +154,7 @@ def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]
     target = q[rows, joint] + side * (limits.half[binding] - ROUNDING / 2) - own[rows, binding]
     along = np.zeros((n, nq))
     along[rows, joint] = 1.0
-    for _ in range(STEPS):
-        move, left = step_to(one.chain, q, along, target - q[rows, joint], one.T)
-        q = q + np.clip(move, -NEAR, NEAR)
-        if left.max() < LEFT:
-            break
+    q, left = led(one.chain, q, along, target - q[rows, joint], one.T, NEAR)
     return q, (left < LEFT) & (limits.excess(q) <= 0)
 
 
