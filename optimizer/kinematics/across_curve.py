@@ -11,7 +11,7 @@ from optimizer.kinematics.chain import Chain
 # added to the diagonal of a system that may be singular; square of a length that is none
 TINY, NO_SQUARE = 1e-14, 1e-28
 # steps, and the error of any joint [rad] that needs no other
-STEPS, LEFT = 5, 1e-12
+STEPS, LEFT = 5, 2e-11
 # length [rad] of no step
 NONE = 1e-300
 # share of a step that the second order adds to it, below which its matrices serve for another one

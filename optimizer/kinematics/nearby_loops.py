@@ -18,7 +18,7 @@ from models.robot import Array, Mask
 from optimizer.kinematics.across_curve import step_across
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.curve_tracing import BENT, LONGEST, TracedPath, turns
+from optimizer.kinematics.curve_tracing import LONGEST, TracedPath, turns
 from optimizer.kinematics.redundant_curve import CurveStack
 from optimizer.kinematics.redundant_pose import RedundantPose
 
@@ -29,6 +29,8 @@ STEPS, STARTS = 12, 3
 LONG, PART, MOST_PARTS, BENT_BY, LEAST, ROUNDS = 0.75, 0.4, 16, 0.35, 0.03, 5
 # farthest points that are kept along a curve [rad], and most that it bends between them [rad]
 SPACED, TURNED = 0.6, 0.4
+# least cosine of tangents at both ends of a step, and of those with it
+BENT = 0.8
 # the last angle all around [rad]
 WHOLE = (-np.pi, np.pi)
 # distance [rad] of two ends of curves that are one point, and of a third that is not

@@ -18,6 +18,7 @@ from optimizer.kinematics.traced_stack import Rows, TracedStack
 
 # parts of a piece that may cross limits, between whose ends it is held against them
 PARTS = 8
+SHARES = np.linspace(0.0, 1.0, PARTS + 1)
 # steps to where a curve crosses limits, if Newton's method does not find it
 CROSSINGS = 16
 # longest step of that, and distance [rad] from the cubics within which a curve is
@@ -41,9 +42,9 @@ class _Range:
         return cls(joints, ((q_min + q_max) / 2)[joints], ((q_max - q_min) / 2)[joints])
 
     def excess(self, q: Array) -> Array:
-        """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
-        away = np.abs(wrapped(q[:, self.joints] - self.middle)) - self.half
-        return np.asarray(away.max(axis=1, initial=-np.pi))
+        """How far (…) [rad] configurations (…, nq) are beyond limits, negative inside."""
+        away = np.abs(wrapped(q[..., self.joints] - self.middle)) - self.half
+        return np.asarray(np.maximum.reduce(away, axis=-1))
 
 
 def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
@@ -66,15 +67,12 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
     inside, undecided = _by_hull(stack, limits)
     at, piece = np.zeros(0), np.zeros(0, dtype=np.intp)
     if len(undecided):
-        share = np.linspace(0.0, 1.0, PARTS + 1)
-        sampled = stack.at(np.repeat(undecided, PARTS + 1), np.tile(share, len(undecided)))
-        excess = limits.excess(sampled).reshape(len(undecided), PARTS + 1)
+        excess = limits.excess(stack.at_each(undecided, SHARES))
         held = excess <= 0
         row, part = np.nonzero(held[:, 1:] != held[:, :-1])
         piece = undecided[row]
         if len(piece):
-            parts = np.array([part, part + 1])
-            at = _crossings(curves[0], limits, piece, share[parts], excess[row, parts])
+            at = _crossings(curves[0], limits, piece, part, excess[row])
     gap = stack.knots[np.minimum(piece + 1, len(inside) - 1)] - stack.knots[piece]
     ends = stack.knots[piece] + at * gap
     # piece by piece, and so curve by curve
@@ -123,22 +121,27 @@ def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> lis
     return arcs
 
 
-def _crossings(one: TracedCurve, limits: _Range, k: Rows, share: Array, excess: Array) -> Array:
-    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, between those given (2, n), at
-    which the cubics exceed them by so much (2, n). `one` is any curve of the pose."""
-    stack = one.stack
-    # a chord crosses limits next to where the curve does
-    at = share[0] - excess[0] * (share[1] - share[0]) / (excess[1] - excess[0])
-    q, exact = _on_limits(one, limits, stack.at(k, at))
-    at = stack.in_line(k, at, q)
-    exact &= (at >= 0) & (at <= 1) & (np.abs(stack.at(k, at) - q).max(axis=1) < NEAR)
+def _crossings(one: TracedCurve, limits: _Range, k: Rows, part: Rows, excess: Array) -> Array:
+    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, in the given parts (n,) of
+    these; the cubics exceed them by so much (n, PARTS + 1) at SHARES. `one` is any curve of the pose."""
+    stack, rows = one.stack, np.arange(len(k))
+    # a parabola through the ends of the part and of the next one crosses limits next to where the curve does
+    low, high = excess[rows, part], excess[rows, part + 1]
+    beside = np.where(part < PARTS - 1, part + 2, part - 1)
+    chord = low / (low - high)
+    bend = (excess[rows, beside] + low + high) / 2 - 1.5 * np.where(beside > part, high, low)
+    root = np.minimum(np.maximum(chord - bend * chord * (chord - 1) / (high - low), 0.0), 1.0)
+    near = stack.at(k, (part + root) / PARTS)
+    q, exact = _on_limits(one, limits, near)
+    at = stack.in_line(k, (part + root) / PARTS, q)
+    exact &= (at >= 0) & (at <= 1) & (np.maximum.reduce(np.abs(near - q), axis=1) < NEAR)
     rest = np.flatnonzero(~exact)
     if len(rest):
         # what is aimed at is inside, by half of what rounding is given
         at[rest] = _zeros(
             lambda share: limits.excess(on_curve(one, k[rest], share)) + ROUNDING / 2,
-            share[:, rest],
-            excess[0, rest] <= 0,
+            np.array([part[rest], part[rest] + 1]) / PARTS,
+            low[rest] <= 0,
         )
     return at
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.kinematics.curve_tracing import TracedPath
-from optimizer.kinematics.hermite import hermite
+from optimizer.kinematics.hermite import hermite, hermite_weights
 
 # half the range of the parameter of a curve with two ends: no full turn, whose ends would be one
 OPEN = 3.0
@@ -95,6 +95,12 @@ class TracedStack:
         """Points (n, nq) [rad] at shares (n,) of the ways from points k (n,) to the next ones."""
         after, way = self._after(k), self.ways[k][:, None]
         return hermite(share, self.nodes[k], self.nodes[after], way * self.tangents[k], way * self.tangents[after])
+
+    def at_each(self, k: Rows, share: Array) -> Array:
+        """Points (n, m, nq) [rad] at each of the shares (m,) of the ways from points k (n,) to the next ones."""
+        after, way = self._after(k), self.ways[k][:, None]
+        ends = [self.nodes[k], self.nodes[after], way * self.tangents[k], way * self.tangents[after]]
+        return np.asarray(hermite_weights(share).T @ np.stack(ends, axis=1))
 
     def along(self, k: Rows, share: Array) -> Array:
         """Directions (n, nq) of the curves there, nearly: members are sought across them."""
