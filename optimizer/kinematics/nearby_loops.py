@@ -18,9 +18,10 @@ from models.robot import Array, Mask
 from optimizer.kinematics.across_curve import step_across
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.curve_tracing import LONGEST, TracedPath, turns
+from optimizer.kinematics.curve_tracing import LONGEST, turns
 from optimizer.kinematics.redundant_curve import CurveStack
 from optimizer.kinematics.redundant_pose import RedundantPose
+from optimizer.kinematics.traced_stack import TracedStack
 
 # steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of these make a loop
 STEPS, STARTS = 12, 3
@@ -187,19 +188,23 @@ def right_curves(pose: RedundantPose) -> CurveStack | None:
 
 def _meeting(ends: Array) -> list[int]:
     """The end (n,) that each of ends (n, 7) [rad] meets, -1 if it meets none or several."""
-    if len(ends) < 2:
-        return [-1] * len(ends)
-    away = np.abs(wrapped(ends[:, None] - ends)).max(axis=2)
-    np.fill_diagonal(away, np.inf)
-    alone = ((away < JOINED).sum(axis=1) == 1) & ((away < APART).sum(axis=1) == 1)
-    met: list[int] = np.where(alone, away.argmin(axis=1), -1).tolist()
-    return met
+    # a wave changes by no more than the sum of what its joints do: few pairs are left
+    wave = np.sin(ends + np.arange(ends.shape[1])).sum(axis=1)
+    near = np.abs(wave[:, None] - wave) < ends.shape[1] * APART
+    i, j = np.triu(near, 1).nonzero()
+    away = np.abs(wrapped(ends[i] - ends[j])).max(axis=1, initial=0.0)
+    others: list[list[tuple[int, bool]]] = [[] for _ in ends]
+    for first, second, one, apart in zip(i.tolist(), j.tolist(), away < JOINED, away < APART, strict=True):
+        if apart:
+            others[first].append((second, bool(one)))
+            others[second].append((first, bool(one)))
+    return [found[0][0] if len(found) == 1 and found[0][1] else -1 for found in others]
 
 
-def followed(chain: Chain, loops: Loops, T: Array) -> tuple[list[TracedPath], Mask]:
+def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
     """The curves that hold the flange at T (4, 4) along loops, and which of the loops (n,) have one."""
     if not loops.counts:
-        return [], np.zeros(0, dtype=bool)
+        return TracedStack.of([]), np.zeros(0, dtype=bool)
     points, end = loops.points, np.cumsum(loops.counts)
     first, final = end - loops.counts, end - 1
     along = np.empty_like(points)
@@ -216,8 +221,10 @@ def followed(chain: Chain, loops: Loops, T: Array) -> tuple[list[TracedPath], Ma
     # from one loop to the next there is no step
     fine[final[:-1]] = True
     good = np.logical_and.reduceat(fine, first)
-    parts = zip(first.tolist(), end.tolist(), good.tolist(), strict=True)
-    return [TracedPath(q[a:b], tangent[a:b], closed=True) for a, b, each in parts if each], np.asarray(good)
+    if not good.all():
+        kept, counts = np.repeat(good, loops.counts), np.array(loops.counts)[good]
+        q, tangent, first = q[kept], tangent[kept], np.cumsum(counts) - counts
+    return TracedStack(q, tangent, first, np.full(int(good.sum()), np.pi)), np.asarray(good)
 
 
 def _onto(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array, Array]:

@@ -42,10 +42,26 @@ class TracedStack:
     @classmethod
     def of(cls, paths: Sequence[TracedPath]) -> TracedStack:
         """The curves along paths."""
+        if not paths:
+            return cls(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0, dtype=np.intp), np.zeros(0))
         counts = [len(path.q) for path in paths]
         half = [np.pi if path.closed else OPEN if count > 1 else 0.0 for path, count in zip(paths, counts, strict=True)]
         nodes, tangents = np.concatenate([path.q for path in paths]), np.concatenate([path.tangents for path in paths])
         return cls(nodes, tangents, np.cumsum([0, *counts[:-1]]), np.array(half))
+
+    def joined(self, paths: Sequence[TracedPath]) -> TracedStack:
+        """These curves, then those along paths."""
+        if not paths:
+            return self
+        others = TracedStack.of(paths)
+        if not len(self.first):
+            return others
+        return TracedStack(
+            np.concatenate([self.nodes, others.nodes]),
+            np.concatenate([self.tangents, others.tangents]),
+            np.concatenate([self.first, others.first + len(self.nodes)]),
+            np.concatenate([self.half, others.half]),
+        )
 
     @cached_property
     def last(self) -> Rows:

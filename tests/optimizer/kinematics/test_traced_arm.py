@@ -140,13 +140,13 @@ def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> 
     assert nearby is not None
     for _ in range(4):
         T = flange(GEN3, inside(GEN3, rng))
-        paths, good = followed(chain, nearby.loops(T)[0], T)
-        assert len(paths) == good.sum()
-        for path in paths:
-            start, _ = solved(chain, path.q[0][None], T)
+        stack, good = followed(chain, nearby.loops(T)[0], T)
+        assert len(stack.first) == good.sum()
+        for first, last in zip(stack.first, stack.last, strict=True):
+            start, _ = solved(chain, stack.nodes[[first]], T)
             (other,) = traced(chain, start, T)
             curve = TracedCurve.of(chain, T, other, NumberedBranch(1))
-            assert other.closed and all(away(curve, q) < SHORT for q in path.q)
+            assert other.closed and all(away(curve, q) < SHORT for q in stack.nodes[first : last + 1])
             count += 1
     assert count > 15
 
