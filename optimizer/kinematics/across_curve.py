@@ -14,8 +14,9 @@ TINY, NO_SQUARE = 1e-14, 1e-28
 STEPS, LEFT = 5, 2e-11
 # length [rad] of no step
 NONE = 1e-300
-# share of a step that the second order adds to it, below which its matrices serve for another one
-ALIKE = 0.1
+# share of a step that the second order adds to it, below which it is added, and below which the step's matrices serve
+# for another one
+HALF, ALIKE = 0.5, 0.1
 # points from which on they are solved for side by side: LAPACK takes as long for each of them
 MANY = 128
 
@@ -55,9 +56,7 @@ def _side_by_side(jacobian: Array, along: Array, error: Array) -> tuple[Array, A
     return np.einsum("in,ijn->nj", rows[:, -1], rows[:, :-1]), tangent.T
 
 
-def led(
-    chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: float = np.inf
-) -> tuple[Array, Array]:
+def led(chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: float = np.inf) -> tuple[Array, Array]:
     """The configurations (n, nq) [rad] with the flange at T (4, 4) next to q (n, nq), with `ahead` (n,) for the product
     of the way there with `along` (n, nq); and the error (n,) [rad] of any joint that they are left with, nearly.
 
@@ -92,14 +91,14 @@ def _step(chain: Chain, q: Array, along: Array, ahead: Array, T: Array) -> tuple
     """A step (n, nq) of `led` and what it leaves (n,), the ratio (n,) of the second order to the first, and the inverse
     matrices (n, nq, nq)."""
     reached, jacobian = chain.flange_and_columns(q)
-    inverse, sides = np.linalg.inv(_system(jacobian, along)), np.zeros(q.shape)
+    inverse, sides = np.asarray(np.linalg.inv(_system(jacobian, along)), dtype=float), np.zeros(q.shape)
     sides[:, :-1], sides[:, -1] = nearly_error(reached, T), ahead
-    move = np.einsum("nij,nj->ni", inverse, sides)
-    more = np.einsum("nij,jn->ni", inverse[:, :, :-1], second_order(jacobian, move.T))
+    move: Array = np.einsum("nij,nj->ni", inverse, sides)
+    more: Array = np.einsum("nij,jn->ni", inverse[:, :, :-1], second_order(jacobian, move.T))
     first, second = (np.maximum.reduce(np.abs(each), axis=1) for each in (move, more))
     first = np.maximum(first, NONE)
-    ratio = second / first
-    small = ratio < 0.5
+    ratio: Array = second / first
+    small = ratio < HALF
     return move - np.where(small[:, None], more, 0.0), np.where(small, ratio * second, first), ratio, inverse
 
 

@@ -160,9 +160,7 @@ class _Reached:
         """All of them; nobody may write to q from here on."""
         self.q.setflags(write=False)
         singularities = Singularities(chain, self.q, form.singular_parts)
-        return list(
-            map(PrincipalSolution, self.q, self.labels, self.curves, repeat(singularities), range(len(self.q)))
-        )
+        return list(map(PrincipalSolution, self.q, self.labels, self.curves, repeat(singularities), range(len(self.q))))
 
 
 class ClosedFormInverseKinematics:
@@ -281,9 +279,7 @@ class ClosedFormInverseKinematics:
         )
 
 
-def _wound(
-    q: Array, owners: Sequence[PrincipalSolution], limits: Limits
-) -> tuple[Array, list[PrincipalSolution]]:
+def _wound(q: Array, owners: Sequence[PrincipalSolution], limits: Limits) -> tuple[Array, list[PrincipalSolution]]:
     """Configurations q (n, nq) [rad] and the branch of each, with every full turn within limits of those that are on no
     curve."""
     wound, found = [np.zeros((0, q.shape[1]))], list[PrincipalSolution]()

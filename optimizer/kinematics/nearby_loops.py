@@ -36,7 +36,7 @@ BENT = 0.8
 WHOLE = (-np.pi, np.pi)
 # distance [rad] of two ends of curves that are one point, and of a third that is not
 JOINED, APART = 1e-4, 1e-2
-# product of lengths of steps [rad²] of which one is none
+# product of lengths [rad²] of which one is none
 NONE = 1e-20
 # longest step of Newton's method [rad] that needs no other, and farthest way [rad] of a point to the curve
 SHORT, MOVED = 0.01, 0.05
@@ -109,8 +109,8 @@ def _grid(whole: tuple[bool, ...]) -> tuple[Array, NDArray[np.intp], NDArray[np.
 
 
 def _points(curves: CurveStack) -> tuple[Array, list[int], Array]:
-    """Points (m, 7) [rad] along the curves from end to end, one curve after the other, where each of them begins, and m;
-    and the configurations at the first and the last point of each, (2n, 7)."""
+    """Points (m, 7) [rad] along the curves from end to end, one curve after the other; where each of them begins, and
+    m; and the configurations at the first and the last point of each, (2n, 7)."""
     u, rows, outer = _grid(tuple(curves.whole.tolist()))
     q = _at(curves, u, rows)
     ends = q[outer]
@@ -188,24 +188,21 @@ def right_curves(pose: RedundantPose) -> CurveStack | None:
 
 def _meeting(ends: Array) -> list[int]:
     """The end (n,) that each of ends (n, 7) [rad] meets, -1 if it meets none or several."""
-    # a wave changes by no more than the sum of what its joints do: few pairs are left
-    wave = np.sin(ends + np.arange(ends.shape[1])).sum(axis=1)
-    near = np.abs(wave[:, None] - wave) < ends.shape[1] * APART
-    i, j = np.triu(near, 1).nonzero()
-    away = np.abs(wrapped(ends[i] - ends[j])).max(axis=1, initial=0.0)
-    others: list[list[tuple[int, bool]]] = [[] for _ in ends]
-    for first, second, one, apart in zip(i.tolist(), j.tolist(), away < JOINED, away < APART, strict=True):
-        if apart:
-            others[first].append((second, bool(one)))
-            others[second].append((first, bool(one)))
-    return [found[0][0] if len(found) == 1 and found[0][1] else -1 for found in others]
+    if len(ends) < 2:
+        return [-1] * len(ends)
+    away = np.abs(wrapped(ends[:, None] - ends)).max(axis=2)
+    np.fill_diagonal(away, np.inf)
+    alone = ((away < JOINED).sum(axis=1) == 1) & ((away < APART).sum(axis=1) == 1)
+    met: list[int] = np.where(alone, away.argmin(axis=1), -1).tolist()
+    return met
 
 
 def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
     """The curves that hold the flange at T (4, 4) along loops, and which of the loops (n,) have one."""
     if not loops.counts:
         return TracedStack.of([]), np.zeros(0, dtype=bool)
-    points, end = loops.points, np.cumsum(loops.counts)
+    points = loops.points
+    end: NDArray[np.intp] = np.cumsum(loops.counts, dtype=np.intp)
     first, final = end - loops.counts, end - 1
     along = np.empty_like(points)
     along[1:-1] = points[2:] - points[:-2]
@@ -222,7 +219,7 @@ def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
     fine[final[:-1]] = True
     good = np.logical_and.reduceat(fine, first)
     if not good.all():
-        kept, counts = np.repeat(good, loops.counts), np.array(loops.counts)[good]
+        kept, counts = np.repeat(good, loops.counts), np.array(loops.counts, dtype=np.intp)[good]
         q, tangent, first = q[kept], tangent[kept], np.cumsum(counts) - counts
     return TracedStack(q, tangent, first, np.full(int(good.sum()), np.pi)), np.asarray(good)
 
@@ -238,4 +235,5 @@ def _onto(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array,
         again, tangent[rows] = step_across(chain, reached[rows], along[rows], T)
         reached[rows] += again
         moved[rows] = np.linalg.norm(reached[rows] - q[rows], axis=1)
-    return reached, tangent / np.sqrt(np.einsum("ij,ij->i", tangent, tangent))[:, None], moved
+    squares = np.maximum(np.einsum("ij,ij->i", tangent, tangent), NONE)
+    return reached, tangent / np.sqrt(squares)[:, None], moved

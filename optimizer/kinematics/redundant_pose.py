@@ -320,6 +320,8 @@ def _angles(polynomial: Polynomial) -> list[float]:
     falling = [*polynomial[degree:0:-1], *(each.conjugate() for each in polynomial[: degree + 1])]
     companion = np.eye(2 * degree, k=-1, dtype=complex)
     companion[0] = [-each / falling[0] for each in falling[1:]]
-    roots = np.linalg.eigvals(companion)
-    near: list[float] = np.angle(roots[np.abs(np.abs(roots) - 1) < NEAR_CIRCLE]).tolist()
-    return near
+    return [
+        atan2(root.imag, root.real)
+        for root in np.linalg.eigvals(companion).tolist()
+        if abs(abs(root) - 1) < NEAR_CIRCLE
+    ]

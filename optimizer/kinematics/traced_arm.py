@@ -9,7 +9,6 @@ the joint ranges does (`seed_table`). Newton's method leads starts onto curves, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np

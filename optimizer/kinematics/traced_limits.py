@@ -13,12 +13,13 @@ import numpy as np
 from models.robot import Array, Mask
 from optimizer.kinematics.across_curve import LEFT, led
 from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.hermite import hermite_weights
 from optimizer.kinematics.traced_curve import TracedCurve, on_curve
 from optimizer.kinematics.traced_stack import Rows, TracedStack
 
 # parts of a piece that may cross limits, between whose ends it is held against them
 PARTS = 8
-SHARES = np.linspace(0.0, 1.0, PARTS + 1)
+WEIGHTS = hermite_weights(np.linspace(0.0, 1.0, PARTS + 1))
 # steps to where a curve crosses limits, if Newton's method does not find it
 CROSSINGS = 16
 # longest step of that, and distance [rad] from the cubics within which a curve is
@@ -42,8 +43,12 @@ class _Range:
         return cls(joints, ((q_min + q_max) / 2)[joints], ((q_max - q_min) / 2)[joints])
 
     def excess(self, q: Array) -> Array:
-        """How far (…) [rad] configurations (…, nq) are beyond limits, negative inside."""
-        away = np.abs(wrapped(q[..., self.joints] - self.middle)) - self.half
+        """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
+        return self.beyond(q[:, self.joints])
+
+    def beyond(self, angles: Array) -> Array:
+        """The same (…) of angles (…, m) [rad] of the joints that have limits."""
+        away = np.abs(wrapped(angles - self.middle)) - self.half
         return np.asarray(np.maximum.reduce(away, axis=-1))
 
 
@@ -54,11 +59,7 @@ def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[Tr
     if not curves or not len(limits.joints):
         return list(curves)
     cut = _cut(curves, limits)
-    return [
-        curve if arcs == curve.arcs else curve.cut(arcs)
-        for curve, arcs in zip(curves, cut, strict=True)
-        if arcs
-    ]
+    return [curve if arcs == curve.arcs else curve.cut(arcs) for curve, arcs in zip(curves, cut, strict=True) if arcs]
 
 
 def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float, float]]]:
@@ -67,7 +68,7 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
     inside, undecided = _by_hull(stack, limits)
     at, piece = np.zeros(0), np.zeros(0, dtype=np.intp)
     if len(undecided):
-        excess = limits.excess(stack.at_each(undecided, SHARES))
+        excess = limits.beyond(stack.at_each(undecided, WEIGHTS, limits.joints))
         held = excess <= 0
         row, part = np.nonzero(held[:, 1:] != held[:, :-1])
         piece = undecided[row]
@@ -78,8 +79,10 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
     # piece by piece, and so curve by curve
     crossed, behind = ends.tolist(), [0, *np.searchsorted(piece, stack.last).tolist()]
     first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
-    return [_arcs(each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row])
-            for each in curves]
+    return [
+        _arcs(each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row])
+        for each in curves
+    ]
 
 
 def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
@@ -123,7 +126,7 @@ def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> lis
 
 def _crossings(one: TracedCurve, limits: _Range, k: Rows, part: Rows, excess: Array) -> Array:
     """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, in the given parts (n,) of
-    these; the cubics exceed them by so much (n, PARTS + 1) at SHARES. `one` is any curve of the pose."""
+    these; the cubics exceed them by so much (n, PARTS + 1) at the ends of all. `one` is any curve of the pose."""
     stack, rows = one.stack, np.arange(len(k))
     # a parabola through the ends of the part and of the next one crosses limits next to where the curve does
     low, high = excess[rows, part], excess[rows, part + 1]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.kinematics.curve_tracing import TracedPath
-from optimizer.kinematics.hermite import hermite, hermite_weights
+from optimizer.kinematics.hermite import hermite
 
 # half the range of the parameter of a curve with two ends: no full turn, whose ends would be one
 OPEN = 3.0
@@ -112,11 +112,14 @@ class TracedStack:
         after, way = self._after(k), self.ways[k][:, None]
         return hermite(share, self.nodes[k], self.nodes[after], way * self.tangents[k], way * self.tangents[after])
 
-    def at_each(self, k: Rows, share: Array) -> Array:
-        """Points (n, m, nq) [rad] at each of the shares (m,) of the ways from points k (n,) to the next ones."""
+    def at_each(self, k: Rows, weights: Array, joints: Rows) -> Array:
+        """Angles (n, m, j) [rad] of some joints (j,) at each of m shares of the ways from points k (n,) to the next
+        ones, by the `hermite_weights` (4, m) of these shares."""
         after, way = self._after(k), self.ways[k][:, None]
-        ends = [self.nodes[k], self.nodes[after], way * self.tangents[k], way * self.tangents[after]]
-        return np.asarray(hermite_weights(share).T @ np.stack(ends, axis=1))
+        ends = np.empty((len(k), 4, self.nodes.shape[1]))
+        ends[:, 0], ends[:, 1] = self.nodes[k], self.nodes[after]
+        ends[:, 2], ends[:, 3] = way * self.tangents[k], way * self.tangents[after]
+        return np.asarray(weights.T @ ends[:, :, joints])
 
     def along(self, k: Rows, share: Array) -> Array:
         """Directions (n, nq) of the curves there, nearly: members are sought across them."""
@@ -158,9 +161,9 @@ class TracedStack:
         The number is the mean of a sum of waves along the curve, which full turns do not change.
         """
         # one phase for each joint, so that mirrored curves differ
-        phases = self.nodes + np.arange(1.0, self.nodes.shape[1] + 1)
-        waves = np.hstack([np.cos(phases), np.sin(phases)])
-        c, s = np.split(waves, 2, axis=1)
+        m, nq = self.nodes.shape
+        phases, waves = self.nodes + np.arange(1.0, nq + 1), np.empty((m, 2 * nq))
+        c, s = np.cos(phases, out=waves[:, :nq]), np.sin(phases, out=waves[:, nq:])
         wave, slope = s.sum(axis=1), np.einsum("ij,ij->i", c, self.tangents)
         # the trapezoidal rule with its end correction
         parts, way = np.zeros(len(wave)), self.ways[:-1]
@@ -170,4 +173,4 @@ class TracedStack:
         # at a distance d, the sum of the cosines of all angles between is no less than their number less d²/2
         alike = np.maximum.reduceat(waves[self.first] @ waves.T, self.first, axis=1)
         far = np.maximum.reduceat(self.ways, self.first) + BESIDE
-        return places, alike >= self.nodes.shape[1] - far**2 / 2
+        return places, alike >= nq - far**2 / 2

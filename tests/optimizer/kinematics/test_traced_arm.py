@@ -15,6 +15,7 @@ from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain, miss, pose_error
 from optimizer.kinematics.curve_tracing import cycles, traced
+from optimizer.kinematics.hermite import hermite_weights
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.nearby_arm import NearbyArm
 from optimizer.kinematics.nearby_loops import LONG, SHORT, followed
@@ -31,6 +32,8 @@ from tests.selection import long_but
 GEN3, CHAIN, PANDA = load_robot("gen3"), serial_chain(7), load_robot("panda")
 # rad: a parameter's derivative against a difference, and how far apart members of the least step are at most
 LIMIT = 1e-8
+# rad: of points on cubics
+ROUNDING = 1e-13
 # share of the members of a closed form that are on the curves found: of a pose next to a singularity some are not
 COVERED = 0.99
 # configurations [rad] next to which the curve of their pose bends by a right angle
@@ -206,6 +209,14 @@ def test_the_parameter_of_a_member_is_found_again(robot: Robot, arm: TracedArm) 
         for u in rng.uniform(*curve.arcs[0], 4):
             found = curve.at(np.array([u, curve.parameter(curve.at(np.array([u]))[0])]))
             assert np.abs(wrapped(found[1] - found[0])).max() < LIMIT
+
+
+def test_points_at_many_shares_are_those_at_each(robot: Robot, arm: TracedArm) -> None:
+    curve = arm.self_motions(flange(robot, inside(robot, np.random.default_rng(76))))[0]
+    share, joints, k = np.linspace(0.0, 1.0, 5), np.array([1, 4]), np.arange(3)
+    each = curve.stack.at_each(k, hermite_weights(share), joints)
+    for row in k:
+        assert np.abs(each[row] - curve.stack.at(np.full(5, row), share)[:, joints]).max() < ROUNDING
 
 
 def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
