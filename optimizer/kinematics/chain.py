@@ -13,6 +13,8 @@ from optimizer.kinematics.forward import joint_placements
 
 # sine of an angle below which its axis is taken from the sine alone
 _TINY = 1e-12
+# configurations up to which products of neighbours take less time than all in a row, link by link
+FEW = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,8 @@ class Chain:
 
     def flange(self, q: Array) -> Array:
         """T_base_flange (n, 4, 4) at q (n, nq) [rad]."""
+        if len(q) > FEW:
+            return _poses(self.flange_components(q))
         waves = self._waves
         parts = np.cos(q)[..., None, None] * waves[0]
         parts += np.sin(q)[..., None, None] * waves[1]
@@ -73,8 +77,8 @@ class Chain:
         return _poses(flange), np.ascontiguousarray(jacobian.transpose(2, 0, 1))
 
     def flange_and_columns(self, q: Array) -> tuple[Array, Array]:
-        """The same with all configurations in a row, for long products in place of many small ones: x, y, z and the
-        place of the flange by components (3, n, 4), and the Jacobian (6, nq, n)."""
+        """The same with all configurations in a row, for long products in place of many small ones:
+        `flange_components` (3, n, 4), and the Jacobian (6, nq, n)."""
         frames, flange = self._frames(q)
         jacobian = np.empty((6, *q.shape[::-1]))
         axis = jacobian[3:]
@@ -83,6 +87,10 @@ class Chain:
         x, y, z = axis
         jacobian[0], jacobian[1], jacobian[2] = y * w - z * v, z * u - x * w, x * v - y * u
         return flange, jacobian
+
+    def flange_components(self, q: Array) -> Array:
+        """x, y, z and the place of the flange by components (3, n, 4), at q (n, nq) [rad]."""
+        return self._frames(q)[1]
 
     def _frames(self, q: Array) -> tuple[Array, Array]:
         """The links' frames (nq, 3, n, 4) and the flange's (3, n, 4) at q (n, nq) [rad], as of `flange_and_columns`."""

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from models.robot import Array
 
 
 def hermite(share: Array, q0: Array, q1: Array, slope0: Array, slope1: Array) -> Array:
     """Values (n, m) at shares (n,), 0 to 1, of the way from q0 to q1 (n, m), by cubics with slopes (n, m) per way."""
-    s = share[:, None]
-    a, b = (1 + 2 * s) * (1 - s) ** 2, s * (1 - s) ** 2
-    return a * q0 + (1 - a) * q1 + b * slope0 + s * s * (s - 1) * slope1
+    a, b, c, d = hermite_weights(share)[:, :, None]
+    return np.asarray(a * q0 + b * q1 + c * slope0 + d * slope1)
+
+
+def hermite_weights(share: Array) -> Array:
+    """The weights (4, n) of q0, q1, slope0 and slope1 in `hermite` at shares (n,)."""
+    rest = 1 - share
+    a, b = (1 + 2 * share) * rest * rest, share * rest * rest
+    return np.array([a, 1 - a, b, -share * share * rest])

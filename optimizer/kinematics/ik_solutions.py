@@ -33,7 +33,7 @@ class Singularities:
         return values
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class PrincipalSolution:
     """One branch of a pose: q (nq,) in [-pi, pi], without regard to limits.
 
@@ -46,6 +46,12 @@ class PrincipalSolution:
     singularities: Singularities
     row: int
 
+    def __init__(
+        self, q: Array, label: BranchLabel, self_motion: SelfMotion | None, singularities: Singularities, row: int
+    ) -> None:
+        # all at once: of some forty solutions of a pose, one by one took as long as it takes to confirm them
+        self.__dict__.update(q=q, label=label, self_motion=self_motion, singularities=singularities, row=row)
+
     @cached_property
     def singular(self) -> tuple[str, ...]:
         """The parts of the label that are singular: the configuration is on both branches of such a part."""
@@ -57,7 +63,7 @@ class PrincipalSolution:
         return self.singularities.smallest_values[self.row]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class IKSolution:
     """One configuration q (nq,) [rad] within limits that reaches a pose, and its branch: see `PrincipalSolution`.
 
@@ -67,6 +73,9 @@ class IKSolution:
     q: Array
     branch: PrincipalSolution
     limit_distance: float
+
+    def __init__(self, q: Array, branch: PrincipalSolution, limit_distance: float) -> None:
+        self.__dict__.update(q=q, branch=branch, limit_distance=limit_distance)
 
     @property
     def label(self) -> BranchLabel:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import groupby, product
+from itertools import compress, groupby, product, repeat
 from typing import Any, Protocol
 
 import numpy as np
@@ -160,10 +160,7 @@ class _Reached:
         """All of them; nobody may write to q from here on."""
         self.q.setflags(write=False)
         singularities = Singularities(chain, self.q, form.singular_parts)
-        return [
-            PrincipalSolution(q, label, curve, singularities, k)
-            for k, (q, label, curve) in enumerate(zip(self.q, self.labels, self.curves, strict=True))
-        ]
+        return list(map(PrincipalSolution, self.q, self.labels, self.curves, repeat(singularities), range(len(self.q))))
 
 
 class ClosedFormInverseKinematics:
@@ -217,9 +214,9 @@ class ClosedFormInverseKinematics:
         off = self._chain.flange(found.q) - T
         if not several and np.abs(off).max(initial=0.0) < ACCURACY / 4:
             return found
-        position = np.linalg.norm(off[:, :3, 3], axis=1)
-        rotation = np.linalg.norm(off[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
-        missed = np.maximum(position, rotation)
+        # the sum of the squares of a rotation's error is twice that of its angle
+        all_, place = np.einsum("ijk,ijk->i", off, off), np.einsum("ij,ij->i", off[:, :3, 3], off[:, :3, 3])
+        missed = np.sqrt(np.maximum(place, (all_ - place) / 2))
         chosen = np.flatnonzero(missed < ACCURACY)
         if several:
             chosen = chosen[distinct(found.q[chosen], missed[chosen])]
@@ -246,15 +243,11 @@ class ClosedFormInverseKinematics:
         if not reachable:
             raise self._out_of_reach(T, target)
         nearest, held = nearest_turns(reached.q, limits)
-        wound, owners = list[Array](), list[PrincipalSolution]()
-        for branch, near, inside in zip(reached.principal(self._form, self._chain), nearest, held, strict=True):
-            if not inside:
-                continue
-            if windings and branch.self_motion is None:
-                wound.append(np.array(list(product(*full_turn_alternatives(branch.q, limits.q_min, limits.q_max)))))
-            else:
-                wound.append(near[None])
-            owners += [branch] * len(wound[-1])
+        principal = reached.principal(self._form, self._chain)
+        owners = list(compress(principal, held))
+        q = nearest if len(owners) == len(nearest) else nearest[np.flatnonzero(held)]
+        if windings:
+            q, owners = _wound(q, owners, limits)
         if not owners:
             raise UnreachablePose(
                 target,
@@ -262,10 +255,9 @@ class ClosedFormInverseKinematics:
                 f"The {target} pose is within reach, but every arm configuration for it violates a position limit: "
                 "widen limits.position or move the pose.",
             )
-        q = np.concatenate(wound)
         q.setflags(write=False)
         distances = np.minimum(q - limits.q_min, limits.q_max - q).min(axis=1).tolist()
-        return [IKSolution(*each) for each in zip(q, owners, distances, strict=True)]
+        return list(map(IKSolution, q, owners, distances))
 
     def _out_of_reach(self, T: Array, target: str) -> UnreachablePose | SingularPose:
         distance = self._form.distance_to_reach(_orthonormal(T))
@@ -285,6 +277,19 @@ class ClosedFormInverseKinematics:
             f"The {target} pose is {distance:.4g} m out of reach in this orientation: {hint}move the position closer "
             "to the robot's workspace, or change the orientation.",
         )
+
+
+def _wound(q: Array, owners: Sequence[PrincipalSolution], limits: Limits) -> tuple[Array, list[PrincipalSolution]]:
+    """Configurations q (n, nq) [rad] and the branch of each, with every full turn within limits of those that are on no
+    curve."""
+    wound, found = [np.zeros((0, q.shape[1]))], list[PrincipalSolution]()
+    for branch, near in zip(owners, q, strict=True):
+        if branch.self_motion is None:
+            wound.append(np.array(list(product(*full_turn_alternatives(branch.q, limits.q_min, limits.q_max)))))
+        else:
+            wound.append(near[None])
+        found += [branch] * len(wound[-1])
+    return np.concatenate(wound), found
 
 
 def _members(motions: Sequence[SelfMotion], parameters: Sequence[Array]) -> list[Array]:

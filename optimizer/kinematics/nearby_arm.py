@@ -7,13 +7,14 @@ from the base on. The curves of the simplest arm nearby (`joint_axes`) are known
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from models.robot import Array
 from optimizer.kinematics.chain import Chain
 from optimizer.kinematics.joint_axes import JointAxes
-from optimizer.kinematics.nearby_loops import loops
+from optimizer.kinematics.nearby_loops import Loops, loops
 from optimizer.kinematics.redundant_pose import RedundantPose
 from optimizer.kinematics.spherical_shoulder import SphericalShoulder
 
@@ -40,19 +41,29 @@ class NearbyArm:
                 return cls(form, mirrored, JointAxes.of(each))
         return None
 
-    def loops(self, T: Array) -> tuple[list[Array], list[Array]]:
-        """Points (m, 7) [rad] along loops on which the arm nearby holds its flange at T (4, 4), and along curves that
-        are in none: see `nearby_loops`."""
-        pose = RedundantPose(self.form, np.asarray(np.linalg.inv(T)) if self.mirrored else T)
-        found, rest = loops(pose)
+    def loops(self, T: Array) -> tuple[Loops, list[Array]]:
+        """Loops on which the arm nearby holds its flange at T (4, 4), and points (m, 7) [rad] along curves that are in
+        none: see `nearby_loops`."""
+        found, rest = loops(RedundantPose(self.form, np.asarray(np.linalg.inv(T)) if self.mirrored else T))
+        return Loops(self._both(found.points), 2 * found.counts), [self._both(each) for each in rest]
+
+    def _both(self, q: Array) -> Array:
+        """The points q (m, 7) [rad] of the form on its right shoulder as ones (2m, 7) of the arm nearby: on it, then on
+        the left one."""
         # on the left shoulder, the third axis leans to the other side
-        scale, shift = np.ones(7), np.zeros(7)
-        scale[1], shift[:3] = -1.0, (np.pi, -2 * self.form.lean_at_zero, np.pi)
+        scale, shift = self._left
         if self.mirrored:
             # from the flange on, the joints come in the other order and turn the other way
-            found, rest = [-q[:, ::-1] for q in found], [-q[:, ::-1] for q in rest]
-            scale, shift = scale[::-1], -shift[::-1]
-        return [*found, *(scale * q + shift for q in found)], [*rest, *(scale * q + shift for q in rest)]
+            q = -q[:, ::-1]
+        return np.concatenate([q, scale * q + shift])
+
+    @cached_property
+    def _left(self) -> tuple[Array, Array]:
+        """Factors (7,) and angles (7,) [rad] that lead from configurations on the right shoulder to those on the left
+        one."""
+        scale, shift = np.ones(7), np.zeros(7)
+        scale[1], shift[:3] = -1.0, (np.pi, -2 * self.form.lean_at_zero, np.pi)
+        return (scale[::-1], -shift[::-1]) if self.mirrored else (scale, shift)
 
     def beside(self, T: Array) -> list[Array]:
         """Points (m, 7) [rad] along the curves on which the arm nearby holds its flange beside T (4, 4), shifted along
@@ -63,5 +74,5 @@ class NearbyArm:
                 near = T.copy()
                 near[:3, 3] += shift
                 closed, rest = self.loops(near)
-                found += [*closed, *rest]
+                found += [*closed.each(), *rest]
         return found

@@ -8,59 +8,85 @@ step is long, or its tangents turn, and the loop is left to be followed point by
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.robot import Array, Mask
 from optimizer.kinematics.across_curve import step_across
-from optimizer.kinematics.angles import nearest_turn, wrapped
+from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain
-from optimizer.kinematics.curve_tracing import BENT, LONGEST, TracedPath, turns
+from optimizer.kinematics.curve_tracing import LONGEST, turns
 from optimizer.kinematics.redundant_curve import CurveStack
 from optimizer.kinematics.redundant_pose import RedundantPose
+from optimizer.kinematics.traced_stack import TracedStack
 
 # steps along each curve of the arm nearby, twice as many once around, and starts on so many: two of these make a loop
-STEPS, STARTS = 16, 4
+STEPS, STARTS = 12, 3
 # a step that is longer [rad] is cut into parts that long, so many at most; one along which the curve bends by more than
 # BENT_BY [rad], into two, if it is not shorter than LEAST [rad]; so many times over
-LONG, PART, MOST_PARTS, BENT_BY, LEAST, ROUNDS = 0.6, 0.25, 16, 0.35, 0.03, 5
+LONG, PART, MOST_PARTS, BENT_BY, LEAST, ROUNDS = 0.75, 0.4, 16, 0.35, 0.03, 5
 # farthest points that are kept along a curve [rad], and most that it bends between them [rad]
-SPACED, TURNED = 0.45, 0.4
+SPACED, TURNED = 0.6, 0.4
+# least cosine of tangents at both ends of a step, and of those with it
+BENT = 0.8
 # the last angle all around [rad]
 WHOLE = (-np.pi, np.pi)
 # distance [rad] of two ends of curves that are one point, and of a third that is not
 JOINED, APART = 1e-4, 1e-2
-# product of lengths of steps [rad²] of which one is none
+# product of lengths [rad²] of which one is none
 NONE = 1e-20
 # longest step of Newton's method [rad] that needs no other, and farthest way [rad] of a point to the curve
 SHORT, MOVED = 0.01, 0.05
+# kinds of curves of a pose, whole or not, whose parameters are kept
+MOST_KINDS = 64
 
 
-def loops(pose: RedundantPose) -> tuple[list[Array], list[Array]]:
-    """Points (m, 7) [rad] along loops of curves of a pose on the right shoulder, each from its first point once around,
-    without full turns left out; and along curves that are in none, since more than two meet at an end, or only one."""
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """Points (m, nq) [rad] along loops, one loop after the other; each has so many, from its first once around, without
+    full turns left out. From one loop to the next there may be any."""
+
+    points: Array
+    counts: list[int]
+
+    def each(self) -> list[Array]:
+        """The points of each loop."""
+        return np.split(self.points, np.cumsum(self.counts)[:-1]) if self.counts else []
+
+
+def loops(pose: RedundantPose) -> tuple[Loops, list[Array]]:
+    """Loops of curves of a pose on the right shoulder; and points (m, 7) [rad] along curves that are in none, since
+    more than two meet at an end, or only one."""
     curves = right_curves(pose)
     if curves is None:
-        return [], []
-    points, ends = _points(curves)
-    found, rest = [points[k] for k in np.flatnonzero(curves.whole).tolist()], list[Array]()
-    meets = _meeting(ends)
-    left = np.flatnonzero(~curves.whole).tolist()
+        return Loops(np.zeros((0, 7)), []), []
+    q, bounds, ends = _points(curves)
+    order, counts, rest = list[int](), list[int](), list[Array]()
+    for k in np.flatnonzero(curves.whole).tolist():
+        order += range(bounds[k], bounds[k + 1])
+        counts.append(bounds[k + 1] - bounds[k])
+    meets, left = _meeting(ends), np.flatnonzero(~curves.whole).tolist()
     while left:
         way, end = list[int](), 2 * left[0] + 1
         while end // 2 in left:
             left.remove(end // 2)
             way.append(end)
             end = meets[end] ^ 1 if meets[end] >= 0 else -1
+        parts = [range(bounds[k // 2], bounds[k // 2 + 1])[:: 1 if k % 2 else -1] for k in way]
         # the way ends where it began, at the other end of its first curve
-        parts = [points[k // 2] if k % 2 else points[k // 2][::-1] for k in way]
         if end == way[0]:
-            found.append(_joined(parts))
+            # each part ends where the next one begins
+            before, total = [k for part in parts[:-1] for k in part[:-1]], len(order)
+            order += [*before, *parts[-1]]
+            counts.append(len(order) - total)
         else:
-            rest += parts
-    return found, rest
+            rest += [q[part] for part in parts]
+    points = q[order]
+    points[1:] -= np.cumsum(turns(points[1:] - points[:-1]), axis=0)
+    return Loops(points, counts), rest
 
 
 def spread_over(points: Array) -> Array:
@@ -69,19 +95,27 @@ def spread_over(points: Array) -> Array:
     return np.asarray(points[((np.arange(count) + 0.5) * len(points) / count).astype(int)])
 
 
-def _points(curves: CurveStack) -> tuple[list[Array], Array]:
-    """Points (m, 7) [rad] along each of the curves from end to end, without full turns left out, and the configurations
-    at the first and the last of them, (2n, 7)."""
+@lru_cache(MOST_KINDS)
+def _grid(whole: tuple[bool, ...]) -> tuple[Array, NDArray[np.intp], NDArray[np.intp]]:
+    """Parameters (m,) along curves, which are whole or not (n,), the curve (m,) of each, and the rows (2n,) of the
+    first and of the last one of every curve."""
     # a whole turn has twice the range
-    counts = np.where(curves.whole, 2 * STEPS, STEPS)
+    counts = np.where(whole, 2 * STEPS, STEPS)
     rows = np.repeat(np.arange(len(counts)), counts + 1)
     last = np.cumsum(counts + 1) - 1
     share = (np.arange(len(rows)) - (last - counts)[rows]) / counts[rows]
-    u = np.pi * np.where(curves.whole[rows], 2 * share - 1, share)
+    u = np.pi * np.where(np.array(whole)[rows], 2 * share - 1, share)
+    return u, rows, np.array([last - counts, last]).T.ravel()
+
+
+def _points(curves: CurveStack) -> tuple[Array, list[int], Array]:
+    """Points (m, 7) [rad] along the curves from end to end, one curve after the other; where each of them begins, and
+    m; and the configurations at the first and the last point of each, (2n, 7)."""
+    u, rows, outer = _grid(tuple(curves.whole.tolist()))
     q = _at(curves, u, rows)
-    ends = q[np.array([last - counts, last]).T.ravel()]
+    ends = q[outer]
     for _ in range(ROUNDS):
-        steps, length, bend = _steps(q, rows)
+        length, bend = _steps(q, rows)
         parts = _parts(length, bend)
         cut = np.flatnonzero(parts > 1)
         if not len(cut):
@@ -96,10 +130,10 @@ def _points(curves: CurveStack) -> tuple[list[Array], Array]:
         q = np.concatenate([q, _at(curves, between, rows[before])])[place]
         u, rows = np.concatenate([u, between])[place], np.concatenate([rows, rows[before]])[place]
     else:
-        steps, length, bend = _steps(q, rows)
+        length, bend = _steps(q, rows)
     kept = _kept(length, bend, rows)
-    unwound = np.cumsum(np.vstack([q[:1], steps]), axis=0)[kept]
-    return np.split(unwound, np.flatnonzero(np.diff(rows[kept])) + 1), ends
+    rows = rows[kept]
+    return q[kept], [0, *(np.flatnonzero(rows[1:] != rows[:-1]) + 1).tolist(), len(kept)], ends
 
 
 def _at(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:
@@ -107,21 +141,20 @@ def _at(curves: CurveStack, u: Array, rows: NDArray[np.intp]) -> Array:
     return curves.pose.configurations(curves.last_angle(u, rows), curves.sheet[rows])
 
 
-def _steps(q: Array, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-    """The steps (n - 1, 7) [rad] from each of the points q (n, 7) of curves (n,) to the next, their lengths (n - 1,), 0
-    from one curve to another, and by how much [rad] the curves bend along them (n - 1,), nearly."""
+def _steps(q: Array, rows: NDArray[np.intp]) -> tuple[Array, Array]:
+    """The lengths [rad] (n - 1,) of the steps from each of the points q (n, 7) of curves (n,) to the next, 0 from one
+    curve to another, and by how much [rad] the curves bend along them (n - 1,), nearly."""
     steps = wrapped(q[1:] - q[:-1])
-    length = np.sqrt((steps * steps).sum(axis=1))
-    length[rows[1:] != rows[:-1]] = 0.0
+    length = np.sqrt(np.einsum("ij,ij->i", steps, steps))
+    other = np.flatnonzero(rows[1:] != rows[:-1])
+    length[other] = 0.0
     product = length[1:] * length[:-1]
-    cosine = (steps[1:] * steps[:-1]).sum(axis=1) / np.maximum(product, NONE)
+    cosine = np.einsum("ij,ij->i", steps[1:], steps[:-1]) / np.maximum(product, NONE)
     turn = np.zeros(len(q))
     turn[1:-1] = np.where(product > NONE, np.sqrt(np.maximum(2 - 2 * cosine, 0.0)), 0.0)
     # at its ends, a curve goes on along another one, and bends as it does next to them
-    last = np.append(np.flatnonzero(rows[1:] != rows[:-1]), len(q) - 1)
-    first = np.append(0, last[:-1] + 1)
-    turn[last], turn[first] = turn[last - 1], turn[first + 1]
-    return steps, length, (turn[1:] + turn[:-1]) / 2
+    turn[0], turn[-1], turn[other], turn[other + 1] = turn[1], turn[-2], turn[other - 1], turn[other + 2]
+    return length, (turn[1:] + turn[:-1]) / 2
 
 
 def _parts(length: Array, bend: Array) -> NDArray[np.intp]:
@@ -141,16 +174,6 @@ def _kept(length: Array, bend: Array, rows: NDArray[np.intp]) -> list[int]:
             way = turned = 0.0
         way, turned = way + step, turned + turn
     return found
-
-
-def _joined(parts: Sequence[Array]) -> Array:
-    """Points (m, 7) [rad] along a loop, of those along parts of which each ends where the next one begins."""
-    found, end = [parts[0][:-1]], parts[0][-1]
-    for each in parts[1:]:
-        shift = nearest_turn(each[0], end) - each[0]
-        found.append(each[:-1] + shift)
-        end = each[-1] + shift
-    return np.vstack([*found, end])
 
 
 def right_curves(pose: RedundantPose) -> CurveStack | None:
@@ -174,31 +197,31 @@ def _meeting(ends: Array) -> list[int]:
     return met
 
 
-def followed(chain: Chain, loops: Sequence[Array], T: Array) -> tuple[list[TracedPath], Mask]:
-    """The curves that hold the flange at T (4, 4) along loops (m, 7) [rad], and which of the loops (n,) have one."""
-    if not loops:
-        return [], np.zeros(0, dtype=bool)
-    counts = [len(each) for each in loops]
-    first = np.cumsum([0, *counts[:-1]])
-    final = first + counts - 1
-    points = np.vstack(loops)
+def followed(chain: Chain, loops: Loops, T: Array) -> tuple[TracedStack, Mask]:
+    """The curves that hold the flange at T (4, 4) along loops, and which of the loops (n,) have one."""
+    if not loops.counts:
+        return TracedStack.of([]), np.zeros(0, dtype=bool)
+    points = loops.points
+    end: NDArray[np.intp] = np.cumsum(loops.counts, dtype=np.intp)
+    first, final = end - loops.counts, end - 1
     along = np.empty_like(points)
     along[1:-1] = points[2:] - points[:-2]
     along[first] = along[final] = points[first + 1] - points[first] + points[final] - points[final - 1]
-    along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
     q, tangent, moved = _onto(chain, points, along, T)
     # once around, a loop is where it began, but for full turns
     q[final], tangent[final] = q[first] + turns(points[final] - points[first]), tangent[first]
     steps = q[1:] - q[:-1]
-    length = np.maximum(np.linalg.norm(steps, axis=1), 1e-300)
-    cosine = np.minimum((tangent[1:] * tangent[:-1]).sum(axis=1), (tangent[1:] * steps).sum(axis=1) / length)
-    fine = (length < 2 * LONGEST) & (cosine > BENT) & (moved[:-1] < MOVED)
+    length = np.sqrt(np.einsum("ij,ij->i", steps, steps))
+    turned = np.einsum("ij,ij->i", tangent[1:], tangent[:-1])
+    ahead = np.einsum("ij,ij->i", tangent[1:], steps)
+    fine = (length < 2 * LONGEST) & (turned > BENT) & (ahead > BENT * length) & (moved[:-1] < MOVED)
     # from one loop to the next there is no step
     fine[final[:-1]] = True
     good = np.logical_and.reduceat(fine, first)
-    parts = [slice(start, end + 1) for start, end in zip(first.tolist(), final.tolist(), strict=True)]
-    kept = [part for part, each in zip(parts, good.tolist(), strict=True) if each]
-    return [TracedPath(q[part], tangent[part], closed=True) for part in kept], np.asarray(good)
+    if not good.all():
+        kept, counts = np.repeat(good, loops.counts), np.array(loops.counts, dtype=np.intp)[good]
+        q, tangent, first = q[kept], tangent[kept], np.cumsum(counts) - counts
+    return TracedStack(q, tangent, first, np.full(int(good.sum()), np.pi)), np.asarray(good)
 
 
 def _onto(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array, Array]:
@@ -206,10 +229,11 @@ def _onto(chain: Chain, q: Array, along: Array, T: Array) -> tuple[Array, Array,
     [rad] they are (n,); from q across the directions `along` (n, nq)."""
     move, tangent = step_across(chain, q, along, T)
     reached = q + move
-    moved = np.linalg.norm(move, axis=1)
+    moved = np.sqrt(np.einsum("ij,ij->i", move, move))
     rows: NDArray[np.intp] = np.flatnonzero(moved > SHORT)
     if len(rows):
         again, tangent[rows] = step_across(chain, reached[rows], along[rows], T)
         reached[rows] += again
         moved[rows] = np.linalg.norm(reached[rows] - q[rows], axis=1)
-    return reached, tangent / np.linalg.norm(tangent, axis=1)[:, None], moved
+    squares = np.maximum(np.einsum("ij,ij->i", tangent, tangent), NONE)
+    return reached, tangent / np.sqrt(squares)[:, None], moved

@@ -30,6 +30,11 @@ ZERO = 1e-7
 # a squared distance [m²] that is none
 TINY = 1e-12
 
+# a real polynomial in exp(iq) and exp(-iq), by its coefficients of the powers of exp(iq) from 0 on: those of exp(-iq)
+# are their conjugates. Plain numbers: several times as fast as arrays of so few
+Polynomial = list[complex]
+ONE: Polynomial = [1 + 0j]
+
 
 @dataclass(frozen=True, eq=False)
 class RedundantPose:
@@ -80,18 +85,26 @@ class RedundantPose:
 
     def angles(self, q7: Array, elbow: Array, wrist: Array) -> tuple[Array, Array]:
         """θ and ψ (n,) [rad] at q7 (n,) on sheets of these signs (n,); cosines beyond 1 count as 1."""
-        form, (distance, v_z) = self.form, self.waves @ angle_waves(np.cos(q7), np.sin(q7))
+        theta, psi, _ = self._angles_of(angle_waves(np.cos(q7), np.sin(q7)), elbow, wrist)
+        return theta, psi
+
+    def _angles_of(self, seventh: Array, elbow: Array, wrist: Array) -> tuple[Array, Array, Array]:
+        """`angles` by the waves (3, n) of q7, and the waves (3, n) of θ."""
+        form, (distance, v_z) = self.form, self.waves @ seventh
         cos = to_cosine((form.squares - distance) / (2 * form.rho * form.nu))
-        k0, kc, ks = form.along_fifth
-        along = k0 + kc * cos + ks * elbow * np.sqrt((1 - cos) * (1 + cos)) - form.fifth_in_6[2] * v_z
+        fourth = angle_waves(cos, elbow * np.sqrt((1 - cos) * (1 + cos)))
+        along = form.along_fifth @ fourth - form.fifth_in_6[2] * v_z
         reach = form.inclined * np.sqrt(np.maximum(distance - v_z * v_z, 0.0))
         across = np.sqrt(np.maximum((reach - along) * (reach + along), 0.0))
-        return elbow * np.arccos(cos), wrist * np.arctan2(across, along)
+        return elbow * np.arccos(cos), wrist * np.arctan2(across, along), fourth
 
     def configurations(self, q7: Array, sheet: Array) -> Array:
         """Configurations (n, 7) [rad] in [-π, π] at q7 (n,) on sheets (n, 3)."""
-        theta, psi = self.angles(q7, sheet[:, 1], sheet[:, 2])
-        return self.at_angles(q7, theta, psi, sheet[:, 0])
+        shoulder, elbow, wrist = sheet.T
+        seventh = angle_waves(np.cos(q7), np.sin(q7))
+        theta, psi, fourth = self._angles_of(seventh, elbow, wrist)
+        last = self._last(q7, theta, psi, seventh, fourth)
+        return np.ascontiguousarray(self.completed(last, backwards(last), shoulder).T)
 
     def at_angles(
         self, q7: Array, theta: Array, psi: Array, shoulder: Array, free: dict[int, Array] | None = None
@@ -106,8 +119,13 @@ class RedundantPose:
 
     def wrist(self, q7: Array, theta: Array, psi: Array) -> Array:
         """The last four joint positions (4, n) [rad] at the given angles (n,)."""
-        form, v = self.form, self.from_wrist(q7)
-        S = form.shoulder_waves.T @ angle_waves(np.cos(theta), np.sin(theta))
+        return self._last(
+            q7, theta, psi, angle_waves(np.cos(q7), np.sin(q7)), angle_waves(np.cos(theta), np.sin(theta))
+        )
+
+    def _last(self, q7: Array, theta: Array, psi: Array, seventh: Array, fourth: Array) -> Array:
+        """`wrist` with the waves (3, n) of q7 and of θ."""
+        form, v, S = self.form, self._wrist_waves @ seventh, self.form.shoulder_waves.T @ fourth
         last = np.empty((4, len(q7)))
         last[0], last[3] = form.q4_at_zero - theta, q7
         last[2] = psi - np.arctan2(v[1], v[0]) + form.fifth_azimuth
@@ -219,17 +237,17 @@ class RedundantPose:
     @cached_property
     def _edges(self) -> Array:
         """Angles (k,) [rad] in [-π, π), sorted, at which a sheet of any sign may end."""
-        form, (square, height) = self.form, self.waves
+        form, (square, height) = self.form, self.waves.tolist()
         scale = 2 * form.rho * form.nu
-        cos = _wave(np.array([(form.squares - square[0]) / scale, -square[1] / scale, -square[2] / scale]))
-        v_z, d2 = _wave(height), _wave(square)
+        cos = _wave((form.squares - square[0]) / scale, -square[1] / scale, -square[2] / scale)
+        v_z, d2 = _wave(*height), _wave(*square)
         k0, kc, ks = form.along_fifth
-        flat = _sum(_wave(np.array([k0, 0, 0])), kc * cos, -form.fifth_in_6[2] * v_z)
-        one = np.array([1.0])
-        sin2 = _sum(one, -np.convolve(cos, cos))
-        P = _sum(form.inclined**2 * _sum(d2, -np.convolve(v_z, v_z)), -np.convolve(flat, flat), -(ks**2) * sin2)
+        flat = _sum((kc, cos), (-float(form.fifth_in_6[2]), v_z), (k0, ONE))
+        sin2, flat2 = _sum((1.0, ONE), (-1.0, _product(cos, cos))), _product(flat, flat)
+        incline = form.inclined**2
+        P = _sum((incline, d2), (-incline, _product(v_z, v_z)), (-1.0, flat2), (-(ks**2), sin2))
         if abs(ks) > ROUNDING:
-            P = _sum(np.convolve(P, P), -4 * ks**2 * np.convolve(np.convolve(flat, flat), sin2))
+            P = _sum((1.0, _product(P, P)), (-4 * ks**2, _product(flat2, sin2)))
         found = sorted([*_angles(P), *self._straight()])
         return np.array([each for k, each in enumerate(found) if k == 0 or each - found[k - 1] > APART])
 
@@ -263,34 +281,47 @@ def backwards(q: Array) -> Complex:
     return found
 
 
-def _wave(coefficients: Array) -> Complex:
-    """Of a + b cos q + c sin q, the coefficients (3,) of the powers -1, 0, 1 of exp(iq)."""
-    a, b, c = coefficients
-    return np.array([(b + 1j * c) / 2, a, (b - 1j * c) / 2])
+def _wave(a: float, b: float, c: float) -> Polynomial:
+    """a + b cos q + c sin q."""
+    return [complex(a), complex(b, -c) / 2]
 
 
-def _sum(*polynomials: Array | Complex) -> Complex:
-    """The sum of polynomials in exp(iq) and exp(-iq), each with its constant in the middle."""
-    size = max(map(len, polynomials))
-    total = np.zeros(size, dtype=complex)
-    for each in polynomials:
-        start = (size - len(each)) // 2
-        total[start : start + len(each)] += each
+def _sum(*terms: tuple[float, Polynomial]) -> Polynomial:
+    """The sum of polynomials, each times a factor."""
+    total = [0j] * max(len(each) for _, each in terms)
+    for factor, each in terms:
+        for k, coefficient in enumerate(each):
+            total[k] += factor * coefficient
     return total
 
 
-def _angles(polynomial: Complex) -> list[float]:
-    """The angles q [rad] at which a polynomial in exp(iq) and exp(-iq) is zero, or nearly."""
-    size: list[float] = np.abs(polynomial).tolist()
-    least, k = NEGLIGIBLE * max(size), 0
-    while 2 * k < len(size) - 1 and size[-1 - k] <= least:
-        k += 1
-    if len(size) - 2 * k < 3:
+def _product(p: Polynomial, r: Polynomial) -> Polynomial:
+    """The product of two polynomials."""
+    total = [0j] * (len(p) + len(r) - 1)
+    for k, a in enumerate(p):
+        for j, b in enumerate(r):
+            total[k + j] += a * b
+            # that with the other power of opposite sign; of both, the one that is not negative
+            if k and j:
+                other = a * b.conjugate() if k >= j else a.conjugate() * b
+                total[abs(k - j)] += other if k != j else 2 * other.real
+    return total
+
+
+def _angles(polynomial: Polynomial) -> list[float]:
+    """The angles q [rad] at which a polynomial is zero, or nearly."""
+    size = [abs(each) for each in polynomial]
+    least, degree = NEGLIGIBLE * max(size), len(size) - 1
+    while degree and size[degree] <= least:
+        degree -= 1
+    if not degree:
         return []
-    falling = polynomial[::-1][k : len(size) - k]
-    # the eigenvalues of its companion are its zeros
-    companion = np.eye(len(falling) - 1, k=-1, dtype=complex)
-    companion[0] = -falling[1:] / falling[0]
-    roots = np.linalg.eigvals(companion)
-    near: list[float] = np.angle(roots[np.abs(np.abs(roots) - 1) < NEAR_CIRCLE]).tolist()
-    return near
+    # by falling powers; the eigenvalues of the companion are the zeros
+    falling = [*polynomial[degree:0:-1], *(each.conjugate() for each in polynomial[: degree + 1])]
+    companion = np.eye(2 * degree, k=-1, dtype=complex)
+    companion[0] = [-each / falling[0] for each in falling[1:]]
+    return [
+        atan2(root.imag, root.real)
+        for root in np.linalg.eigvals(companion).tolist()
+        if abs(abs(root) - 1) < NEAR_CIRCLE
+    ]

@@ -9,7 +9,6 @@ the joint ranges does (`seed_table`). Newton's method leads starts onto curves, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -105,15 +104,17 @@ class TracedArm:
         found = solved(self._chain, around.reshape(-1, JOINTS), T, STEPS)
         return np.concatenate([q, found[0]]), np.concatenate([missed, found[1]])
 
-    def _beside_nearby(self, T: Array) -> tuple[list[TracedPath], Array]:
+    def _beside_nearby(self, T: Array) -> tuple[TracedStack, Array]:
         """The curves along those of the arm nearby with the flange at T (4, 4), and starts (n, 7) near the others."""
         none = np.zeros((0, JOINTS))
         if self._nearby is None:
-            return [], none
+            return TracedStack.of([]), none
         loops, rest = self._nearby.loops(T)
-        paths, good = followed(self._chain, loops, T)
-        left = np.flatnonzero(~good).tolist()
-        return paths, np.vstack([none, *map(spread_over, rest), *(spread_over(loops[k][:-1]) for k in left)])
+        stack, good = followed(self._chain, loops, T)
+        if good.all() and not rest:
+            return stack, none
+        left = [each[:-1] for each, held in zip(loops.each(), good.tolist(), strict=True) if not held]
+        return stack, np.vstack([none, *map(spread_over, [*rest, *left])])
 
     def _beside(self, T: Array) -> list[Array]:
         """Starts (n, 7) of the arm nearby, beside the pose T (4, 4): the arm itself may reach a little further."""
@@ -122,10 +123,11 @@ class TracedArm:
     def _curves(self, matrix: bytes) -> list[TracedCurve]:
         T = np.frombuffer(matrix).reshape(4, 4)
         checkpoint()
-        paths, starts = self._beside_nearby(T)
-        if len(starts) or not paths:
-            paths += self._through(starts, T, bool(paths))
-        return self._different(paths, T)
+        stack, starts = self._beside_nearby(T)
+        count = len(stack.first)
+        if len(starts) or not count:
+            stack = stack.joined(self._through(starts, T, count > 0))
+        return self._different(stack, T)
 
     def _through(self, starts: Array, T: Array, others: bool) -> list[TracedPath]:
         """The curves with the flange at T (4, 4) that starts (n, 7) lead to, and if there are no others, those that the
@@ -145,15 +147,16 @@ class TracedArm:
             raise SingularPose("goal", float(smallest.min()))
         return traced(self._chain, q[regular], T)
 
-    def _different(self, paths: Sequence[TracedPath], T: Array) -> list[TracedCurve]:
-        """The curves along paths, in their order, each once."""
-        if not paths:
+    def _different(self, stack: TracedStack, T: Array) -> list[TracedCurve]:
+        """The curves of a stack, in their order, each once."""
+        if not len(stack.first):
             return []
-        stack, found = TracedStack.of(paths), list[TracedCurve]()
-        places, near = stack.places_and_near()
+        found = list[TracedCurve]()
+        places, beside = stack.places_and_near()
+        near = beside.tolist()
         for row in np.argsort(places, kind="stable").tolist():
             # where a curve bends, one start may pass another unseen
-            if not any(near[row, each.row] and each.passes(paths[row].q[0]) for each in found):
+            if not any(near[row][each.row] and each.passes(stack.nodes[stack.first[row]]) for each in found):
                 half = float(stack.half[row])
                 label = NumberedBranch(len(found) + 1)
                 found.append(TracedCurve(self._chain, T, stack, row, label, [(-half, half)]))

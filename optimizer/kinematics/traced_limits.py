@@ -6,21 +6,23 @@ A cubic is within the hull of its four control points: most are inside all limit
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from models.robot import Array, Mask
-from optimizer.kinematics.across_curve import LEFT, step_to
+from optimizer.kinematics.across_curve import LEFT, led
 from optimizer.kinematics.angles import wrapped
+from optimizer.kinematics.hermite import hermite_weights
 from optimizer.kinematics.traced_curve import TracedCurve, on_curve
 from optimizer.kinematics.traced_stack import Rows, TracedStack
 
 # parts of a piece that may cross limits, between whose ends it is held against them
 PARTS = 8
-# steps of Newton's method to where a curve crosses limits, and steps that find what it does not
-STEPS, CROSSINGS = 5, 16
-# longest step there, and distance [rad] from the cubics within which a curve is
+WEIGHTS = hermite_weights(np.linspace(0.0, 1.0, PARTS + 1))
+# steps to where a curve crosses limits, if Newton's method does not find it
+CROSSINGS = 16
+# longest step of that, and distance [rad] from the cubics within which a curve is
 NEAR = 0.05
 # rounding of an angle on a limit [rad]
 ROUNDING = 1e-9
@@ -42,8 +44,12 @@ class _Range:
 
     def excess(self, q: Array) -> Array:
         """How far (n,) [rad] configurations (n, nq) are beyond limits, negative inside."""
-        away = np.abs(wrapped(q[:, self.joints] - self.middle)) - self.half
-        return np.asarray(away.max(axis=1, initial=-np.pi))
+        return self.beyond(q[:, self.joints])
+
+    def beyond(self, angles: Array) -> Array:
+        """The same (…) of angles (…, m) [rad] of the joints that have limits."""
+        away = np.abs(wrapped(angles - self.middle)) - self.half
+        return np.asarray(np.maximum.reduce(away, axis=-1))
 
 
 def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[TracedCurve]:
@@ -53,11 +59,7 @@ def within(curves: Sequence[TracedCurve], q_min: Array, q_max: Array) -> list[Tr
     if not curves or not len(limits.joints):
         return list(curves)
     cut = _cut(curves, limits)
-    return [
-        curve if arcs == curve.arcs else replace(curve, arcs=arcs)
-        for curve, arcs in zip(curves, cut, strict=True)
-        if arcs
-    ]
+    return [curve if arcs == curve.arcs else curve.cut(arcs) for curve, arcs in zip(curves, cut, strict=True) if arcs]
 
 
 def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float, float]]]:
@@ -66,38 +68,42 @@ def _cut(curves: Sequence[TracedCurve], limits: _Range) -> list[list[tuple[float
     inside, undecided = _by_hull(stack, limits)
     at, piece = np.zeros(0), np.zeros(0, dtype=np.intp)
     if len(undecided):
-        share = np.linspace(0.0, 1.0, PARTS + 1)
-        sampled = stack.at(np.repeat(undecided, PARTS + 1), np.tile(share, len(undecided)))
-        excess = limits.excess(sampled).reshape(len(undecided), PARTS + 1)
+        excess = limits.beyond(stack.at_each(undecided, WEIGHTS, limits.joints))
         held = excess <= 0
         row, part = np.nonzero(held[:, 1:] != held[:, :-1])
         piece = undecided[row]
         if len(piece):
-            parts = np.array([part, part + 1])
-            at = _crossings(curves[0], limits, piece, share[parts], excess[row, parts])
+            at = _crossings(curves[0], limits, piece, part, excess[row])
     gap = stack.knots[np.minimum(piece + 1, len(inside) - 1)] - stack.knots[piece]
     ends = stack.knots[piece] + at * gap
-    crossed = np.split(ends, np.searchsorted(piece, stack.last[:-1]))
+    # piece by piece, and so curve by curve
+    crossed, behind = ends.tolist(), [0, *np.searchsorted(piece, stack.last).tolist()]
     first, last = inside[stack.first].tolist(), inside[stack.last].tolist()
-    return [_arcs(each, crossed[each.row].tolist(), first[each.row], last[each.row]) for each in curves]
+    return [
+        _arcs(each, crossed[behind[each.row] : behind[each.row + 1]], first[each.row], last[each.row])
+        for each in curves
+    ]
 
 
 def _by_hull(stack: TracedStack, limits: _Range) -> tuple[Mask, Rows]:
     """Which nodes (n,) are inside limits, and the rows of those nodes after which the cubic may cross one."""
     q, tangents = stack.nodes[:, limits.joints], stack.tangents[:, limits.joints]
+    own = wrapped(q - limits.middle)
+    inside: Mask = np.logical_and.reduce(np.abs(own) <= limits.half, axis=1)
     points = np.empty((4, len(q) - 1, len(limits.joints)))
-    points[0] = wrapped(q[:-1] - limits.middle)
+    points[0] = own[:-1]
     # the other ones without full turns left out
     third = stack.ways[:-1, None] / 3
     points[1], points[3] = points[0] + third * tangents[:-1], points[0] + (q[1:] - q[:-1])
     points[2] = points[3] - third * tangents[1:]
-    least, most = points.min(axis=0), points.max(axis=0)
-    held = ((least >= -limits.half) & (most <= limits.half)).all(axis=1)
+    least, most = np.minimum.reduce(points, axis=0), np.maximum.reduce(points, axis=0)
+    low, high = least >= -limits.half, most <= limits.half
+    held = np.logical_and.reduce(low & high, axis=1)
     beyond = 2 * np.pi - limits.half
     outside = ((least > limits.half) & (most < beyond)) | ((most < -limits.half) & (least > -beyond))
-    inside: Mask = np.asarray((np.abs(wrapped(q - limits.middle)) <= limits.half).all(axis=1))
     # of nodes on a limit, rounding may have it that hull and node differ
-    crossing = ~(held & inside[:-1] & inside[1:]) & ~(outside.any(axis=1) & ~inside[:-1] & ~inside[1:])
+    both, either = inside[:-1] & inside[1:], inside[:-1] | inside[1:]
+    crossing = ~(held & both) & (either | ~np.logical_or.reduce(outside, axis=1))
     crossing[stack.last[:-1]] = False
     return inside, np.flatnonzero(crossing)
 
@@ -118,22 +124,27 @@ def _arcs(curve: TracedCurve, ends: list[float], first: bool, last: bool) -> lis
     return arcs
 
 
-def _crossings(one: TracedCurve, limits: _Range, k: Rows, share: Array, excess: Array) -> Array:
-    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, between those given (2, n), at
-    which the cubics exceed them by so much (2, n). `one` is any curve of the pose."""
-    stack = one.stack
-    # a chord crosses limits next to where the curve does
-    at = share[0] - excess[0] * (share[1] - share[0]) / (excess[1] - excess[0])
-    q, exact = _on_limits(one, limits, stack.at(k, at))
-    at = stack.in_line(k, at, q)
-    exact &= (at >= 0) & (at <= 1) & (np.abs(stack.at(k, at) - q).max(axis=1) < NEAR)
+def _crossings(one: TracedCurve, limits: _Range, k: Rows, part: Rows, excess: Array) -> Array:
+    """Shares (n,) of the pieces from points k (n,) on at which the curves cross limits, in the given parts (n,) of
+    these; the cubics exceed them by so much (n, PARTS + 1) at the ends of all. `one` is any curve of the pose."""
+    stack, rows = one.stack, np.arange(len(k))
+    # a parabola through the ends of the part and of the next one crosses limits next to where the curve does
+    low, high = excess[rows, part], excess[rows, part + 1]
+    beside = np.where(part < PARTS - 1, part + 2, part - 1)
+    chord = low / (low - high)
+    bend = (excess[rows, beside] + low + high) / 2 - 1.5 * np.where(beside > part, high, low)
+    root = np.minimum(np.maximum(chord - bend * chord * (chord - 1) / (high - low), 0.0), 1.0)
+    near = stack.at(k, (part + root) / PARTS)
+    q, exact = _on_limits(one, limits, near)
+    at = stack.in_line(k, (part + root) / PARTS, q)
+    exact &= (at >= 0) & (at <= 1) & (np.maximum.reduce(np.abs(near - q), axis=1) < NEAR)
     rest = np.flatnonzero(~exact)
     if len(rest):
         # what is aimed at is inside, by half of what rounding is given
         at[rest] = _zeros(
             lambda share: limits.excess(on_curve(one, k[rest], share)) + ROUNDING / 2,
-            share[:, rest],
-            excess[0, rest] <= 0,
+            np.array([part[rest], part[rest] + 1]) / PARTS,
+            low[rest] <= 0,
         )
     return at
 
@@ -149,11 +160,7 @@ def _on_limits(one: TracedCurve, limits: _Range, q: Array) -> tuple[Array, Mask]
     target = q[rows, joint] + side * (limits.half[binding] - ROUNDING / 2) - own[rows, binding]
     along = np.zeros((n, nq))
     along[rows, joint] = 1.0
-    for _ in range(STEPS):
-        move, left = step_to(one.chain, q, along, target - q[rows, joint], one.T)
-        q = q + np.clip(move, -NEAR, NEAR)
-        if left.max() < LEFT:
-            break
+    q, left = led(one.chain, q, along, target - q[rows, joint], one.T, NEAR)
     return q, (left < LEFT) & (limits.excess(q) <= 0)
 
 

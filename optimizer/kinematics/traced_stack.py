@@ -16,8 +16,8 @@ from optimizer.kinematics.hermite import hermite
 # half the range of the parameter of a curve with two ends: no full turn, whose ends would be one
 OPEN = 3.0
 # steps that find where a cubic is across from a configuration, the share beyond its ends that they may go to, and the
-# step that needs no more
-STEPS, BEYOND, IN_LINE = 8, 0.25, 1e-12
+# step whose square is none
+STEPS, BEYOND, IN_LINE = 8, 0.25, 1e-8
 # distance [rad] from the way between two points within which a curve is
 BESIDE = 0.15
 # length [rad] of no curve
@@ -42,10 +42,26 @@ class TracedStack:
     @classmethod
     def of(cls, paths: Sequence[TracedPath]) -> TracedStack:
         """The curves along paths."""
+        if not paths:
+            return cls(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(0, dtype=np.intp), np.zeros(0))
         counts = [len(path.q) for path in paths]
         half = [np.pi if path.closed else OPEN if count > 1 else 0.0 for path, count in zip(paths, counts, strict=True)]
         nodes, tangents = np.concatenate([path.q for path in paths]), np.concatenate([path.tangents for path in paths])
         return cls(nodes, tangents, np.cumsum([0, *counts[:-1]]), np.array(half))
+
+    def joined(self, paths: Sequence[TracedPath]) -> TracedStack:
+        """These curves, then those along paths."""
+        if not paths:
+            return self
+        others = TracedStack.of(paths)
+        if not len(self.first):
+            return others
+        return TracedStack(
+            np.concatenate([self.nodes, others.nodes]),
+            np.concatenate([self.tangents, others.tangents]),
+            np.concatenate([self.first, others.first + len(self.nodes)]),
+            np.concatenate([self.half, others.half]),
+        )
 
     @cached_property
     def last(self) -> Rows:
@@ -87,35 +103,53 @@ class TracedStack:
         gap = self.knots[after] - self.knots[k]
         return k, (u - self.knots[k]) / np.where(gap > 0, gap, 1.0)
 
+    def _after(self, k: Rows) -> Rows:
+        """The points after points k (n,); of one with no way to it, the same."""
+        return np.asarray(k + (self.ways[k] > 0))
+
     def at(self, k: Rows, share: Array) -> Array:
         """Points (n, nq) [rad] at shares (n,) of the ways from points k (n,) to the next ones."""
-        after, way = np.minimum(k + 1, len(self.nodes) - 1), self.ways[k][:, None]
-        # of a curve of one point, there is no next one
-        after = np.where(self.ways[k] > 0, after, k)
+        after, way = self._after(k), self.ways[k][:, None]
         return hermite(share, self.nodes[k], self.nodes[after], way * self.tangents[k], way * self.tangents[after])
+
+    def at_each(self, k: Rows, weights: Array, joints: Rows) -> Array:
+        """Angles (n, m, j) [rad] of some joints (j,) at each of m shares of the ways from points k (n,) to the next
+        ones, by the `hermite_weights` (4, m) of these shares."""
+        after, way = self._after(k), self.ways[k][:, None]
+        ends = np.empty((len(k), 4, self.nodes.shape[1]))
+        ends[:, 0], ends[:, 1] = self.nodes[k], self.nodes[after]
+        ends[:, 2], ends[:, 3] = way * self.tangents[k], way * self.tangents[after]
+        return np.asarray(weights.T @ ends[:, :, joints])
 
     def along(self, k: Rows, share: Array) -> Array:
         """Directions (n, nq) of the curves there, nearly: members are sought across them."""
-        after = np.where(self.ways[k] > 0, np.minimum(k + 1, len(self.nodes) - 1), k)
-        return self.tangents[k] + share[:, None] * (self.tangents[after] - self.tangents[k])
+        before = self.tangents[k]
+        return before + share[:, None] * (self.tangents[self._after(k)] - before)
 
     def in_line(self, k: Rows, share: Array, q: Array) -> Array:
         """The shares (n,), next to those given, at which configurations q (n, nq) [rad] are across from the curves:
         across the direction `along` there. Of ways of no length, those given."""
-        way, after = self.ways[k][:, None], np.where(self.ways[k] > 0, k + 1, k)
-        t, bend, chord = self.tangents[k], self.tangents[after] - self.tangents[k], self.nodes[after] - self.nodes[k]
-        # the cubic is node + a s + b s² + c s³, and what is sought a zero of a quartic
-        a, b = way * t, 3 * chord - way * (3 * t + bend)
-        c = way * (2 * t + bend) - 2 * chord
-        e0, e1 = ((q - self.nodes[k]) * np.stack([t, bend])).sum(axis=2)
-        f1, f2, f3 = (t * np.stack([a, b, c])).sum(axis=2)
-        g2, g3, g4 = (bend * np.stack([a, b, c])).sum(axis=2)
-        e1, e2, e3 = e1 - f1, -f2 - g2, -f3 - g3
+        way, after = self.ways[k], self._after(k)
+        sides = np.empty((4, *q.shape))
+        t, bend, chord, away = sides
+        t[:], bend[:] = self.tangents[k], self.tangents[after]
+        bend -= t
+        np.subtract(self.nodes[after], self.nodes[k], out=chord)
+        np.subtract(q, self.nodes[k], out=away)
+        (tt, _), (tb, bb), (tc, bc), (e0, e1) = np.einsum("xij,yij->xyi", sides, sides[:2])
+        # the cubic is node + a s + b s² + c s³ with a = way t, b = 3 chord - way (3 t + bend), c = way (2 t + bend) - 2
+        # chord; what is sought is a zero of a quartic
+        e1 = e1 - way * tt
+        e2 = way * (3 * tt) - 3 * tc
+        e3 = way * (2 * tb + bb - 2 * tt) + 2 * tc - 3 * bc
+        e4 = 2 * bc - way * (2 * tb + bb)
+        moving = way > 0
+        least = -np.maximum(way, NONE)
         for _ in range(STEPS):
-            value = e0 + share * (e1 + share * (e2 + share * (e3 - share * g4)))
-            slope = e1 + share * (2 * e2 + share * (3 * e3 - share * 4 * g4))
-            step = value / np.where(slope < 0, slope, -np.maximum(self.ways[k], NONE))
-            share = np.where(self.ways[k] > 0, np.minimum(np.maximum(share - step, -BEYOND), 1 + BEYOND), share)
+            value = e0 + share * (e1 + share * (e2 + share * (e3 + share * e4)))
+            slope = e1 + share * (2 * e2 + share * (3 * e3 + share * (4 * e4)))
+            step = value / np.where(slope < 0, slope, least)
+            share = np.where(moving, np.minimum(np.maximum(share - step, -BEYOND), 1 + BEYOND), share)
             if np.abs(step).max(initial=0.0) < IN_LINE:
                 break
         return np.asarray(share)
@@ -126,18 +160,17 @@ class TracedStack:
 
         The number is the mean of a sum of waves along the curve, which full turns do not change.
         """
-        c, s = np.cos(self.nodes), np.sin(self.nodes)
-        phases = np.arange(1.0, self.nodes.shape[1] + 1)
         # one phase for each joint, so that mirrored curves differ
-        pc, ps = np.cos(phases), np.sin(phases)
-        wave, slope = s @ pc + c @ ps, ((c * pc - s * ps) * self.tangents).sum(axis=1)
+        m, nq = self.nodes.shape
+        phases, waves = self.nodes + np.arange(1.0, nq + 1), np.empty((m, 2 * nq))
+        c, s = np.cos(phases, out=waves[:, :nq]), np.sin(phases, out=waves[:, nq:])
+        wave, slope = s.sum(axis=1), np.einsum("ij,ij->i", c, self.tangents)
         # the trapezoidal rule with its end correction
         parts, way = np.zeros(len(wave)), self.ways[:-1]
         parts[:-1] = way / 2 * (wave[1:] + wave[:-1]) - way**2 / 12 * (slope[1:] - slope[:-1])
         total = np.add.reduceat(parts, self.first)
         places = np.where(self.lengths > 0, total / np.maximum(self.lengths, NONE), wave[self.first])
         # at a distance d, the sum of the cosines of all angles between is no less than their number less d²/2
-        waves = np.hstack([c, s])
         alike = np.maximum.reduceat(waves[self.first] @ waves.T, self.first, axis=1)
         far = np.maximum.reduceat(self.ways, self.first) + BESIDE
-        return places, alike >= len(phases) - far**2 / 2
+        return places, alike >= nq - far**2 / 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from models.registry import load_robot
-from optimizer.kinematics.across_curve import LEFT, onto, second_order
+from optimizer.kinematics.across_curve import LEFT, MANY, led, onto, second_order, step_across
 from optimizer.kinematics.chain import Chain, miss, pose_error
 from tests.optimizer.chains import serial_chain
 
@@ -14,6 +14,8 @@ CHAINS = [Chain.of(load_robot("gen3").model), Chain.of(serial_chain(7).model)]
 STEPS, THIRD_ORDER = (3e-2, 3e-3, 3e-4), 40.0
 # error [m, rad] of what is on the curve: each of seven joints may be off by some LEFT
 EXACT = 10 * LEFT
+# share of a step, or length, that rounding changes next to a singularity; way ahead [rad]
+ROUNDING, AHEAD = 1e-9, 0.03
 
 
 def test_what_two_orders_leave_goes_with_the_cube_of_the_step() -> None:
@@ -39,3 +41,31 @@ def test_what_is_led_onto_the_curve_is_on_it_across_the_given_direction() -> Non
             reached = onto(chain, starts, np.tile(along, (20, 1)), T[0])
             assert miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
             assert np.abs((reached - starts) @ along).max() < EXACT
+
+
+def test_many_points_take_the_steps_that_few_do() -> None:
+    """Those of many are solved for by orthogonal rows, those of few by LAPACK."""
+    rng = np.random.default_rng(73)
+    for chain in CHAINS:
+        q = rng.uniform(-2.0, 2.0, (MANY + 10, 7))
+        T, along = chain.flange(q[:1])[0], rng.normal(size=q.shape)
+        move, tangent = step_across(chain, q, along, T)
+        parts = [step_across(chain, q[k : k + 20], along[k : k + 20], T) for k in range(0, len(q), 20)]
+        few, tangents = (np.concatenate(each) for each in zip(*parts, strict=True))
+        assert np.abs(move - few).max() < ROUNDING * np.abs(few).max()
+        unit, other = (each / np.linalg.norm(each, axis=1)[:, None] for each in (tangent, tangents))
+        assert np.abs(unit - other).max() < ROUNDING
+        assert ((tangent * along).sum(axis=1) > 0).all()
+
+
+def test_what_is_led_ahead_is_on_the_curve_as_far_ahead_as_asked() -> None:
+    """With short steps, too: what is left of the way is gone later."""
+    rng, chain = np.random.default_rng(74), CHAINS[0]
+    q = rng.uniform(-2.0, 2.0, 7)
+    T, jacobian = chain.flange_and_jacobian(q[None])
+    along = np.tile(np.linalg.svd(jacobian[0])[2][-1], (20, 1))
+    ahead = rng.uniform(-AHEAD, AHEAD, 20)
+    for longest in (np.inf, AHEAD / 3):
+        reached, left = led(chain, np.tile(q, (20, 1)), along, ahead, T[0], longest)
+        assert left.max() < LEFT and miss(pose_error(chain.flange(reached), T[0])).max() < EXACT
+        assert np.abs(((reached - q) * along).sum(axis=1) - ahead).max() < EXACT

@@ -15,6 +15,7 @@ from optimizer.exceptions import SingularPose, UnreachablePose
 from optimizer.kinematics.angles import wrapped
 from optimizer.kinematics.chain import Chain, miss, pose_error
 from optimizer.kinematics.curve_tracing import cycles, traced
+from optimizer.kinematics.hermite import hermite_weights
 from optimizer.kinematics.inverse import required_inverse_kinematics
 from optimizer.kinematics.nearby_arm import NearbyArm
 from optimizer.kinematics.nearby_loops import LONG, SHORT, followed
@@ -31,6 +32,8 @@ from tests.selection import long_but
 GEN3, CHAIN, PANDA = load_robot("gen3"), serial_chain(7), load_robot("panda")
 # rad: a parameter's derivative against a difference, and how far apart members of the least step are at most
 LIMIT = 1e-8
+# rad: of points on cubics
+ROUNDING = 1e-13
 # share of the members of a closed form that are on the curves found: of a pose next to a singularity some are not
 COVERED = 0.99
 # configurations [rad] next to which the curve of their pose bends by a right angle
@@ -127,7 +130,7 @@ def test_the_curves_of_the_arm_nearby_are_near_those_of_the_arm() -> None:
         for q in rng.uniform(-1.5, 1.5, (5, 7)):
             T = chain.flange(q[None])[0]
             found, rest = nearby.loops(T)
-            starts = np.vstack([*found, *rest])
+            starts = np.vstack([found.points, *rest])
             assert len(starts) and miss(pose_error(chain.flange(starts), T)).max() < 2e-3
         found = TracedArm.of(model)
         assert found is not None and found.self_motions(T)
@@ -140,13 +143,13 @@ def test_curves_found_all_points_at_once_are_those_followed_point_by_point() -> 
     assert nearby is not None
     for _ in range(4):
         T = flange(GEN3, inside(GEN3, rng))
-        paths, good = followed(chain, nearby.loops(T)[0], T)
-        assert len(paths) == good.sum()
-        for path in paths:
-            start, _ = solved(chain, path.q[0][None], T)
+        stack, good = followed(chain, nearby.loops(T)[0], T)
+        assert len(stack.first) == good.sum()
+        for first, last in zip(stack.first, stack.last, strict=True):
+            start, _ = solved(chain, stack.nodes[[first]], T)
             (other,) = traced(chain, start, T)
             curve = TracedCurve.of(chain, T, other, NumberedBranch(1))
-            assert other.closed and all(away(curve, q) < SHORT for q in path.q)
+            assert other.closed and all(away(curve, q) < SHORT for q in stack.nodes[first : last + 1])
             count += 1
     assert count > 15
 
@@ -159,7 +162,7 @@ def test_nearly_all_poses_have_points_enough_along_their_curves() -> None:
     for _ in range(poses):
         T = flange(GEN3, inside(GEN3, rng))
         loops, rest = nearby.loops(T)
-        assert all(np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops)
+        assert all(np.linalg.norm(np.diff(each, axis=0), axis=1).max() < 2 * LONG for each in loops.each())
         count += not rest and followed(chain, loops, T)[1].all()
     assert count >= AT_ONCE * poses
 
@@ -206,6 +209,14 @@ def test_the_parameter_of_a_member_is_found_again(robot: Robot, arm: TracedArm) 
         for u in rng.uniform(*curve.arcs[0], 4):
             found = curve.at(np.array([u, curve.parameter(curve.at(np.array([u]))[0])]))
             assert np.abs(wrapped(found[1] - found[0])).max() < LIMIT
+
+
+def test_points_at_many_shares_are_those_at_each(robot: Robot, arm: TracedArm) -> None:
+    curve = arm.self_motions(flange(robot, inside(robot, np.random.default_rng(76))))[0]
+    share, joints, k = np.linspace(0.0, 1.0, 5), np.array([1, 4]), np.arange(3)
+    each = curve.stack.at_each(k, hermite_weights(share), joints)
+    for row in k:
+        assert np.abs(each[row] - curve.stack.at(np.full(5, row), share)[:, joints]).max() < ROUNDING
 
 
 def test_boxes_hold_what_they_say(robot: Robot, arm: TracedArm) -> None:
@@ -262,7 +273,9 @@ def test_an_arm_stretched_further_than_the_one_nearby_is_found() -> None:
     """The one nearby has no curve there. The starts of the table led to two others of the arm's curves."""
     arm, T = TracedArm.of(GEN3.model), flange(GEN3, STRETCHED)
     nearby = NearbyArm.of(Chain.of(GEN3.model))
-    assert arm is not None and nearby is not None and nearby.loops(T) == ([], []) and nearby.beside(T)
+    assert arm is not None and nearby is not None and nearby.beside(T)
+    loops, rest = nearby.loops(T)
+    assert not loops.counts and not rest
     assert min(away(each, STRETCHED) for each in arm.self_motions(T, GEN3.limits)) < FOUND
 
 
