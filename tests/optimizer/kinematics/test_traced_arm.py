@@ -63,6 +63,9 @@ BENT_CURVES = (
 )
 # configuration [rad] of an arm stretched further than the one nearby reaches: 0.35 mm lie between their axes
 STRETCHED = np.array([-5.237985, 0.035838, 1.066330, -0.002736, -4.184650, -1.781755, -3.956364])
+# configuration [rad] on a curve that passes another one so near that both are followed as one: found a step beside
+MISSED = np.array([1.7421639313669246, 1.2081081464382009, -1.1520435434201328, -2.1504617708665963,
+                   3.6191942258128424, 0.5573754073121058, 4.203107568439206])  # fmt: skip
 # least share of poses all of whose curves are found without being followed step by step
 AT_ONCE = 0.9
 # s: no search comes near it, however busy the machine
@@ -309,3 +312,11 @@ def test_an_answer_over_curves_that_may_be_missing_is_not_optimal(from_pose: boo
     to_joints = optimize(replace(problem, goal=goal)) if not from_pose else None
     # any posture of the goal pose needs no more than the one that the pose was made of
     assert to_joints is None or found.energy.electrical.total <= 1.001 * to_joints.energy.electrical.total
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-4, -1e-4])
+def test_a_curve_that_passes_another_is_missed_there_alone(beside: float) -> None:
+    arm, q = TracedArm.of(GEN3.model), MISSED + beside
+    assert arm is not None and not arm.complete
+    curves = arm.self_motions(flange(GEN3, q), GEN3.limits)
+    assert (min(away(each, q) for each in curves) < FOUND) == (beside != 0.0)
