@@ -68,32 +68,34 @@ class Plant:
         time: float = 0.0,
         regeneration: float | None = None,
         width: float = WIDTH,
+        frictionless: bool = False,
     ) -> Array:
         """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1] and duration [W].
 
         `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply takes back. The cost of
         an instant cannot depend on a charge: with an energy storage, this value stands for it. `width` [W] smooths the
-        corners of the cost.
+        corners of the cost. If `frictionless`, the limited torque is that of the rigid bodies and the rotors.
         """
         payload, friction, drives, nq = self.arm.payload, self.arm.friction_law, self.arm.drives, self.arm.robot.nq
+        present = 0.0 if frictionless else 1.0
         return Parameters(
             mass=payload.mass,
             com=payload.com,
             inertia=payload.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]],
             gravity=self.arm.gravity,
             rotor_inertia=drives.rotor_inertia,
-            coulomb=friction.coulomb,
-            curved=friction.curved,
+            coulomb=present * friction.coulomb,
+            curved=present * friction.curved,
             speed=friction.speed,
-            viscous=friction.viscous,
-            load=np.zeros(nq) if friction.load is None else friction.load,
+            viscous=present * friction.viscous,
+            load=np.zeros(nq) if friction.load is None else present * friction.load,
             bend=BEND * self.arm.robot.limits.tau_max,
             torque_constant=drives.torque_constant,
             copper=drives.copper,
             inverter_constant=drives.inverter_constant,
             inverter_linear=drives.inverter_linear,
             inverter_quadratic=drives.inverter_quadratic,
-            link_side=float(self.arm.robot.torque_side == "link"),
+            link_side=present * float(self.arm.robot.torque_side == "link"),
             base_power=self.arm.base_power,
             regeneration=self.arm.regeneration if regeneration is None else regeneration,
             isolated=float(self.arm.bus.mode == "isolated"),

@@ -22,6 +22,7 @@ from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
 from optimizer.methods.duration_intervals import duration_intervals
 from optimizer.methods.free_spline import TIGHT, FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.methods.sharp_motion import sharp_motion
 from optimizer.methods.sqp_method import above
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate, Reason
@@ -35,9 +36,9 @@ from optimizer.solution import CandidateStatus
 LEAST_TIME = 3.0
 # candidates whose rough motions are found at a time, in order of their lower bounds
 AT_ONCE = 12
-# relative decreases that a further step must promise: on few control points, from random guesses, on more control
-# points, and on as many as the last motion
-COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 2e-3, 2e-3, 1e-3
+# relative decreases that a further step must promise: on few control points, from random guesses, and on more control
+# points
+COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
 # motions are given up if they are expected to need more than this ratio of the least of all
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
@@ -46,8 +47,8 @@ CONTENDING, CONTENDERS = 1.35, 8
 RESTARTS, FOLLOWED = 8, 6
 # of candidates without collisions, those that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.03, 2
-# with as many control points as the last motion, they are given up if they need more than this ratio of the least work
-BEHIND_BEST = 1.005
+# with sharper corners, they are given up if they need more than this ratio of the least work
+NEAR_SHARP = 1.005
 # on as many control points as the last motion, and with sharp corners, a motion needs about this ratio of its work
 PROMISE = 0.97
 # a motion that collides must be below this multiple of the best energy without clearance constraints, and below this
@@ -162,16 +163,33 @@ class _LeastWork:
         return self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
 
     def _follow(self, clear: list[Rough]) -> None:
-        """Follow motions to sharp corners, and solve the best; if it has no motion within the limits, the next."""
-        (first, last), best = SHARPER_WIDTHS, np.inf
-        followed = self.work.solved(clear, MIDDLE, first, PROGRESS, BEHIND)
-        for each in self.work.solved(followed, DENSE, first, DENSE_PROGRESS, NEAR_BEST):
-            if each.work > BEHIND_BEST * best:
+        """Follow motions to sharp corners, the best first; those that are left behind on the way are given up."""
+        best = np.inf
+        followed = self.work.solved(clear, MIDDLE, SHARPER_WIDTHS[0], PROGRESS, BEHIND)
+        for each in followed:
+            if each.work > NEAR_SHARP * followed[0].work and np.isfinite(best):
                 self.behind.add(id(each.candidate))
-            elif self._solved(each, each.points, last, LAST_PROGRESS).spline is not None:
+            elif self._sharpened(each).spline is not None:
                 # if there is none, there may be one with rounder corners
                 best = min(best, each.work)
                 self.tried.add(id(each.candidate))
+
+    def _sharpened(self, rough: Rough) -> SolveResult:
+        """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides or fails."""
+        incumbent, found = self.incumbent, list[Array]()
+
+        def sharpen() -> SolveResult:
+            result, points = sharp_motion(incumbent.prepared, rough.on(DENSE), self.work.duration, SHARPER_WIDTHS[0])
+            found.append(points)
+            return result
+
+        result = in_time(incumbent, sharpen)
+        if result.spline is None and found:
+            return self._solved(rough, found[0], SHARPER_WIDTHS[-1], LAST_PROGRESS)
+        if result.spline is not None:
+            incumbent.accept_if_better(rough.candidate, result, incumbent.prepared.energy(result.spline))
+            incumbent.tell_tried(rough.candidate)
+        return result
 
     def _solve_promising(self) -> None:
         """Solve the candidates whose rough motions promise less than what is known, the most promising first."""
