@@ -10,6 +10,7 @@ from models.robot import Array
 from optimizer.energy.plant import SHARPER_WIDTHS
 from optimizer.methods.limit_repair import MARGIN, REPAIR_MARGIN, WITHIN, repair_factors
 from optimizer.methods.method import CONVERGED, SolveResult, SolveStatus
+from optimizer.methods.sqp_method import COSTLIER
 from optimizer.nlp.interior_point import Interior, InteriorPoint
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.trajectories import bspline
@@ -19,15 +20,17 @@ from optimizer.trajectories.spline import Spline, span_peak_rates, spline_of
 REPAIRS = 8
 # relative decrease of the work that a further step must promise
 PROGRESS = 2e-4
+# part of the width of its corner by which a joint's smooth power is above its power, on the mean
+ROUNDED = 0.5
 
 
 def sharp_motion(
-    prepared: PreparedProblem, points: Array, duration: float, first: float
+    prepared: PreparedProblem, points: Array, duration: float, first: float, below: float = np.inf
 ) -> tuple[SolveResult, Array]:
     """The motion from control points (n, nq) [rad] over evenly spaced knots, with corners of `first` [W] at first.
 
     It lasts `duration` [s]. It may collide: then the result has the collision, but no motion. Returned with its control
-    points (n, nq) [rad].
+    points (n, nq) [rad]. It is given up if it is not expected to need less than `below` [J].
     """
     limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
     basis, nq = bspline.uniform(len(points)), points.shape[1]
@@ -37,8 +40,11 @@ def sharp_motion(
     )
     ends, bounds = points[[0, -1]], program.unbounded()
     at = program.first(ends, np.clip(points[basis.free], limits.q_min, limits.q_max), first, bounds)
+    most = below + ROUNDED * SHARPER_WIDTHS[-1] * duration * nq
     for solves in range(1, REPAIRS + 1):
-        at = program.minimised(ends, at, SHARPER_WIDTHS[-1], bounds, PROGRESS)
+        at = program.minimised(ends, at, SHARPER_WIDTHS[-1], bounds, PROGRESS, most)
+        if at.costlier:
+            return SolveResult(SolveStatus.PRUNED, COSTLIER, at.iterations, solves), points
         points = program.points(ends, at.free)
         if not at.converged:
             return SolveResult(SolveStatus.FAILED, "it did not converge", at.iterations, solves), points

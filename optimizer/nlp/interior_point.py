@@ -45,6 +45,8 @@ RESIDUAL_PRICE = 2.0
 CENTRAL = 1e6
 # steps within which a motion must lose the relative decrease `progress`, if it is within its limits
 PATIENCE = 3
+# a motion is given up if even this multiple of the decrease that its step promises leaves it above what it must be
+MOST_DECREASE = 3.0
 # excess of a ratio over its bound that is none
 EXCESS = 2e-5
 
@@ -54,9 +56,9 @@ class Interior:
     """An iterate: free control points (m, r), slacks and prices (2, K) [J] of the limits below and above their bounds,
     slopes (N, r) of the corners, limited torques (N, r) [N·m], barrier [J] and width [W].
 
-    `work` [J] is the sum of |p| at the nodes, `scale` [J] that of the first iterate, `excess` the greatest excess of a
+    `work` [J] is the smooth work, `scale` [J] that of the first iterate, `excess` the greatest excess of a
     ratio over its bound. `stationarity` is as of the SQP's `Result`. `converged`: a further step promises too
-    little, and the motion is within its limits.
+    little, and the motion is within its limits. `costlier`: it was given up.
     """
 
     free: Array
@@ -72,6 +74,7 @@ class Interior:
     stationarity: float = np.inf
     iterations: int = 0
     converged: bool = False
+    costlier: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,8 +120,8 @@ class InteriorPoint:
         """The iterate at free control points (m, r) [rad] of a motion between `ends` (2, r), for `bounds` (K,)."""
         y = self._states(ends, free)
         power = self.kernel.value(y, self.plain)[1] * self._speeds(y)
-        limited = self.kernel.value(y, self.parameters(width))[1].copy()
-        work = float((self._weights * np.abs(power)).sum())
+        cost, limited = self.kernel.value(y, self.parameters(width))
+        work, limited = float(self._weights[:, 0] @ cost), limited.copy()
         scale = max(work, 1e-9)
         ratio = self._ratio(ends, free, limited)
         slack = np.maximum(bounds - np.stack([ratio, -ratio]), LEAST_SLACK)
@@ -126,10 +129,13 @@ class InteriorPoint:
         slope = power / np.hypot(power, width)
         return Interior(free, slack, barrier / slack, slope, limited, barrier, width, work, scale)
 
-    def minimised(self, ends: Array, at: Interior, last: float, bounds: Array, progress: float) -> Interior:
+    def minimised(
+        self, ends: Array, at: Interior, last: float, bounds: Array, progress: float, below: float = np.inf
+    ) -> Interior:
         """The motion of least work with corners of width `last` [W], from an iterate.
 
-        It goes on until a step promises less than the relative decrease `progress`.
+        It goes on until a step promises less than the relative decrease `progress`, and is given up if its smooth work
+        is not expected to come below `below` [J].
         """
         convexity, found, lost = Convexity(), at, [np.inf]
         for made in range(1, MAX_ITERATIONS + 1):
@@ -137,13 +143,15 @@ class InteriorPoint:
             nodes = self._nodes(ends, found)
             residual = np.stack([nodes.ratio, -nodes.ratio]) - bounds + found.slack
             step = self._step(found, nodes, residual, convexity)
+            smooth = float((self._weights * nodes.smooth).sum())
             if found.width <= last:
-                lost.append(float((self._weights * nodes.smooth).sum()))
+                lost.append(smooth)
             lowest = found.width <= last and found.barrier <= BARRIERS[1] * found.scale
+            if found.width <= last and smooth + MOST_DECREASE * min(step.descent, 0.0) > below:
+                return replace(found, costlier=True)
             found, length = self._moved(ends, found, step, nodes, bounds, last)
-            work = float((self._weights * np.abs(nodes.power)).sum())
-            stationarity = step.gradient / max(work, 1e-9)
-            found = replace(found, work=work, stationarity=stationarity, iterations=at.iterations + made)
+            stationarity = step.gradient / found.scale
+            found = replace(found, work=smooth, stationarity=stationarity, iterations=at.iterations + made)
             little = -step.descent < progress * found.scale and length > LAST_STEP
             little |= lost[-1 - PATIENCE :][0] - lost[-1] < progress * found.scale
             if not length or (lowest and little and found.excess <= EXCESS):

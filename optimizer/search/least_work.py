@@ -46,9 +46,9 @@ CONTENDING, CONTENDERS = 1.35, 8
 # random guesses of the two best candidates, and how many of their motions are solved on more control points
 RESTARTS, FOLLOWED = 8, 6
 # of candidates without collisions, those that need at most this ratio of the least are followed, and so many
-NEAR_BEST, RIVALS = 1.03, 2
+NEAR_BEST, RIVALS = 1.05, 6
 # with sharper corners, they are given up if they need more than this ratio of the least work
-NEAR_SHARP = 1.005
+NEAR_SHARP, SHARPENED = 1.03, 3
 # on as many control points as the last motion, and with sharp corners, a motion needs about this ratio of its work
 PROMISE = 0.97
 # a motion that collides must be below this multiple of the best energy without clearance constraints, and below this
@@ -148,43 +148,48 @@ class _LeastWork:
         return sorted(self.rough.values(), key=lambda each: each.work)
 
     def _clear(self, found: list[Rough]) -> list[Rough]:
-        """Of motions in order of work, the first that does not collide, and those of other candidates near it."""
-        clear: dict[int, Rough] = {}
+        """Of motions in order of work, the first that does not collide, and others near it that do not, either."""
+        clear: list[Rough] = []
         for each in found:
-            best = next(iter(clear.values()), None)
-            if best is not None and (each.work > NEAR_BEST * best.work or len(clear) > RIVALS):
+            if clear and (each.work > NEAR_BEST * clear[0].work or len(clear) == RIVALS):
                 break
             roomy = self.work.duration >= LEAST_FREEDOM * each.candidate.shortest
-            if roomy and id(each.candidate) not in clear and self._is_clear(each):
-                clear[id(each.candidate)] = each
-        return list(clear.values())
+            if roomy and not any(each.is_like(other) for other in clear) and self._is_clear(each):
+                clear.append(each)
+        return clear
 
     def _is_clear(self, rough: Rough) -> bool:
         return self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
 
     def _follow(self, clear: list[Rough]) -> None:
         """Follow motions to sharp corners, the best first; those that are left behind on the way are given up."""
-        best = np.inf
-        followed = self.work.solved(clear, MIDDLE, SHARPER_WIDTHS[0], PROGRESS, BEHIND)
-        for each in followed:
-            if each.work > NEAR_SHARP * followed[0].work and np.isfinite(best):
+        made, least = 0, np.inf
+        for each in self.work.solved(clear, MIDDLE, SHARPER_WIDTHS[0], PROGRESS, BEHIND):
+            if made == SHARPENED or each.work > NEAR_SHARP * least:
                 self.behind.add(id(each.candidate))
-            elif self._sharpened(each).spline is not None:
+                continue
+            result = self._sharpened(each)
+            made += 1
+            if result.spline is not None or result.status is SolveStatus.PRUNED:
                 # if there is none, there may be one with rounder corners
-                best = min(best, each.work)
+                least = min(least, each.work)
                 self.tried.add(id(each.candidate))
+        self.behind -= self.tried
 
     def _sharpened(self, rough: Rough) -> SolveResult:
         """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides or fails."""
         incumbent, found = self.incumbent, list[Array]()
 
         def sharpen() -> SolveResult:
-            result, points = sharp_motion(incumbent.prepared, rough.on(DENSE), self.work.duration, SHARPER_WIDTHS[0])
+            best = incumbent.best()
+            known = np.inf if best is None or best.energy is None else best.energy
+            points, first = rough.on(DENSE), SHARPER_WIDTHS[0]
+            result, points = sharp_motion(incumbent.prepared, points, self.work.duration, first, known)
             found.append(points)
             return result
 
         result = in_time(incumbent, sharpen)
-        if result.spline is None and found:
+        if result.spline is None and result.status is not SolveStatus.PRUNED and found:
             return self._solved(rough, found[0], SHARPER_WIDTHS[-1], LAST_PROGRESS)
         if result.spline is not None:
             incumbent.accept_if_better(rough.candidate, result, incumbent.prepared.energy(result.spline))

@@ -21,6 +21,8 @@ from optimizer.trajectories.spline import Spline, spline_of
 SHARP = 1e-6
 # control points of guesses, and steps from one that are made whatever they promise: the first promise little
 COARSE, SURE = 13, 3
+# distance of all control points [rad] below which two motions count as one
+ALIKE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,11 @@ class Rough:
     def spline(self, duration: float) -> Spline:
         """The motion of `duration` [s]."""
         return spline_of(bspline.uniform(len(self.points)), self.points, duration)
+
+    def is_like(self, other: Rough) -> bool:
+        """Whether another motion of as many control points is nearly the same."""
+        same = self.candidate is other.candidate
+        return same and bool(np.abs(self.points - other.points).max() < ALIKE)
 
     def on(self, count: int) -> Array:
         """The motion's `count` control points (count, nq) [rad]: through the same places, not quite the same motion if
