@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -68,34 +68,43 @@ class Plant:
         time: float = 0.0,
         regeneration: float | None = None,
         width: float = WIDTH,
-        frictionless: bool = False,
     ) -> Array:
         """Packed kernel parameters: the arm's, and weights of electrical and mechanical energy [1] and duration [W].
 
         `regeneration` [1] is the value of a joule of surplus, by default what the arm's supply takes back. The cost of
         an instant cannot depend on a charge: with an energy storage, this value stands for it. `width` [W] smooths the
-        corners of the cost. If `frictionless`, the limited torque is that of the rigid bodies and the rotors.
+        corners of the cost.
         """
+        return self._parameters(electrical, mechanical, time, regeneration, width).pack()
+
+    @cached_property
+    def frictionless_parameters(self) -> Array:
+        """Packed kernel parameters of a cost of zero, whose limited torque is that of rigid bodies and rotors."""
+        parts, none = self._parameters(0.0, 0.0, 0.0, None, WIDTH), np.zeros(self.arm.robot.nq)
+        return replace(parts, coulomb=none, curved=none, viscous=none, load=none, link_side=0.0).pack()
+
+    def _parameters(
+        self, electrical: float, mechanical: float, time: float, regeneration: float | None, width: float
+    ) -> Parameters:
         payload, friction, drives, nq = self.arm.payload, self.arm.friction_law, self.arm.drives, self.arm.robot.nq
-        present = 0.0 if frictionless else 1.0
         return Parameters(
             mass=payload.mass,
             com=payload.com,
             inertia=payload.inertia[[0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]],
             gravity=self.arm.gravity,
             rotor_inertia=drives.rotor_inertia,
-            coulomb=present * friction.coulomb,
-            curved=present * friction.curved,
+            coulomb=friction.coulomb,
+            curved=friction.curved,
             speed=friction.speed,
-            viscous=present * friction.viscous,
-            load=np.zeros(nq) if friction.load is None else present * friction.load,
+            viscous=friction.viscous,
+            load=np.zeros(nq) if friction.load is None else friction.load,
             bend=BEND * self.arm.robot.limits.tau_max,
             torque_constant=drives.torque_constant,
             copper=drives.copper,
             inverter_constant=drives.inverter_constant,
             inverter_linear=drives.inverter_linear,
             inverter_quadratic=drives.inverter_quadratic,
-            link_side=present * float(self.arm.robot.torque_side == "link"),
+            link_side=float(self.arm.robot.torque_side == "link"),
             base_power=self.arm.base_power,
             regeneration=self.arm.regeneration if regeneration is None else regeneration,
             isolated=float(self.arm.bus.mode == "isolated"),
@@ -105,7 +114,7 @@ class Plant:
             time=time,
             knee=KNEE,
             width=width,
-        ).pack()
+        )
 
     @cached_property
     def electrical_parameters(self) -> Array:

@@ -35,9 +35,7 @@ def sharp_motion(
     limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
     basis, nq = bspline.uniform(len(points)), points.shape[1]
     parameters = lru_cache(lambda width: prepared.parameters(mechanical=1.0, width=width))
-    program = InteriorPoint(
-        prepared.kernel, basis, parameters, prepared.parameters(frictionless=True), limits, duration
-    )
+    program = InteriorPoint(prepared.kernel, basis, limits, duration, parameters, prepared.frictionless_parameters)
     ends, bounds = points[[0, -1]], program.unbounded()
     at = program.first(ends, np.clip(points[basis.free], limits.q_min, limits.q_max), first, bounds)
     most = below + ROUNDED * SHARPER_WIDTHS[-1] * duration * nq
@@ -56,7 +54,9 @@ def sharp_motion(
                 return _checked(prepared, spline, at, solves), points
             torque = factors.tau_max
         bounds = program.tightened(bounds, 1 / np.where(spans > WITHIN, spans + REPAIR_MARGIN, 1.0), torque)
-    return SolveResult(SolveStatus.FAILED, "the motion exceeds limits between the nodes", at.iterations, REPAIRS), points
+    return SolveResult(
+        SolveStatus.FAILED, "the motion exceeds limits between the nodes", at.iterations, REPAIRS
+    ), points
 
 
 def _checked(prepared: PreparedProblem, spline: Spline, at: Interior, solves: int) -> SolveResult:

@@ -43,12 +43,10 @@ COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
-# random guesses of the two best candidates, and how many of their motions are solved on more control points
-RESTARTS, FOLLOWED = 8, 6
-# of candidates without collisions, those that need at most this ratio of the least are followed, and so many
+# motions without collisions that need at most this ratio of the least are followed, and so many
 NEAR_BEST, RIVALS = 1.05, 6
-# with sharper corners, they are given up if they need more than this ratio of the least work
-NEAR_SHARP, SHARPENED = 1.03, 3
+# width of their corners [W] at first
+FIRST_WIDTH = 0.2
 # on as many control points as the last motion, and with sharp corners, a motion needs about this ratio of its work
 PROMISE = 0.97
 # a motion that collides must be below this multiple of the best energy without clearance constraints, and below this
@@ -90,6 +88,23 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
     return True
 
 
+@dataclass(frozen=True)
+class _Effort:
+    """`restarts`: random guesses of each of the two best candidates; `followed`: how many of all their motions are
+    solved on more control points; `sharpened`: how many get sharp corners, if they need at most `near` times the
+    least before."""
+
+    restarts: int
+    followed: int
+    sharpened: int
+    near: float
+
+
+# Of one candidate, the best of 8 restarts is often another one than that of 24. Which of several motions needs the
+# least with sharp corners, the rough ones hardly say. Many candidates take their time before
+SOLE, SEVERAL = _Effort(24, 16, 3, 1.03), _Effort(8, 6, 2, 1.015)
+
+
 @dataclass(eq=False)
 class _LeastWork:
     """The search. `rough` are the motions of least work that are known of its candidates by their ids, `tried` the
@@ -110,27 +125,27 @@ class _LeastWork:
         least = min(each.work for each in self.rough.values())
         contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
         contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
-        again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, RESTARTS)]
-        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[:FOLLOWED]
+        effort = SOLE if len(contenders) == 1 else SEVERAL
+        again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, effort.restarts)]
+        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[: effort.followed]
         again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
-        self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)))
+        self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)), effort)
         self._solve_promising()
 
     def _screen(self) -> None:
         """Rough motions of one member of each family, then of the best families' others."""
         firsts = sorted((family[0] for family in self.families), key=lambda each: each.lower_bound)
         for k in range(0, len(firsts), AT_ONCE):
-            self._find(firsts[k : k + AT_ONCE], lines=True)
+            self._find(firsts[k : k + AT_ONCE])
         works = [self._work_of(family[0]) for family in self.families]
         near = [k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)]
-        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]], lines=False)
+        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]])
 
-    def _find(self, candidates: Sequence[Candidate], lines: bool) -> None:
+    def _find(self, candidates: Sequence[Candidate]) -> None:
         """Find rough motions of those candidates whose bounds do not rule them out."""
         least = min((each.work for each in self.rough.values()), default=np.inf)
         open_ = [each for each in candidates if each.lower_bound < least]
-        guesses = self.work.first(open_) + (self.work.straight(open_) if lines else [])
-        self._note(self.work.solved(guesses, COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
+        self._note(self.work.solved(self.work.first(open_), COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
 
     def _note(self, found: list[Rough]) -> list[Rough]:
         """Keep the motions of least work of each candidate; returns what was found."""
@@ -161,19 +176,21 @@ class _LeastWork:
     def _is_clear(self, rough: Rough) -> bool:
         return self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
 
-    def _follow(self, clear: list[Rough]) -> None:
+    def _follow(self, clear: list[Rough], effort: _Effort) -> None:
         """Follow motions to sharp corners, the best first; those that are left behind on the way are given up."""
         made, least = 0, np.inf
-        for each in self.work.solved(clear, MIDDLE, SHARPER_WIDTHS[0], PROGRESS, BEHIND):
-            if made == SHARPENED or each.work > NEAR_SHARP * least:
+        for each in clear:
+            if made == effort.sharpened or each.work > effort.near * least:
                 self.behind.add(id(each.candidate))
                 continue
             result = self._sharpened(each)
             made += 1
-            if result.spline is not None or result.status is SolveStatus.PRUNED:
+            if result.spline is not None:
                 # if there is none, there may be one with rounder corners
                 least = min(least, each.work)
                 self.tried.add(id(each.candidate))
+            elif result.status is SolveStatus.PRUNED:
+                self.behind.add(id(each.candidate))
         self.behind -= self.tried
 
     def _sharpened(self, rough: Rough) -> SolveResult:
@@ -183,7 +200,7 @@ class _LeastWork:
         def sharpen() -> SolveResult:
             best = incumbent.best()
             known = np.inf if best is None or best.energy is None else best.energy
-            points, first = rough.on(DENSE), SHARPER_WIDTHS[0]
+            points, first = rough.on(DENSE), FIRST_WIDTH
             result, points = sharp_motion(incumbent.prepared, points, self.work.duration, first, known)
             found.append(points)
             return result

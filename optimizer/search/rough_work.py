@@ -71,10 +71,6 @@ class RoughWork:
             found.append(Rough(each, _at_rest(points, each)))
         return found
 
-    def straight(self, candidates: Sequence[Candidate]) -> list[Rough]:
-        """Guesses of candidates: rest-to-rest quintics on straight lines."""
-        return [Rough(each, _line(each)) for each in candidates]
-
     def random(self, candidate: Candidate, count: int) -> list[Rough]:
         """As many guesses of a candidate: random displacements of the quintic, within the limits but for places."""
         limits, line = self.prepared.problem.arm.active_limits, _line(candidate)
