@@ -102,7 +102,7 @@ class _Effort:
 
 # Of one candidate, the best of 8 restarts is often another one than that of 24. Which of several motions needs the
 # least with sharp corners, the rough ones hardly say. Many candidates take their time before
-SOLE, SEVERAL = _Effort(24, 16, 3, 1.03), _Effort(8, 6, 2, 1.015)
+SOLE, SEVERAL = _Effort(24, 16, 3, 1.03), _Effort(8, 6, 1, 1.0)
 
 
 @dataclass(eq=False)
