@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -75,6 +75,17 @@ class Plant:
         an instant cannot depend on a charge: with an energy storage, this value stands for it. `width` [W] smooths the
         corners of the cost.
         """
+        return self._parameters(electrical, mechanical, time, regeneration, width).pack()
+
+    @cached_property
+    def frictionless_parameters(self) -> Array:
+        """Packed kernel parameters of a cost of zero, whose limited torque is that of rigid bodies and rotors."""
+        parts, none = self._parameters(0.0, 0.0, 0.0, None, WIDTH), np.zeros(self.arm.robot.nq)
+        return replace(parts, coulomb=none, curved=none, viscous=none, load=none, link_side=0.0).pack()
+
+    def _parameters(
+        self, electrical: float, mechanical: float, time: float, regeneration: float | None, width: float
+    ) -> Parameters:
         payload, friction, drives, nq = self.arm.payload, self.arm.friction_law, self.arm.drives, self.arm.robot.nq
         return Parameters(
             mass=payload.mass,
@@ -103,7 +114,7 @@ class Plant:
             time=time,
             knee=KNEE,
             width=width,
-        ).pack()
+        )
 
     @cached_property
     def electrical_parameters(self) -> Array:

@@ -19,8 +19,9 @@ from models.robot import Array, Limits
 from optimizer.deadline import checkpoint
 from optimizer.energy.kernel import Kernel
 from optimizer.nlp.active_path_constraints import Index
+from optimizer.nlp.control_point_pairs import ControlPointPairs
 from optimizer.nlp.convex_quadratic import Convexity
-from optimizer.trajectories.bspline import DEGREE, Basis, basis_matrix
+from optimizer.trajectories.bspline import Basis, basis_matrix
 
 # cost of the mean square of what exceeds a limit, as ratios of the limit and of the first cost
 PENALTY = 500.0
@@ -205,12 +206,8 @@ class ManyMotions:
             blocks[:, :, joints, joints] += self._rate_products @ (by_limit * (rates != 0) / self._rate_limits)
         if places.any():
             gradient += weight * places
-            same = np.flatnonzero(self._pairs[0] == self._pairs[1])
-            blocks[:, same[:, None], joints, joints] += weight * (places != 0)
-        band = np.zeros((many, self._m * r * (self._band + 1)))
-        kept, at = self._band_places
-        band[:, at] = blocks.reshape(many, -1)[:, kept]
-        return gradient.reshape(many, -1), band.reshape(many, self._m * r, -1)
+            blocks[:, self._pairs.own[:, None], joints, joints] += weight * (places != 0)
+        return gradient.reshape(many, -1), self._pairs.banded(blocks)
 
     def _node(self, y: Array, weight: Array, beyond: Array) -> tuple[Array, Array]:
         """Gradient (N, 3 nq) and Hessian (N, 3, 3, nq, nq) by q, v, a of one motion's cost and torque penalty."""
@@ -269,47 +266,25 @@ class ManyMotions:
         return np.repeat(self.limits.rates * (self.T ** np.arange(1, 4))[:, None], self._rate_count, axis=0)
 
     @cached_property
-    def _pairs(self) -> tuple[Index, Index]:
-        """The pairs i ≤ j of free control points that move the same span."""
-        apart = np.subtract.outer(np.arange(self._m), np.arange(self._m))
-        i, j = np.nonzero((apart <= 0) & (apart >= -DEGREE))
-        return i, j
+    def _pairs(self) -> ControlPointPairs:
+        return ControlPointPairs(self._m, self._r)
 
     @cached_property
     def _node_products(self) -> Array:
-        i, j = self._pairs
-        D = self._D.reshape(-1, 3, self._m)
-        return np.ascontiguousarray((D[:, :, None, i] * D[:, None, :, j]).reshape(-1, len(i)).T)
+        return self._pairs.node_products(self._D)
 
     @cached_property
     def _rate_products(self) -> Array:
-        i, j = self._pairs
-        return np.ascontiguousarray((self._R[:, i] * self._R[:, j]).T)
-
-    @property
-    def _band(self) -> int:
-        """Number of diagonals below the main one."""
-        return min((DEGREE + 1) * self._r, self._m * self._r) - 1
+        return self._pairs.products(self._R)
 
     @cached_property
     def _rate_bends(self) -> tuple[Array, Array]:
         """Second derivatives of half the sum of the squares of all rates' ratios: lower band, and upper triangle."""
-        (i, j), joints, n = self._pairs, np.arange(self._r), self._m * self._r
+        (i, j), joints, n = self._pairs.pairs, np.arange(self._r), self._m * self._r
         row, column = (each[:, None] * self._r + joints for each in (i, j))
-        band, upper = np.zeros((n, self._band + 1)), np.zeros((n, n))
+        band, upper = np.zeros((n, self._pairs.band + 1)), np.zeros((n, n))
         band[row, column - row] = upper[row, column] = self._rate_products @ (1 / self._rate_limits**2)
         return band, upper
-
-    @cached_property
-    def _band_places(self) -> tuple[Index, Index]:
-        """The entries of the pairs' blocks that are on or below the diagonal, and where they are in the band."""
-        (i, j), joints = self._pairs, np.arange(self._r)
-        rows, columns = np.broadcast_arrays(
-            j[:, None, None] * self._r + joints, i[:, None, None] * self._r + joints[:, None]
-        )
-        below = (rows - columns).ravel()
-        kept = np.flatnonzero(below >= 0)
-        return kept, (columns.ravel() * (self._band + 1) + below)[kept]
 
 
 def _beyond_one(ratio: Array) -> Array:

@@ -22,6 +22,7 @@ from optimizer.energy.plant import SHARPER_WIDTHS, WIDTH
 from optimizer.methods.duration_intervals import duration_intervals
 from optimizer.methods.free_spline import TIGHT, FreeSpline
 from optimizer.methods.method import SolveResult, SolveStatus
+from optimizer.methods.sharp_motion import sharp_motion
 from optimizer.methods.sqp_method import above
 from optimizer.search.attempts import in_time, solver_of
 from optimizer.search.candidates import Candidate, Reason
@@ -35,19 +36,17 @@ from optimizer.solution import CandidateStatus
 LEAST_TIME = 3.0
 # candidates whose rough motions are found at a time, in order of their lower bounds
 AT_ONCE = 12
-# relative decreases that a further step must promise: on few control points, from random guesses, on more control
-# points, and on as many as the last motion
-COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS, DENSE_PROGRESS = 2e-2, 2e-3, 2e-3, 1e-3
+# relative decreases that a further step must promise: on few control points, from random guesses, and on more control
+# points
+COARSE_PROGRESS, RESTART_PROGRESS, MIDDLE_PROGRESS = 2e-2, 2e-3, 2e-3
 # motions are given up if they are expected to need more than this ratio of the least of all
 BEHIND = 1.4
 # those that need at most this ratio of the least work on few control points are solved on more of them, and so many
 CONTENDING, CONTENDERS = 1.35, 8
-# random guesses of the two best candidates, and how many of their motions are solved on more control points
-RESTARTS, FOLLOWED = 8, 6
-# of candidates without collisions, those that need at most this ratio of the least are followed, and so many
-NEAR_BEST, RIVALS = 1.03, 2
-# with as many control points as the last motion, they are given up if they need more than this ratio of the least work
-BEHIND_BEST = 1.005
+# motions without collisions that need at most this ratio of the least are followed, and so many
+NEAR_BEST, RIVALS = 1.05, 6
+# width of their corners [W] at first
+FIRST_WIDTH = 0.2
 # on as many control points as the last motion, and with sharp corners, a motion needs about this ratio of its work
 PROMISE = 0.97
 # a motion that collides must be below this multiple of the best energy without clearance constraints, and below this
@@ -89,6 +88,23 @@ def explore_least_work(incumbent: Incumbent, explore: Callable[[], object]) -> b
     return True
 
 
+@dataclass(frozen=True)
+class _Effort:
+    """`restarts`: random guesses of each of the two best candidates; `followed`: how many of all their motions are
+    solved on more control points; `sharpened`: how many get sharp corners, if they need at most `near` times the
+    least before."""
+
+    restarts: int
+    followed: int
+    sharpened: int
+    near: float
+
+
+# Of one candidate, the best of 8 restarts is often another one than that of 24. Which of several motions needs the
+# least with sharp corners, the rough ones hardly say. Many candidates take their time before
+SOLE, SEVERAL = _Effort(24, 16, 3, 1.03), _Effort(8, 6, 1, 1.0)
+
+
 @dataclass(eq=False)
 class _LeastWork:
     """The search. `rough` are the motions of least work that are known of its candidates by their ids, `tried` the
@@ -109,27 +125,27 @@ class _LeastWork:
         least = min(each.work for each in self.rough.values())
         contenders = [each for each in self._known() if each.work <= CONTENDING * least][:CONTENDERS]
         contenders = self._note(self.work.solved(contenders, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
-        again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, RESTARTS)]
-        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[:FOLLOWED]
+        effort = SOLE if len(contenders) == 1 else SEVERAL
+        again = [rough for each in contenders[:2] for rough in self.work.random(each.candidate, effort.restarts)]
+        again = self.work.solved(again, COARSE, WIDTH, RESTART_PROGRESS, BEHIND)[: effort.followed]
         again = self._note(self.work.solved(again, MIDDLE, WIDTH, MIDDLE_PROGRESS, BEHIND))
-        self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)))
+        self._follow(self._clear(sorted([*contenders, *again], key=lambda each: each.work)), effort)
         self._solve_promising()
 
     def _screen(self) -> None:
         """Rough motions of one member of each family, then of the best families' others."""
         firsts = sorted((family[0] for family in self.families), key=lambda each: each.lower_bound)
         for k in range(0, len(firsts), AT_ONCE):
-            self._find(firsts[k : k + AT_ONCE], lines=True)
+            self._find(firsts[k : k + AT_ONCE])
         works = [self._work_of(family[0]) for family in self.families]
         near = [k for k in np.argsort(works, kind="stable").tolist() if works[k] <= NEAR * min(works)]
-        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]], lines=False)
+        self._find([each for k in near[:FAMILIES] for each in self.families[k][1:MEMBERS]])
 
-    def _find(self, candidates: Sequence[Candidate], lines: bool) -> None:
+    def _find(self, candidates: Sequence[Candidate]) -> None:
         """Find rough motions of those candidates whose bounds do not rule them out."""
         least = min((each.work for each in self.rough.values()), default=np.inf)
         open_ = [each for each in candidates if each.lower_bound < least]
-        guesses = self.work.first(open_) + (self.work.straight(open_) if lines else [])
-        self._note(self.work.solved(guesses, COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
+        self._note(self.work.solved(self.work.first(open_), COARSE, WIDTH, COARSE_PROGRESS, BEHIND))
 
     def _note(self, found: list[Rough]) -> list[Rough]:
         """Keep the motions of least work of each candidate; returns what was found."""
@@ -147,31 +163,55 @@ class _LeastWork:
         return sorted(self.rough.values(), key=lambda each: each.work)
 
     def _clear(self, found: list[Rough]) -> list[Rough]:
-        """Of motions in order of work, the first that does not collide, and those of other candidates near it."""
-        clear: dict[int, Rough] = {}
+        """Of motions in order of work, the first that does not collide, and others near it that do not, either."""
+        clear: list[Rough] = []
         for each in found:
-            best = next(iter(clear.values()), None)
-            if best is not None and (each.work > NEAR_BEST * best.work or len(clear) > RIVALS):
+            if clear and (each.work > NEAR_BEST * clear[0].work or len(clear) == RIVALS):
                 break
             roomy = self.work.duration >= LEAST_FREEDOM * each.candidate.shortest
-            if roomy and id(each.candidate) not in clear and self._is_clear(each):
-                clear[id(each.candidate)] = each
-        return list(clear.values())
+            if roomy and not any(each.is_like(other) for other in clear) and self._is_clear(each):
+                clear.append(each)
+        return clear
 
     def _is_clear(self, rough: Rough) -> bool:
         return self.incumbent.prepared.surroundings.worst_violation(rough.spline(self.work.duration)) is None
 
-    def _follow(self, clear: list[Rough]) -> None:
-        """Follow motions to sharp corners, and solve the best; if it has no motion within the limits, the next."""
-        (first, last), best = SHARPER_WIDTHS, np.inf
-        followed = self.work.solved(clear, MIDDLE, first, PROGRESS, BEHIND)
-        for each in self.work.solved(followed, DENSE, first, DENSE_PROGRESS, NEAR_BEST):
-            if each.work > BEHIND_BEST * best:
+    def _follow(self, clear: list[Rough], effort: _Effort) -> None:
+        """Follow motions to sharp corners, the best first; those that are left behind on the way are given up."""
+        made, least = 0, np.inf
+        for each in clear:
+            if made == effort.sharpened or each.work > effort.near * least:
                 self.behind.add(id(each.candidate))
-            elif self._solved(each, each.points, last, LAST_PROGRESS).spline is not None:
+                continue
+            result = self._sharpened(each)
+            made += 1
+            if result.spline is not None:
                 # if there is none, there may be one with rounder corners
-                best = min(best, each.work)
+                least = min(least, each.work)
                 self.tried.add(id(each.candidate))
+            elif result.status is SolveStatus.PRUNED:
+                self.behind.add(id(each.candidate))
+        self.behind -= self.tried
+
+    def _sharpened(self, rough: Rough) -> SolveResult:
+        """A candidate's solve with sharp corners, from a rough motion; by the SQP, if it collides or fails."""
+        incumbent, found = self.incumbent, list[Array]()
+
+        def sharpen() -> SolveResult:
+            best = incumbent.best()
+            known = np.inf if best is None or best.energy is None else best.energy
+            points, first = rough.on(DENSE), FIRST_WIDTH
+            result, points = sharp_motion(incumbent.prepared, points, self.work.duration, first, known)
+            found.append(points)
+            return result
+
+        result = in_time(incumbent, sharpen)
+        if result.spline is None and result.status is not SolveStatus.PRUNED and found:
+            return self._solved(rough, found[0], SHARPER_WIDTHS[-1], LAST_PROGRESS)
+        if result.spline is not None:
+            incumbent.accept_if_better(rough.candidate, result, incumbent.prepared.energy(result.spline))
+            incumbent.tell_tried(rough.candidate)
+        return result
 
     def _solve_promising(self) -> None:
         """Solve the candidates whose rough motions promise less than what is known, the most promising first."""

@@ -21,6 +21,8 @@ from optimizer.trajectories.spline import Spline, spline_of
 SHARP = 1e-6
 # control points of guesses, and steps from one that are made whatever they promise: the first promise little
 COARSE, SURE = 13, 3
+# distance of all control points [rad] below which two motions count as one
+ALIKE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,11 @@ class Rough:
     def spline(self, duration: float) -> Spline:
         """The motion of `duration` [s]."""
         return spline_of(bspline.uniform(len(self.points)), self.points, duration)
+
+    def is_like(self, other: Rough) -> bool:
+        """Whether another motion of as many control points is nearly the same."""
+        same = self.candidate is other.candidate
+        return same and bool(np.abs(self.points - other.points).max() < ALIKE)
 
     def on(self, count: int) -> Array:
         """The motion's `count` control points (count, nq) [rad]: through the same places, not quite the same motion if
@@ -63,10 +70,6 @@ class RoughWork:
             points = time_optimal_positions(limits, each.q_start, each.q_goal, at)
             found.append(Rough(each, _at_rest(points, each)))
         return found
-
-    def straight(self, candidates: Sequence[Candidate]) -> list[Rough]:
-        """Guesses of candidates: rest-to-rest quintics on straight lines."""
-        return [Rough(each, _line(each)) for each in candidates]
 
     def random(self, candidate: Candidate, count: int) -> list[Rough]:
         """As many guesses of a candidate: random displacements of the quintic, within the limits but for places."""

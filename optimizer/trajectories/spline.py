@@ -65,7 +65,12 @@ def fine_samples(spline: Spline, per_panel: int) -> tuple[Array, Array, Array, A
 
 
 def peak_rates(spline: Spline) -> Array:
-    """Greatest absolute speed, acceleration and jerk of every joint, (3, nq).
+    """Greatest absolute speed, acceleration and jerk of every joint, (3, nq)."""
+    return np.asarray(span_peak_rates(spline).max(axis=1))
+
+
+def span_peak_rates(spline: Spline) -> Array:
+    """Greatest absolute speed, acceleration and jerk of every joint in every knot span, (3, spans, nq).
 
     Every knot span is expanded around its middle, so that both sides of a repeated knot count. Every sample is raised
     to the vertex of the parabola through it and its neighbours: exact for a quintic's jerk, which is such a parabola.
@@ -85,7 +90,7 @@ def peak_rates(spline: Spline) -> Array:
         bend = 2 * top - low - high
         # the vertex counts only between the two outer samples
         vertex = np.where(np.abs(high - low) <= 2 * bend, (high - low) ** 2 / (8 * bend + 1e-300), 0.0)
-        peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=(0, 1)), (top + vertex).max(axis=(0, 1))))
+        peaks.append(np.maximum(np.abs(values[[0, -1]]).max(axis=0), (top + vertex).max(axis=0)))
     return np.array(peaks)
 
 
