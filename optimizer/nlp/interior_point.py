@@ -31,7 +31,7 @@ LEAST_SLACK, TO_BOUNDARY = 0.01, 0.995
 NEAR_TORQUE = 0.5
 # width and barrier fall after a step of at least this length; the last step is at least as long as the second number
 LONG_STEP, LAST_STEP = 0.3, 0.9
-MAX_ITERATIONS, BACKTRACKS = 40, 8
+MAX_ITERATIONS, BACKTRACKS = 80, 8
 # part of the promised decrease that a step must reach, and rounding
 ARMIJO, ROUNDING = 1e-4, 1e-9
 # price of a residual in the merit function, as a multiple of the price of its limit
