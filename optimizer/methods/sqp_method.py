@@ -278,9 +278,9 @@ class SqpMethod(Method):
         prepared = self.prepared
         spline = spline_of(program.basis, program.joint_points(result.free), result.duration)
         factors = repair_factors(prepared, spline, self.overshoot(spline))
-        if factors is not None:
-            spline = slightly_retimed(spline, factors, self.t_max)
-            factors = repair_factors(prepared, spline, self.overshoot(spline))
+        slower = spline if factors is None else slightly_retimed(spline, factors, self.t_max)
+        if slower is not spline:
+            spline, factors = slower, repair_factors(prepared, slower, self.overshoot(slower))
         collision = prepared.surroundings.worst_violation(spline)
         return LimitCheck(spline, factors, collision, path_excess(prepared, spline, program.path, collision))
 
