@@ -36,6 +36,8 @@ optimize_round_module = importlib.import_module("optimizer.optimize_round")
 ROUNDING = 1e-9
 # relative; a motion's energy from panels that are as long as a share of it
 QUADRATURE = 2e-5
+# relative; two solves that end where a step promises less than this
+PROGRESS = 5e-5
 ARM = Arm(robot=ROBOT, collisions=False)
 Q = [
     HOME + np.array(each)
@@ -240,7 +242,7 @@ def test_passes_at_the_same_place_are_one() -> None:
     assert [each.stop for each in found.moves[0].passes] == ["0", "1", "2", "3"]
     assert found.status == "optimal" and found.moves[0].solution.certificate.valid
     plain = optimize_round(of(Stop(name="1", target=Q[0], passed=True), Stop(name="rest", target=Q[1]), closed=False))
-    assert found.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=1e-6)
+    assert found.energy.electrical.total == pytest.approx(plain.energy.electrical.total, rel=PROGRESS)
 
 
 def test_waiting_is_not_at_a_stop_that_is_passed() -> None:
