@@ -109,10 +109,10 @@ class InteriorPoint(LimitedMotions):
 
     def first(self, ends: Array, free: Array, width: float, bounds: Array) -> Interior:
         """The iterate at free control points (m, r) [rad] of a motion between `ends` (2, r), for `bounds` (K,)."""
-        y = self._states(ends, free)
+        y = self._states(self.points(ends, free))
         power = self.kernel.value(y, self.plain)[1] * self._speeds(y)
         cost, limited = self.kernel.value(y, self.parameters(width))
-        work, limited = float(self._weights[:, 0] @ cost), limited.copy()
+        work, limited = float(self._weights @ cost), limited.copy()
         scale = max(work, 1e-9)
         ratio = self._ratio(ends, free, limited)
         slack = np.maximum(bounds - np.stack([ratio, -ratio]), LEAST_SLACK)
@@ -134,7 +134,7 @@ class InteriorPoint(LimitedMotions):
             nodes = self._nodes(ends, found)
             residual = np.stack([nodes.ratio, -nodes.ratio]) - bounds + found.slack
             step = self._step(found, nodes, residual, convexity)
-            smooth = float((self._weights * nodes.smooth).sum())
+            smooth = float((self._weights[:, None] * nodes.smooth).sum())
             if found.width <= last:
                 lost.append(smooth)
             lowest = found.width <= last and found.barrier <= BARRIERS[1] * found.scale
@@ -150,9 +150,9 @@ class InteriorPoint(LimitedMotions):
         return found
 
     def _nodes(self, ends: Array, at: Interior) -> _Nodes:
-        y, r = self._states(ends, at.free), self._r
+        y, r = self._states(self.points(ends, at.free)), self._r
         v, joints, count = self._speeds(y), np.arange(r), len(y)
-        pull, none, limited_J = self._weights * at.slope, np.zeros(count), None
+        pull, none, limited_J = self._weights[:, None] * at.slope, np.zeros(count), None
         if (np.abs(at.limited) > NEAR_TORQUE * self.limits.tau_max).any():
             price = self._torque_part(at.price[0] - at.price[1]) / self.limits.tau_max
             near = self.kernel.node(y, price, none, self.parameters(at.width))
@@ -179,11 +179,11 @@ class InteriorPoint(LimitedMotions):
         bend = (at.price / at.slack).sum(axis=0)
         unit = nodes.power / nodes.smooth
         # the curvature of the corner, if its slope keeps up
-        corner = self._weights / nodes.smooth * np.maximum(1 - at.slope * unit, 0.0)
+        corner = self._weights[:, None] / nodes.smooth * np.maximum(1 - at.slope * unit, 0.0)
         torque_bend = self._torque_part(bend) / self.limits.tau_max**2
         hessian = nodes.hessian + (nodes.jacobian * corner[:, :, None]).transpose(0, 2, 1) @ nodes.jacobian
         hessian += (nodes.torque_jacobian * torque_bend[:, :, None]).transpose(0, 2, 1) @ nodes.torque_jacobian
-        cost = self._D.T @ ((self._weights * unit)[:, None] @ nodes.jacobian).reshape(-1, self._r)
+        cost = self._D.T @ ((self._weights[:, None] * unit)[:, None] @ nodes.jacobian).reshape(-1, self._r)
         gradient = cost + self._pulled(nodes, target[0] - target[1])
         quadratic = convexity.of(self._pairs.banded(self._blocks(hessian, bend)))
         free = quadratic.least(gradient.ravel()).reshape(self._m, self._r)
@@ -209,16 +209,18 @@ class InteriorPoint(LimitedMotions):
         parameters = self.parameters(at.width)
         weight = RESIDUAL_PRICE * np.maximum(at.price, at.price + step.price)
         wrong = float((weight * np.abs(step.residual)).sum())
-        before = float((self._weights * nodes.smooth).sum()) - at.barrier * float(np.log(at.slack).sum()) + wrong
+        before = (
+            float((self._weights[:, None] * nodes.smooth).sum()) - at.barrier * float(np.log(at.slack).sum()) + wrong
+        )
         descent = min(step.descent - wrong, 0.0)
         length = _most(at.slack, step.slack)
         for _ in range(BACKTRACKS):
             free, slack = at.free + length * step.free, at.slack + length * step.slack
-            cost, limited = self.kernel.value(self._states(ends, free), parameters)
+            cost, limited = self.kernel.value(self._states(self.points(ends, free)), parameters)
             ratio = self._ratio(ends, free, limited)
             room = bounds - np.stack([ratio, -ratio])
             slack = np.maximum(slack, room)
-            merit = float(self._weights[:, 0] @ cost) - at.barrier * float(np.log(slack).sum())
+            merit = float(self._weights @ cost) - at.barrier * float(np.log(slack).sum())
             merit += float((weight * (slack - room)).sum())
             if merit <= before + ARMIJO * length * descent + ROUNDING * abs(before):
                 return self._with_prices(

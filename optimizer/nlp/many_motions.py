@@ -15,13 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array, Limits
+from models.robot import Array
 from optimizer.deadline import checkpoint
-from optimizer.energy.kernel import Kernel
 from optimizer.nlp.active_path_constraints import Index
-from optimizer.nlp.control_point_pairs import ControlPointPairs
 from optimizer.nlp.convex_quadratic import Convexity
-from optimizer.trajectories.bspline import Basis, basis_matrix
+from optimizer.nlp.timed_motions import TimedMotions
 
 # cost of the mean square of what exceeds a limit, as ratios of the limit and of the first cost
 PENALTY = 500.0
@@ -63,14 +61,10 @@ class _State:
 
 
 @dataclass(frozen=True, eq=False)
-class ManyMotions:
+class ManyMotions(TimedMotions):
     """The programs of motions in one spline space, of one duration T [s], with packed kernel parameters p."""
 
-    kernel: Kernel
-    basis: Basis
     p: Array
-    limits: Limits
-    T: float
 
     def minimised(self, ends: Array, free: Array, progress: float, behind: float = np.inf, sure: int = 1) -> Motions:
         """Motions between `ends` (B, 2, nq) [rad] from free control points (B, m, nq) [rad].
@@ -96,13 +90,6 @@ class ManyMotions:
             if not len(at):
                 break
         return Motions(now.free, now.cost, now.penalty, iterations)
-
-    def points(self, ends: Array, free: Array) -> Array:
-        """All control points (B, n, nq) of motions between `ends` (B, 2, nq)."""
-        rest = self.basis.resting
-        return np.concatenate(
-            [np.repeat(ends[:, :1], rest, axis=1), free, np.repeat(ends[:, 1:], rest, axis=1)], axis=1
-        )
 
     def costs(self, points: Array, p: Array) -> Array:
         """Costs (B,) [J] of motions by their control points (B, n, nq), with other kernel parameters."""
@@ -155,10 +142,6 @@ class ManyMotions:
         moved = np.ones(len(at), dtype=bool)
         moved[todo] = False
         return moved
-
-    def _states(self, points: Array) -> Array:
-        """q, v, a at the nodes, (B, N, 3 nq)."""
-        return (self._at_nodes @ points).reshape(len(points), len(self.basis.nodes), -1)
 
     def _value(
         self, ends: Array, free: Array, scale: Array, allowed: Array | None = None
@@ -222,60 +205,16 @@ class ManyMotions:
             hessian[k] += (J[k] * bend[:, :, None]).transpose(0, 2, 1) @ J[k]
         return gradient, hessian.reshape(-1, 3, r, 3, r).transpose(0, 1, 3, 2, 4)
 
-    @property
-    def _r(self) -> int:
-        return self.kernel.nq
-
-    @property
-    def _m(self) -> int:
-        return self.basis.n - 2 * self.basis.resting
-
     @cached_property
-    def _weights(self) -> Array:
-        return np.asarray(self.T * self.basis.weights)
-
-    @cached_property
-    def _at_nodes(self) -> Array:
-        """From control points to q, v, a at the nodes, (3 N, n)."""
-        powers = self.T ** -np.arange(3.0)
-        at_nodes = (self.basis.at_nodes * powers[:, None, None]).transpose(1, 0, 2)
-        return np.ascontiguousarray(at_nodes).reshape(-1, self.basis.n)
-
-    @cached_property
-    def _D(self) -> Array:
-        return np.ascontiguousarray(self._at_nodes[:, self.basis.free])
-
-    @cached_property
-    def _at_rates(self) -> Array:
-        """From control points to the first to third derivative by τ at RATE_POINTS per span and the ends, (3 M, n)."""
+    def _rate_places(self) -> list[Array]:
+        """RATE_POINTS per span, and the ends."""
         edges = np.unique(self.basis.knots)
         within = (np.arange(RATE_POINTS) + 0.5) / RATE_POINTS
-        at = np.concatenate([[0.0], (edges[:-1, None] + np.diff(edges)[:, None] * within).ravel(), [1.0]])
-        return np.concatenate([basis_matrix(self.basis.knots, at, d) for d in range(1, 4)])
-
-    @cached_property
-    def _R(self) -> Array:
-        return np.ascontiguousarray(self._at_rates[:, self.basis.free])
+        return [np.concatenate([[0.0], (edges[:-1, None] + np.diff(edges)[:, None] * within).ravel(), [1.0]])] * 3
 
     @property
     def _rate_count(self) -> int:
-        return len(self._at_rates) // 3
-
-    @cached_property
-    def _rate_limits(self) -> Array:
-        return np.repeat(self.limits.rates * (self.T ** np.arange(1, 4))[:, None], self._rate_count, axis=0)
-
-    @cached_property
-    def _pairs(self) -> ControlPointPairs:
-        return ControlPointPairs(self._m, self._r)
-
-    @cached_property
-    def _node_products(self) -> Array:
-        return self._pairs.node_products(self._D)
-
-    @cached_property
-    def _rate_products(self) -> Array:
-        return self._pairs.products(self._R)
+        return len(self._rate_places[0])
 
     @cached_property
     def _rate_bends(self) -> tuple[Array, Array]:

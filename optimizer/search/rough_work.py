@@ -102,7 +102,7 @@ class RoughWork:
             prepared = self.prepared
             limits = prepared.problem.arm.active_limits.scaled(1 - MARGIN)
             p = prepared.parameters(mechanical=1.0, width=width)
-            self._programs[key] = ManyMotions(prepared.kernel, bspline.uniform(count), p, limits, self.duration)
+            self._programs[key] = ManyMotions(prepared.kernel, bspline.uniform(count), limits, self.duration, p)
         return self._programs[key]
 
 

@@ -74,7 +74,7 @@ def test_hessian_is_that_of_the_lagrangian(prepared: PreparedProblem) -> None:
     def gradient(step: float) -> Array:
         moved = own.first(ENDS, free + step * change, WIDTH, bounds)
         nodes = own._nodes(ENDS, moved)
-        by_power = ((own._weights * at.slope)[:, None] @ nodes.jacobian).reshape(-1, own._r)
+        by_power = ((own._weights[:, None] * at.slope)[:, None] @ nodes.jacobian).reshape(-1, own._r)
         by_torque = (pull[:, None] @ nodes.torque_jacobian).reshape(-1, own._r)
         return np.asarray(own._D.T @ (by_power + by_torque))
 

@@ -26,7 +26,7 @@ def motions(**given: float) -> ManyMotions:
     arm_limits = limits(**given)
     prepared = PreparedProblem.of(problem(objective="mechanical", **fixed(DURATION)))
     p = prepared.parameters(mechanical=1.0, width=WIDTH)
-    return ManyMotions(prepared.kernel, SPACE, p, arm_limits, DURATION)
+    return ManyMotions(prepared.kernel, SPACE, arm_limits, DURATION, p)
 
 
 def guesses(count: int) -> tuple[Array, Array]:
