@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -21,6 +23,10 @@ from optimizer.problem.arm import Arm
 from optimizer.solution import Energy, Sensitivity, Trajectory
 from optimizer.trajectories.spline import Spline, fine_samples, sample
 
+Found = TypeVar("Found")
+# quadrature weights (k,) [s], and q, v, a, torques (k, nq) of a motion
+ReportSamples = tuple[Array, Array, Array, Array, Array]
+
 # smoothing in the optimiser's cost: the reversal of friction [rad/s], the corner of the load that friction grows with
 # as a share of the robot's torque limit, and the corners of |power| [W]
 KNEE = 0.02
@@ -37,6 +43,21 @@ LEAST_STEP = 1e-6
 def has_corners(objective: str, arm: Arm) -> bool:
     """Whether every joint's power has a corner of its own in the objective: mechanical work, and an isolated bus."""
     return objective == "mechanical" or (objective == "electrical" and arm.bus.mode == "isolated")
+
+
+@dataclass(eq=False)
+class _OfTheLast(Generic[Found]):
+    """What was computed of the last motion: a motion is valued several times, and then reported."""
+
+    known: tuple[Spline, Found] | None = None
+
+    def of(self, spline: Spline, compute: Callable[[Spline], Found]) -> Found:
+        """What `compute` finds of the motion, which may be known."""
+        # read once: other threads may replace it
+        known = self.known
+        if known is None or known[0] is not spline:
+            known = self.known = spline, compute(spline)
+        return known[1]
 
 
 @dataclass(frozen=True)
@@ -143,44 +164,34 @@ class Plant:
         return float(pin.computePotentialEnergy(self.model, self._data, q))
 
     def energy(self, spline: Spline) -> Energy:
-        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas.
+        """Energy [J] of a spline motion by Gauss-Legendre quadrature, with the exact, unsmoothed formulas."""
+        return self._last_energy.of(spline, self._computed_energy)
 
-        That of the last motion is kept, as its samples are.
-        """
-        for known, energy in self._last_energy:
-            if known is spline:
-                return energy
+    def _computed_energy(self, spline: Spline) -> Energy:
         weights, _, v, a, tau = self._report_samples(spline)
         ends = spline.control_points
         change = self.potential(ends[-1]) - self.potential(ends[0])
-        found = breakdown(weights, v, a, tau, change, self.arm)
-        self._last_energy[:] = [(spline, found)]
-        return found
+        return breakdown(weights, v, a, tau, change, self.arm)
 
     def sensitivity(self, spline: Spline) -> Sensitivity:
         """How the electrical energy of a spline motion hangs on the arm's figures."""
         return energy_sensitivity(*self._report_samples(spline), self.arm, arm_spread(self.arm))
 
-    def _report_samples(self, spline: Spline) -> tuple[Array, Array, Array, Array, Array]:
-        """Quadrature weights (k,) [s] and q, v, a, torques (k, nq) of a motion for reported figures.
+    def _report_samples(self, spline: Spline) -> ReportSamples:
+        """Samples of a motion for reported figures."""
+        return self._last_samples.of(spline, self._computed_samples)
 
-        Those of the last motion are kept: what is found is valued, and later reported.
-        """
-        for known, samples in self._last_report:
-            if known is spline:
-                return samples
+    def _computed_samples(self, spline: Spline) -> ReportSamples:
         weights, q, v, a = fine_samples(spline, REPORT_NODES)
-        found = weights, q, v, a, self.torques(q, v, a)
-        self._last_report[:] = [(spline, found)]
-        return found
+        return weights, q, v, a, self.torques(q, v, a)
 
     @cached_property
-    def _last_energy(self) -> list[tuple[Spline, Energy]]:
-        return []
+    def _last_energy(self) -> _OfTheLast[Energy]:
+        return _OfTheLast()
 
     @cached_property
-    def _last_report(self) -> list[tuple[Spline, tuple[Array, Array, Array, Array, Array]]]:
-        return []
+    def _last_samples(self) -> _OfTheLast[ReportSamples]:
+        return _OfTheLast()
 
     def trajectory(self, spline: Spline, period: float) -> Trajectory:
         """Samples of a spline motion every `period` [s]; the last one lies on the end."""
