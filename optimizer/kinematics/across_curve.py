@@ -57,8 +57,8 @@ def _side_by_side(jacobian: Array, along: Array, error: Array) -> tuple[Array, A
 
 
 def led(chain: Chain, q: Array, along: Array, ahead: Array, T: Array, longest: float = np.inf) -> tuple[Array, Array]:
-    """The configurations (n, nq) [rad] with the flange at T (4, 4) next to q (n, nq), with `ahead` (n,) for the product
-    of the way there with `along` (n, nq); and the error (n,) [rad] of any joint that they are left with, nearly.
+    """The configurations (n, nq) [rad] next to q (n, nq) that have the flange at T (4, 4), displaced by `ahead` (n,) in
+    the directions `along` (n, nq), as a scalar product; and an estimate of the greatest joint error (n,) [rad] left.
 
     Newton's method with its step and what the second order adds to it: with a ratio r of the two, what is left is some
     r² of the step. Where r is small, the next step takes the same matrices (the chord method): it leaves some 2 r of

@@ -22,7 +22,7 @@ REST_POINTS = 3
 # least number of quadrature nodes of the cost, and of grid points at which the peaks of the rates are searched
 LEAST_NODES = 31
 # least number of nodes per span: the power v · a of a constant inertia has degree 7, for which four are exact. With
-# three, motions gained energy that the quadrature lost, and the Hessian had a negative eigenvalue per joint and end
+# three, the error of the quadrature gave the Hessian of the cost a negative eigenvalue for each joint and end
 LEAST_PER_SPAN = 4
 GRID_POINTS = 512
 # points at which path constraints are bounded; an excess between them is found afterwards and repaired

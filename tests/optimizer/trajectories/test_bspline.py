@@ -120,7 +120,7 @@ def test_nodes_integrate_the_square_of_an_acceleration(space: Basis) -> None:
 
 
 def test_nodes_give_kinetic_energy_back(space: Basis) -> None:
-    """∫ v a dt of a motion between rests is none, with what two joints share: no motion gains energy by its nodes."""
+    """The work ∫ v M a dt of a constant inertia M is zero from rest to rest."""
     rng = np.random.default_rng(4)
     points = np.repeat(rng.normal(size=(1, 2)), space.n, axis=0)
     points[space.free] = rng.normal(size=(space.n, 2))[space.free]
