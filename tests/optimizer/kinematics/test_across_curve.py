@@ -58,6 +58,17 @@ def test_many_points_take_the_steps_that_few_do() -> None:
         assert ((tangent * along).sum(axis=1) > 0).all()
 
 
+def test_steps_at_singular_configurations_are_numbers() -> None:
+    """Side by side, and few at a time; of an arm that is straight, or nearly."""
+    rng, chain = np.random.default_rng(76), CHAINS[0]
+    for size in (0.0, 1e-9):
+        for n in (3, MANY + 3):
+            q, along = size * rng.normal(size=(n, 7)), np.eye(7)[rng.integers(0, 7, n)]
+            T = chain.flange(q[:1])[0]
+            for found in (*step_across(chain, q, along, T), *led(chain, q, along, np.zeros(n), T)):
+                assert np.isfinite(found).all()
+
+
 def test_what_is_led_ahead_is_on_the_curve_as_far_ahead_as_asked() -> None:
     """With short steps, too: what is left of the way is gone later."""
     rng, chain = np.random.default_rng(74), CHAINS[0]
