@@ -15,7 +15,7 @@ from models.uncertainty.parameters import BASE_POWER, DRIVES, FRICTION, LINKS, P
 from models.uncertainty.ranges import default_ranges
 from models.uncertainty.spread import DRAWS, Spread, spread_of
 from optimizer.energy.dwell import dwell_energy, holding_power
-from optimizer.energy.interval import Known, interval_of, saving_interval, saving_intervals
+from optimizer.energy.interval import Known, interval_of, saving_interval
 from optimizer.energy.losses import breakdown
 from optimizer.energy.plant import REPORT_NODES
 from optimizer.optimize import optimize
@@ -335,17 +335,6 @@ def test_a_saving_keeps_what_each_motion_has_of_its_own() -> None:
     saving = saving_interval(one, one, arm)
     assert saving.sd == pytest.approx(np.sqrt(2) * 2.0 * MOVE_SD / 100, rel=0.05)
     assert saving.p5 == pytest.approx(-1.645 * saving.sd, rel=0.1) and saving.p95 == pytest.approx(-saving.p5, rel=0.1)
-
-
-def test_several_savings_are_each_one_by_itself() -> None:
-    """Of no energy, and of none at all, too."""
-    arm, rng = problem().arm, np.random.default_rng(5)
-    known = [Known(e, Sensitivity(rng.normal(size=count(6)), 0.1), 1.5) for e in (50.0, 60.0, 0.0)]
-    alone = [saving_interval(known[0], each, arm) for each in known]
-    for one, other in zip(saving_intervals(known[0], known, arm), alone, strict=True):
-        # means over the draws, summed in another order
-        assert [one.p5, one.p95, one.sd] == pytest.approx([other.p5, other.p95, other.sd], rel=1e-12, abs=1e-12)
-    assert saving_intervals(known[0], [], arm) == []
 
 
 def test_the_guess_has_no_effect_on_another_law() -> None:
