@@ -46,7 +46,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,9 +59,11 @@ from optimizer.problem.arm import Arm
 TAU, RISE = 0.5, 0.35
 # sweeps over the joints in search of the multipliers, and least and greatest ratio ρ
 SWEEPS, RATIO = 3, 4.0
-# shares of the multipliers that are tried, of all joints and without all but one of those that hold; what share of the
-# holding is none
-CHOICES, LIGHT = tuple(product((0.9, 0.7, 0.5, 0.3, 0.15), (False, True))), 0.05
+# shares of the multipliers that are tried, of all joints or of one alone among those that hold, and none
+SCALES = np.append(np.repeat([0.9, 0.7, 0.5, 0.3, 0.15], 2), 0.0)
+ALONE = np.append(np.tile([False, True], 5), False)
+# what share of the holding is none
+LIGHT = 0.05
 # where convexity does not suffice for the multipliers, shares of them that are taken, and shares of what is left then
 LESS = (0.5, 0.0)
 _TINY = 1e-12
@@ -103,11 +104,9 @@ class HoldingBound:
 
         A joint's displacement has the sign of the line's in the whole box, or it is zero on the line.
         """
-        first, count = Cells(self, line[:1], edges[:1], eta[:1]), eta.shape[1]
-        tried = [_Choice(np.full(count, scale), np.full(count, alone)) for scale, alone in CHOICES]
-        one = [first.planes(first.omega(each, half[:1]), half[:1], deficit).value[0] for each in tried]
+        one = self._tried(line[:1], half[:1], edges[:1], eta[:1], deficit).value
         best = np.argmax(one, axis=0)
-        chosen = _Choice(*(np.array(each)[best] for each in zip(*CHOICES, strict=True)))
+        chosen = _Choice(SCALES[best], ALONE[best])
         cells = Cells(self, line, edges, eta)
         omega = cells.omega(chosen, half)
         found = cells.planes(omega, half, deficit)
@@ -118,6 +117,18 @@ class HoldingBound:
             omega = np.where(enough[..., None], omega, share * omega)
             found = cells.planes(omega, half, deficit)
         return found
+
+    def of_pair(self, line: Line, edges: Array, eta: Array, gain: float, deficit: float) -> float:
+        """The bound [J] of motions along one line, (1, …), of durations between edges (1, C + 1) [s]; η (1, C), the
+        gain of potential energy [J], and `deficit` as above."""
+        found = self._tried(line, np.zeros_like(line.d), edges, eta, deficit)
+        return float((found.value + found.more * gain).max(axis=0).min())
+
+    def _tried(self, line: Line, half: Array, edges: Array, eta: Array, deficit: float) -> Planes:
+        """The bounds of one line, (1, …), with each of the shares of the multipliers."""
+        many = np.zeros(len(SCALES), dtype=np.intp)
+        cells, half = Cells(self, line[many], edges[many], eta[many]), half[many]
+        return cells.planes(cells.omega(_Choice(SCALES[:, None], ALONE[:, None]), half), half, deficit)
 
 
 @dataclass(frozen=True)
@@ -139,7 +150,7 @@ class Planes:
 
 @dataclass(frozen=True)
 class _Choice:
-    """Of each cell (C,): the share of the multipliers that is taken, and whether one joint alone holds."""
+    """Of cells, (C,) or (P, 1): the share of the multipliers that is taken, and whether one joint alone holds."""
 
     scale: Array
     alone: Mask
@@ -213,8 +224,8 @@ class Cells:
         omega = np.where((self.d > 0) | (half[:, None] == 0), self.model, 0.0)
         held = np.abs(omega * self.line.gravity[:, None])
         light = held < LIGHT * held.sum(axis=-1, keepdims=True)
-        kept = light | (held == held.max(axis=-1, keepdims=True)) | ~choice.alone[:, None]
-        return choice.scale[:, None] * np.where(kept, omega, 0.0)
+        kept = light | (held == held.max(axis=-1, keepdims=True)) | ~choice.alone[..., None]
+        return choice.scale[..., None] * np.where(kept, omega, 0.0)
 
     def _convexity(self) -> Array:
         """a (P, C, nq) without ν."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.robot import Array
 from optimizer.bounds.chain_derivatives import ChainDerivatives
@@ -35,7 +36,7 @@ class Line:
     gradient: Array
     gradient_error: Array
 
-    def __getitem__(self, chosen: slice) -> Line:
+    def __getitem__(self, chosen: slice | NDArray[np.intp]) -> Line:
         return Line(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
     @classmethod

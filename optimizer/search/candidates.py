@@ -193,6 +193,9 @@ def _joint_options(starts: list[float], goals: list[float], fixed: bool, winding
 def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: Sequence[Side] = SIDES) -> None:
     """Mark the candidates with an infeasible start or goal, and give each its lower bound and least duration.
 
+    An end at which only the reserve of the clearance is missing is infeasible, but other motions may go there: its
+    candidates keep their bounds.
+
     Ends that are not to be `checked` are known to be feasible.
 
     Raises InvalidProblem, StartInCollision, GoalInCollision or TorqueInfeasible if no candidate is left.
@@ -219,7 +222,7 @@ def bound(prepared: PreparedProblem, candidates: Sequence[Candidate], checked: S
     for name in reversed(checked):  # of a candidate with two such ends, the start is named
         for row, ruling in enumerate(ruled[name]):
             if ruling is not None:
-                _rule_out(candidates, sides[name].rows == row, f"at the {name}, {ruling.reason}")
+                _rule_out(candidates, sides[name].rows == row, f"at the {name}, {ruling.reason}", ruling.possible)
     for name in checked:
         raise_if_none_is_left(name, [(end.label, end.target, end.q) for end in sides[name].all], ruled[name])
 
@@ -249,9 +252,11 @@ class _Ends:
         return np.array([prepared.potential(end.q) for end in self.all])[self.rows]
 
 
-def _rule_out(candidates: Sequence[Candidate], marked: Mask, message: str) -> None:
-    """Settle the `marked` (P,) candidates as infeasible: the arm cannot be at an end."""
+def _rule_out(candidates: Sequence[Candidate], marked: Mask, message: str, possible: bool) -> None:
+    """Settle the `marked` (P,) candidates as infeasible. They keep their bounds if an arm can be there."""
     for row in np.flatnonzero(marked).tolist():
         candidate = candidates[row]
         candidate.settle(CandidateStatus.INFEASIBLE, Reason.INVALID_END, message)
-        candidate.lower_bound, candidate.holdable = np.inf, False
+        candidate.holdable = False
+        if not possible:
+            candidate.lower_bound = np.inf

@@ -24,10 +24,14 @@ EDGE = 1e-9
 
 @dataclass(frozen=True)
 class InvalidReason:
-    """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a pair, a joint)."""
+    """Why a configuration is infeasible: a message and its cause (an angle [rad] beyond the cone, a pair, a joint).
+
+    `possible`: the arm can be there, only RESERVE is missing. No motion is sought, but there may be one.
+    """
 
     reason: str
     cause: float | ClosestPair | TorqueInfeasible
+    possible: bool = False
 
 
 def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidReason | None]:
@@ -39,8 +43,8 @@ def check_configurations(prepared: PreparedProblem, q: Array) -> list[InvalidRea
     ):
         if contact.distance < RESERVE:
             first, second = contact.pair
-            message = f"{first} and {second}: clearance {RESERVE - contact.distance:.4f} m too small"
-            result[k] = InvalidReason(message, contact)
+            message = f"{first} and {second}: clearance {RESERVE - contact.distance:.5f} m too small"
+            result[k] = InvalidReason(message, contact, contact.distance >= 0 and result[k] is None)
     for k, beyond in enumerate(_beyond_cone(prepared, q)):
         if beyond > 0:
             result[k] = InvalidReason(f"the tool points {beyond:.4f} rad outside its cone", beyond)

@@ -1,4 +1,4 @@
-"""Bounds of `bounds.holding` on motions from given joint positions into boxes, over every duration.
+"""Bounds of `bounds.holding` on motions from given joint positions to others, or into boxes, over every duration.
 
 Beyond the durations where the plain bound reaches a cap it stays above it; between them, cells of durations have the
 bound. A full turn more of a joint than the least has the plain bound of its displacement.
@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from models.robot import Array
+from models.robot import Array, Mask
 from optimizer.bounds.chain_derivatives import ChainDerivatives
 from optimizer.bounds.holding import HoldingBound, Planes
 from optimizer.bounds.straight_line import Line
@@ -54,27 +54,39 @@ class HoldingCells:
         nearest = np.maximum(np.abs(d) - half, 0.0)
         cap = np.minimum(plain + MOST * np.abs(plain), self._turned(nearest, next_, gain))
         net = NetEnergy.for_motions(self.prepared.arm, nearest, gain)
-        problem = self.prepared.problem
-        first = np.maximum(shortest_duration(nearest, self.prepared.arm.active_limits), LEAST_DURATION)
+        edges, eta, allowed = self._cells(net, nearest, cap)
+        # the nearest goal of the box first, whose motions may be the shortest
+        line = Line.of(self.bound.chain, start, np.sign(d) * nearest)
+        planes = self.bound(line, 2 * half, edges, eta, net.deficit)
+        turn = d - ((low + high) / 2 - start)
+        return Group(planes, start + np.sign(d) * nearest - turn, np.where(allowed, cap, np.inf))
+
+    def pair(self, start: Array, goal: Array, gain: float, cap: float) -> float:
+        """A bound [J] of motions between two configurations (nq,) [rad] with this gain of potential energy [J], no
+        higher than `cap` [J]."""
+        d = (goal - start)[None]
+        net = NetEnergy.for_motions(self.prepared.arm, np.abs(d), np.array([gain]))
+        edges, eta, _ = self._cells(net, np.abs(d), np.array([cap]))
+        line = Line.of(self.bound.chain, start[None], d)
+        return min(cap, self.bound.of_pair(line, edges, eta, gain, net.deficit))
+
+    def _cells(self, net: NetEnergy, away: Array, cap: Array) -> tuple[Array, Array, Mask]:
+        """Cells of the durations at which the plain bound is below `cap` (n,) [J], for displacements (n, nq) [rad]:
+        edges (n, CELLS + 1) [s] and η (n, CELLS); and which motions may be made in the allowed time (n,)."""
+        problem, rows = self.prepared.problem, np.arange(len(away))
+        first = np.maximum(shortest_duration(away, self.prepared.arm.active_limits), LEAST_DURATION)
         first = np.maximum(first, problem.duration_min or 0.0)
         longest = LONGEST_DURATION if problem.duration_max is None else problem.duration_max
         # the plain bound is no less than work and the power that is drawn at all times
         drawn = net.power - net.deficit
         last = np.minimum(np.where(drawn > 0, (cap - net.work) / np.maximum(drawn, TINY), np.inf), longest)
         probes = first[:, None] * np.maximum(last / first, 1 + LEAST_RATIO)[:, None] ** np.linspace(0, 1, PROBES)
-        repeated = np.repeat(np.arange(len(d)), PROBES)
-        below = net[repeated].at(probes.ravel())[0].reshape(probes.shape) < cap[:, None]
-        rows = np.arange(len(d))
+        below = net[np.repeat(rows, PROBES)].at(probes.ravel())[0].reshape(probes.shape) < cap[:, None]
         left = probes[rows, np.maximum(below.argmax(axis=1) - 1, 0)]
         right = probes[rows, np.minimum(PROBES - below[:, ::-1].argmax(axis=1), PROBES - 1)]
         edges = left[:, None] * (right / left)[:, None] ** np.linspace(0, 1, CELLS + 1)
         middle = ((edges[:, 1:] + edges[:, :-1]) / 2).ravel()
-        eta = net[np.repeat(rows, CELLS)].multiplier(middle).reshape(-1, CELLS)
-        # the nearest goal of the box first, whose motions may be the shortest
-        line = Line.of(self.bound.chain, start, np.sign(d) * nearest)
-        planes = self.bound(line, 2 * half, edges, eta, net.deficit)
-        turn = d - ((low + high) / 2 - start)
-        return Group(planes, start + np.sign(d) * nearest - turn, np.where(first <= longest, cap, np.inf))
+        return edges, net[np.repeat(rows, CELLS)].multiplier(middle).reshape(-1, CELLS), first <= longest
 
     def _displacements(self, start: Array, goal: Array, half: Array) -> tuple[Array, Array]:
         """The least displacements d (n, nq) [rad] to the middles of boxes within the limits, and the least of other

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from models.robot import Array
@@ -26,6 +28,8 @@ from optimizer.trajectories.time_scalings import quintic_spline
 # assumed values of a joule of surplus if the storage cannot take all of it: shares of the way from what the supply
 # pays for it to what the storage gives back
 SURPLUS_VALUES = (0.75, 0.5, 0.25)
+# how much slower a baseline may become: where jumps of jerk are close, rounding takes jerk beyond its limit
+SLOWER = (1.0, 1 + 1e-5)
 
 
 def refine(incumbent: Incumbent, candidate: Candidate) -> None:
@@ -148,9 +152,9 @@ def _accept_certified(incumbent: Incumbent, candidate: Candidate, better: list[B
         "ruckig_slowed": retimed(fastest, duration / fastest.duration),
         "quintic": quintic_spline(candidate.q_start, candidate.q_goal, duration),
     }
-    for name in better:
+    for name, slower in product(better, SLOWER):
         needed = least_time_scale(motions[name], limits.rates)
-        spline = retimed(motions[name], max(needed, 1.0))
+        spline = retimed(motions[name], slower * max(needed, 1.0))
         energy = incumbent.prepared.energy(spline)
         if incumbent.allows(spline.duration) and incumbent.certified(candidate, spline, energy).valid:
             incumbent.accept_if_better(

@@ -16,7 +16,7 @@ from optimizer.trajectories.spline import Spline, sampled
 # relative decrease of the cost that a further step of the first solve must promise
 FIRST_PROGRESS = 1e-3
 # further solves, while each saves this share of the energy
-REGRADED, SAVED = 2, 3e-4
+REGRADED, SAVED = 2, 1e-3
 
 
 def grade(incumbent: Incumbent, candidate: Candidate) -> None:

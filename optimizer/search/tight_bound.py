@@ -57,7 +57,7 @@ def tighten(prepared: PreparedProblem, candidates: list[Candidate], energy: floa
     pairs = _Pairs.of(prepared)
     if pairs is None:
         return
-    below = [each for each in candidates if each.holdable and each.lower_bound < energy and each.goal.tolerance is None]
+    below = [each for each in candidates if each.lower_bound < energy and each.goal.tolerance is None]
     for candidate in sorted(below, key=lambda each: each.lower_bound):
         if deadline.left < TERMS_TIME:
             return

@@ -1,0 +1,74 @@
+"""Bounds raised by the copper loss of holding: where it pays, never above an energy, and only as far as it matters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.registry import load_robot
+from optimizer.deadline import NEVER, Deadline
+from optimizer.optimize import optimize
+from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.cycle import Cycle
+from optimizer.problem.problem import Problem
+from optimizer.search import candidates as search
+from optimizer.search.ends import ends
+from optimizer.search.held_pairs import hold
+from tests.optimizer.moves import GOAL, START, problem, tcp_pose
+
+# the arm stretched out sideways at both ends: it holds its weight all the way
+OUT = np.array([0.0, -0.3, 0.4, -1.5, -1.57, 0.0])
+TURNED = OUT + np.array([1.2, 0.1, -0.1, 0.0, 0.0, 0.5])
+# of a heavy arm's gap that is to be gone at least
+SHARE = 0.3
+
+
+def bounded(asked: Problem) -> tuple[PreparedProblem, list[search.Candidate]]:
+    """The problem's candidates with their plain bounds."""
+    made = PreparedProblem.of(asked)
+    found = search.pairs(made, ends(made, "start")[0], ends(made, "goal")[0])
+    search.bound(made, found)
+    return made, found
+
+
+def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
+    asked = problem(OUT, TURNED, robot=load_robot("ur20"))
+    _, (plain,) = bounded(asked)
+    found = optimize(asked)
+    energy = found.energy.electrical.total
+    assert plain.lower_bound < found.lower_bound <= energy
+    assert energy - found.lower_bound < (1 - SHARE) * (energy - plain.lower_bound)
+    # nor does a motion of another duration spend less
+    for factor in (1.0, 1.2, 1.6):
+        duration = factor * found.duration
+        slower = optimize(replace(asked, duration_min=duration, duration_max=duration))
+        assert found.lower_bound <= slower.energy.electrical.total
+
+
+@pytest.mark.parametrize("ratio", [1.02, 1.3, 3.0])
+def test_the_lowest_are_raised_until_the_least_is(ratio: float) -> None:
+    """No bound falls, or rises above the energy; the least one is that of a pair that was raised, or they were many."""
+    made, found = bounded(problem(OUT, tcp_pose(TURNED)))
+    before = {id(each): each.lower_bound for each in found}
+    energy = ratio * min(before.values())
+    hold(made, found, energy, NEVER)
+    raised = [each for each in found if each.lower_bound != before[id(each)]]
+    assert raised
+    for each in raised:
+        assert before[id(each)] < each.lower_bound <= energy
+    least = min(found, key=lambda each: each.lower_bound)
+    assert least in raised or least.lower_bound >= energy or len(raised) > 3
+
+
+def test_nothing_changes_where_it_does_not_apply() -> None:
+    for given, deadline in (
+        ({"objective": "mechanical", "duration_max": 3.0}, NEVER),
+        ({"cycle": Cycle(4.0)}, NEVER),
+        ({}, Deadline.after(0.0)),
+    ):
+        made, found = bounded(problem(START, tcp_pose(GOAL), **given))
+        before = [each.lower_bound for each in found]
+        hold(made, found, 1e3, deadline)
+        assert [each.lower_bound for each in found] == before
