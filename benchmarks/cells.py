@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from models.registry import load_robot
 from models.robot import Array
 from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import plan_paths
+from optimizer.collision.path_planner import Effort, plan_paths
 from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.exceptions import SingularPose, UnreachablePose
@@ -76,7 +76,9 @@ class Draw:
         there is none."""
         checkers = ValidityCheckers(self.arm, self.model)
         for q_goal in self.q_goals:
-            if plan_paths(self.arm, self.q_start, q_goal, Deadline.after(AMPLE), 1, checkers=checkers).paths:
+            if plan_paths(
+                self.arm, self.q_start, q_goal, Deadline.after(AMPLE), Effort(paths=1), checkers=checkers
+            ).paths:
                 return q_goal
         return None
 

@@ -27,7 +27,7 @@ from models.registry import load_robot
 from models.robot import Array
 from optimizer import optimize
 from optimizer.collision.model import collision_model
-from optimizer.collision.path_planner import along, plan_paths
+from optimizer.collision.path_planner import Effort, along, plan_paths
 from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.exceptions import JoulepathError
@@ -80,7 +80,7 @@ def energies_of_paths(problem: Problem, q_start: Array, q_goal: Array, count: in
     for seed in range(count):
         # seed 0 would be no seed to OMPL, and seed 1 is the planner's own
         planned = plan_paths(
-            problem.arm, q_start, q_goal, Deadline.after(AMPLE), most=1, seed=seed + 2, checkers=checkers
+            problem.arm, q_start, q_goal, Deadline.after(AMPLE), Effort(paths=1), seed=seed + 2, checkers=checkers
         )
         found += [solver().along_path(*along(path, 1.0, v_max)) for path in planned.paths]
     found = sorted(found, key=lambda result: prepared.cost_of(result.spline))

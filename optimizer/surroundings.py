@@ -12,7 +12,7 @@ from models.robot import Array
 from optimizer.collision.bodies import Indices
 from optimizer.collision.clearance_proof import is_proven_clear, proven_clearance
 from optimizer.collision.model import ClosestPair, CollisionModel, collision_model
-from optimizer.collision.path_planner import MOST_STATES, PlannedPaths, PlanningEnd, plan_paths
+from optimizer.collision.path_planner import USUAL, Effort, PlannedPaths, PlanningEnd, plan_paths
 from optimizer.collision.state_validity import ValidityCheckers
 from optimizer.deadline import Deadline
 from optimizer.kinematics.forward import joint_placements
@@ -109,7 +109,7 @@ class Surroundings:
         q_goal: Array,
         deadline: Deadline,
         other_goals: Sequence[Array] = (),
-        most_states: int = MOST_STATES,
+        effort: Effort = USUAL,
     ) -> PlannedPaths:
         """Collision-free joint paths from q_start to q_goal or one of the others, (nq,) [rad]; see `plan_paths`.
 
@@ -119,13 +119,11 @@ class Surroundings:
         """
         known, turned = self._planned.get(_key(q_start, q_goal)), self._turned.get(_turned_key(q_start, q_goal))
         for earlier in (known, turned if turned is not None and not turned.paths else None):
-            if earlier is not None and (earlier.paths or earlier.checked_states >= most_states):
+            if earlier is not None and (earlier.paths or earlier.checked_states >= effort.most_states):
                 return earlier
         like = turned.paths[0] if known is None and turned is not None and turned.paths else None
         goals = q_goal[None] if like is not None else np.vstack([q_goal, *other_goals])
-        planned = plan_paths(
-            self.arm, q_start, goals, deadline, checkers=self._checkers, most_states=most_states, like=like
-        )
+        planned = plan_paths(self.arm, q_start, goals, deadline, effort, checkers=self._checkers, like=like)
         for goal in {path[-1].tobytes(): path[-1] for path in planned.paths}.values():
             self._keep(q_start, goal, replace(planned, paths=planned.leading_to(goal)))
         if planned.end is PlanningEnd.EXHAUSTED:

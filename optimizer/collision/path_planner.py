@@ -31,8 +31,6 @@ RESERVES = (5e-3, 5e-4, 0.0)
 STEP = 0.1
 # checked states of a planning, of all its searches
 MOST_STATES = 200_000
-# checked states for further paths, once one is found
-MORE_STATES = 3_000
 # checked states of a planning that may follow a known path
 STATES_BESIDE = 5_000
 # two paths are the same if no joint differs by this much [rad] at the same fraction of their lengths
@@ -49,6 +47,19 @@ PATIENCE = 0.02
 # from one generator of the process, so that two threads at once would take seeds from each other. Little is lost:
 # planners spend their time in the validity checks, which need Python's global lock.
 _OMPL = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Of a planning: states that all searches check at most, paths that are sought, and states for further ones, once
+    one is found."""
+
+    most_states: int = MOST_STATES
+    paths: int = 2
+    more_states: int = 3_000
+
+
+USUAL = Effort()
 
 
 @dataclass(frozen=True)
@@ -116,29 +127,28 @@ def plan_paths(
     q_start: Array,
     q_goals: Array,
     deadline: Deadline,
-    most: int = 2,
+    effort: Effort = USUAL,
     seed: int = 1,
     checkers: ValidityCheckers | None = None,
-    most_states: int = MOST_STATES,
     like: Array | None = None,
 ) -> PlannedPaths:
-    """Up to `most` collision-free joint paths from q_start (nq,) to any of q_goals, (nq,) or (m, nq) [rad].
+    """Collision-free joint paths from q_start (nq,) to any of q_goals, (nq,) or (m, nq) [rad].
 
     A path is piecewise linear, within the joint limits and the tool cone of the arm. It is checked at short steps,
-    which is no proof. The planning ends after about `most_states` checked states, or at `deadline`. Unless the deadline
-    passes, `seed` determines the result. `checkers` are those of the arm, if at hand.
+    which is no proof. The planning ends after about as many checked states as the `effort` has, or at `deadline`.
+    Unless the deadline passes, `seed` determines the result. `checkers` are those of the arm, if at hand.
     `like` (k, nq) [rad] is such a path to a goal that differs by full turns. Then one path is sought, which may follow
     it away from the start and, turned as fully, to the goal: narrow ways out of an obstacle are found once.
     """
     checkers = ValidityCheckers(arm, collision_model(arm)) if checkers is None else checkers
     if like is not None:
-        most, most_states = 1, min(most_states, STATES_BESIDE)
+        effort = Effort(min(effort.most_states, STATES_BESIDE), paths=1)
     found = _reserves(checkers, q_start, np.atleast_2d(q_goals))
     if found is None:
         return PlannedPaths(PlanningEnd.INVALID_END)
     with _seeded(seed, deadline):
         planning = _Planning(checkers, q_start, *found, like, deadline)
-        paths = planning.run(most, most_states)
+        paths = planning.run(effort)
     end = PlanningEnd.FOUND if paths else PlanningEnd.CUT_SHORT if deadline.passed else PlanningEnd.EXHAUSTED
     v_max = arm.active_limits.v_max
     return PlannedPaths(end, sorted(paths, key=lambda path: length(path, v_max)), planning.checked_states)
@@ -176,12 +186,12 @@ class _Planning:
         self._steps = {region: STEP / 2 if region.narrow else STEP for region in REGIONS}
         self.checked_states = 0
 
-    def run(self, most: int, most_states: int) -> list[Array]:
-        """Up to `most` different paths, in about `most_states` checked states."""
-        paths: list[Array] = []
+    def run(self, effort: Effort) -> list[Array]:
+        """Different paths, as many as the effort seeks at most."""
+        paths, most_states = list[Array](), effort.most_states
         while True:
             for region in REGIONS:
-                if len(paths) == most or self._deadline.passed or self.checked_states >= most_states:
+                if len(paths) == effort.paths or self._deadline.passed or self.checked_states >= most_states:
                     return paths
                 if not region.after <= self.checked_states < region.before:
                     continue
@@ -193,7 +203,7 @@ class _Planning:
                     # the straight line
                     return paths
                 if len(paths) == 1:
-                    most_states = min(most_states, self.checked_states + MORE_STATES)
+                    most_states = min(most_states, self.checked_states + effort.more_states)
 
     def _slice(self, region: Region, left: int) -> Array | None:
         """The path that a region's search finds in its turn, if any; then the region begins a new search.

@@ -328,7 +328,7 @@ class Run:
         """What no motion goes below [J], and whether every candidate that was not solved needs at least `objective`."""
         incumbent = self.incumbent
         prepared, candidates = incumbent.prepared, incumbent.candidates
-        hold(prepared, candidates, objective, incumbent.deadline)
+        hold(prepared, candidates, incumbent.deadline)
         if self.problem.bound == "tight":
             tighten(prepared, candidates, objective, incumbent.deadline)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]

@@ -10,7 +10,7 @@ import pytest
 from models.robot import Array
 from optimizer.collision.clearance_proof import GAP, proven_clearance
 from optimizer.collision.model import CollisionModel
-from optimizer.collision.path_planner import PlanningEnd
+from optimizer.collision.path_planner import Effort, PlanningEnd
 from optimizer.deadline import Deadline
 from optimizer.problem.arm import Arm
 from optimizer.problem.scene import Box, Obstacle, Scene, Sphere
@@ -123,9 +123,9 @@ def test_a_planning_that_the_deadline_ended_is_not_kept() -> None:
 
 def test_a_planning_that_ran_out_of_states_is_kept_until_more_are_allowed() -> None:
     surroundings, few = behind_a_wall(), 1
-    first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), most_states=few)
+    first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few))
     assert first.end is PlanningEnd.EXHAUSTED and not first.paths
-    assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), most_states=few) is first
+    assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few)) is first
     assert surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE)).paths
 
 
@@ -143,9 +143,9 @@ def test_a_planning_stands_for_all_goals_that_differ_by_full_turns() -> None:
     """Without a path, none is looked for again; with one, the next is found in fewer states."""
     surroundings, few = behind_a_wall(), 1
     turned = GOAL + 2 * np.pi * np.eye(6)[4]
-    first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), most_states=few)
+    first = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE), effort=Effort(few))
     assert surroundings.seems_enclosed(START, turned) and not surroundings.has_planned_paths(START, turned)
-    assert surroundings.planned_paths(START, turned, Deadline.after(AMPLE), most_states=few) is first
+    assert surroundings.planned_paths(START, turned, Deadline.after(AMPLE), effort=Effort(few)) is first
     found = surroundings.planned_paths(START, GOAL, Deadline.after(AMPLE))
     assert found.paths and not surroundings.seems_enclosed(START, turned)
     (path,) = surroundings.planned_paths(START, turned, Deadline.after(AMPLE)).paths

@@ -176,14 +176,14 @@ def test_planned_paths_are_collision_free(name: str) -> None:
 
 def test_the_same_seed_gives_the_same_paths() -> None:
     arm, q_start, q_goal = task("post")
-    first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2, s).paths for s in (3, 3, 4))
+    first, again, other = (plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), seed=s).paths for s in (3, 3, 4))
     assert [path.tolist() for path in first] == [path.tolist() for path in again]
     assert [path.tolist() for path in first] != [path.tolist() for path in other]
 
 
 def test_two_paths_are_distinct() -> None:
     arm, q_start, q_goal = task("post")
-    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE), 2).paths
+    paths = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     assert len(paths) == 2
     v_max = arm.active_limits.v_max
     assert np.abs(along(paths[0], 1.0, v_max)[0] - along(paths[1], 1.0, v_max)[0]).max() > 0.3

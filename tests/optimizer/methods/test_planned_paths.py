@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from optimizer.collision.path_planner import PlanningEnd, along, plan_paths
+from optimizer.collision.path_planner import Effort, PlanningEnd, along, plan_paths
 from optimizer.deadline import NEVER, Deadline
 from optimizer.methods import free_spline, planned_paths
 from optimizer.methods.free_spline import FreeSpline
@@ -24,7 +24,7 @@ def test_a_known_path_leads_to_goals_that_differ_by_full_turns() -> None:
     arm, q_start, q_goal = task("cage")
     (path, *_) = plan_paths(arm, q_start, q_goal, Deadline.after(AMPLE)).paths
     turned = q_goal - 2 * np.pi * np.sign(q_goal) * np.eye(6)[3]
-    alone = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), 1)
+    alone = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), Effort(paths=1))
     beside = plan_paths(arm, q_start, turned, Deadline.after(AMPLE), like=path)
     (found,) = beside.paths
     np.testing.assert_array_equal(found[[0, -1]], [q_start, turned])

@@ -23,6 +23,8 @@ OUT = np.array([0.0, -0.3, 0.4, -1.5, -1.57, 0.0])
 TURNED = OUT + np.array([1.2, 0.1, -0.1, 0.0, 0.0, 0.5])
 # of a heavy arm's gap that is to be gone at least
 SHARE = 0.3
+# the cells of a higher bound are others: by how much that may change it
+AGAIN = 0.02
 
 
 def bounded(asked: Problem) -> tuple[PreparedProblem, list[search.Candidate]]:
@@ -47,19 +49,18 @@ def test_a_heavy_arm_that_holds_its_weight_gains_much() -> None:
         assert found.lower_bound <= slower.energy.electrical.total
 
 
-@pytest.mark.parametrize("ratio", [1.02, 1.3, 3.0])
-def test_the_lowest_are_raised_until_the_least_is(ratio: float) -> None:
-    """No bound falls, or rises above the energy; the least one is that of a pair that was raised, or they were many."""
+def test_the_lowest_are_raised_until_the_least_is() -> None:
+    """No bound falls, and the least one is that of a pair that was raised, or hardly could be."""
     made, found = bounded(problem(OUT, tcp_pose(TURNED)))
     before = {id(each): each.lower_bound for each in found}
-    energy = ratio * min(before.values())
-    hold(made, found, energy, NEVER)
+    hold(made, found, NEVER)
     raised = [each for each in found if each.lower_bound != before[id(each)]]
-    assert raised
-    for each in raised:
-        assert before[id(each)] < each.lower_bound <= energy
-    least = min(found, key=lambda each: each.lower_bound)
-    assert least in raised or least.lower_bound >= energy or len(raised) > 3
+    assert all(each.lower_bound > before[id(each)] for each in raised)
+    assert min(found, key=lambda each: each.lower_bound) in raised
+    # a second time, nothing is left to be raised by much
+    least = min(each.lower_bound for each in found)
+    hold(made, found, NEVER)
+    assert min(each.lower_bound for each in found) == pytest.approx(least, rel=AGAIN)
 
 
 def test_nothing_changes_where_it_does_not_apply() -> None:
@@ -70,5 +71,5 @@ def test_nothing_changes_where_it_does_not_apply() -> None:
     ):
         made, found = bounded(problem(START, tcp_pose(GOAL), **given))
         before = [each.lower_bound for each in found]
-        hold(made, found, 1e3, deadline)
+        hold(made, found, deadline)
         assert [each.lower_bound for each in found] == before
