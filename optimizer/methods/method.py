@@ -86,6 +86,8 @@ class Method(ABC):
     best_known: float = np.inf
     # goals (nq,) [rad] of other candidates from the same start: as long as no motion is known, a path to any may do
     other_goals: Callable[[], Sequence[Array]] = tuple
+    # whether there is no other candidate
+    is_sole: bool = False
     # whether the candidate was postponed: then clearance constraints on its own motion, and a planning in few states,
     # were tried in vain
     was_postponed: bool = False

@@ -64,7 +64,8 @@ def solve(incumbent: Incumbent, candidate: Candidate) -> SolveResult:
 
 def _solved(incumbent: Incumbent, candidate: Candidate, solver: Method) -> SolveResult:
     """The result of a solver that knows what the search knows so far."""
-    best = incumbent.best()
+    best, ruled_out = incumbent.best(), CandidateStatus.INFEASIBLE
+    solver.is_sole = sum(each.status is not ruled_out for each in incumbent.candidates) == 1
     solver.was_postponed = candidate.attempt is not None and candidate.attempt.status is SolveStatus.POSTPONED
     if best is None or best.energy is None:
         solver.other_goals = partial(_other_goals, incumbent, candidate)
