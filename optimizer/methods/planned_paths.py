@@ -16,9 +16,9 @@ from optimizer.trajectories.spline import Spline
 # a planning may take this fraction of the time left: the rest is for the solves. The first one to a goal, and all of
 # them once a motion is known, may check so many states
 PLANNING, FEW_STATES = 0.75, 20_000
-# paths that are sought, and states that may be checked for those beyond the first: of one of several candidates, and of
-# the only one, for which there is more time
-MORE, MORE_TO_SOLE = (2, 3_000), (4, 12_000)
+# of the only candidate, for which there is more time: paths that are sought, and states that may be checked for those
+# beyond the first, unless that was found in fewer than the last number of states
+OF_SOLE = (4, 12_000, 1_000)
 # fraction of the time left that a method which follows paths gives to the second one
 PATIENCE = 0.3
 # planned paths longer than this multiple of the shortest one are skipped
@@ -45,7 +45,7 @@ def plan(method: Method) -> PlannedPaths:
         method.q_goal,
         method.deadline.within(PLANNING * left) if np.isfinite(left) else method.deadline,
         others if thorough else (),
-        Effort(MOST_STATES if thorough else FEW_STATES, *(MORE_TO_SOLE if method.is_sole else MORE)),
+        Effort(MOST_STATES if thorough else FEW_STATES, *(OF_SOLE if method.is_sole else ())),
     )
 
 
