@@ -147,8 +147,14 @@ class _Proof:
         return Clearance(proven, self.least, self.model.names(pair), t, points)
 
     def bound(self) -> float:
-        """Lower bound [m]: halves intervals until all are proven, or the limits on the effort are reached."""
-        instants, checks = self.initial_intervals()
+        """Lower bound [m]: halves intervals until all are proven, or the limits on the effort are reached.
+
+        -inf if a sample is lower than what is `wanted`.
+        """
+        instants, distances = self.sampled()
+        if self.wanted is not None and self.least < self.wanted:
+            return -np.inf
+        checks = self.initial_checks(instants, distances)
         proven, checked = np.inf, 0
         for level in range(MOST_LEVELS):
             checked += len(checks.pair)
@@ -163,18 +169,25 @@ class _Proof:
         # rounding may put a bound that is exact above the sample
         return min(proven, self.least)
 
-    def initial_intervals(self) -> tuple[_Instants, _Checks]:
-        """Intervals, each within a knot span, and the pairs that may be the closest there."""
+    def sampled(self) -> tuple[_Instants, Array]:
+        """Instants (n,) with all knots, and lower bounds (n, p) [m] on the distances of all pairs there.
+
+        The pair of the least bound is sampled at each of them.
+        """
         spans = np.unique(self.spline.knots)
         longest = self.spline.duration / LEAST_INTERVALS
         parts = [np.linspace(a, b, math.ceil((b - a) / longest), endpoint=False) for a, b in pairwise(spans)]
         t = np.concatenate([*parts, spans[-1:]])
         instants = self.instants(t)
-        n, p = len(t), len(self.model.pairs)
         # those of half-spaces, which no ball encloses, are exact
         distances = self.model.pair_distances(instants.frames, within=-np.inf).distance
-        self.sample_normals(instants, np.arange(n), distances.argmin(axis=1), np.full(n, -1))
-        v, _, h = self.rate_bounds(t[:-1], t[1:])
+        self.sample_normals(instants, np.arange(len(t)), distances.argmin(axis=1), np.full(len(t), -1))
+        return instants, distances
+
+    def initial_checks(self, instants: _Instants, distances: Array) -> _Checks:
+        """The pairs that may be the closest between two instants, of all intervals; with lower bounds `distances`."""
+        n, p = distances.shape
+        v, _, h = self.rate_bounds(instants.t[:-1], instants.t[1:])
         travel = (v * h[:, None]) @ self.levers.T
         is_open = self.may_be_closest(distances, travel)
         instant, pair = np.nonzero(_at_ends(is_open))
@@ -187,7 +200,7 @@ class _Proof:
         row[instant, pair] = np.arange(len(pair))
         begin, pair = np.nonzero(is_open)
         part = np.full(len(pair), -1)
-        return instants, _Checks(pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]])
+        return _Checks(pair, part, begin, begin + 1, found[row[begin, pair]], found[row[begin + 1, pair]])
 
     def may_be_closest(self, bounds: Array, travel: Array) -> Mask:
         """Which pairs (n - 1, p) may be nearer than what is known or wanted over the intervals between n instants.
