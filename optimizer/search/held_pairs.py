@@ -1,6 +1,6 @@
 """Lower bounds of pairs, raised by the copper loss of holding against gravity: `bounds.holding`.
 
-The plain bound leaves that loss out. It is half of the gap of heavy arms. A pair takes a few milliseconds, so that only
+The plain bound leaves that loss out: a quarter of the gap of heavy arms. A pair takes a few milliseconds, so that only
 those whose bounds would be the answer's are raised, the lowest first.
 """
 
@@ -23,7 +23,7 @@ STEP = 0.2
 
 
 def hold(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> None:
-    """Raise the least of the lower bounds of candidates, again and again until the least is one that is raised."""
+    """Raise the least of the lower bounds of candidates, until the least one has been raised as far as it can be."""
     pairs = [each for each in candidates if not each.sampled and each.goal.tolerance is None]
     lowest = min(pairs, key=_bound_of, default=None)
     if lowest is None or np.isinf(lowest.lower_bound) or (cells := HoldingCells.of(prepared)) is None:
