@@ -53,8 +53,8 @@ class Reason(Enum):
 class Candidate:
     """A start and goal configuration with the state of their search; `energy` [J] is the exact value of the objective.
 
-    `shortest` [s] is a proven least duration. `holdable`: the arm can be at both ends. A candidate that is `deferred`
-    is not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
+    `shortest` [s] is a proven least duration. `holdable`: both ends are feasible. A candidate that is `deferred` is
+    not solved yet, because similar candidates have a smaller lower bound. `sampled`: an end is one of infinitely
     many configurations that reach its target.
     """
 
@@ -162,7 +162,7 @@ def _combined(start: EndConfiguration, goal: EndConfiguration, windings: bool, m
     """Starts and goals (k, nq) [rad] of all combinations of the options of each joint, the last joint's first; of some
     of them, if there are more than `most`."""
     options = [
-        _joint_options(s, g, start.fixed or goal.fixed, windings)
+        joint_options(s, g, start.fixed or goal.fixed, windings)
         for s, g in zip(start.choices, goal.choices, strict=True)
     ]
     count = math.prod(map(len, options))
@@ -175,7 +175,7 @@ def _combined(start: EndConfiguration, goal: EndConfiguration, windings: bool, m
     return q_start, q_goal
 
 
-def _joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
+def joint_options(starts: list[float], goals: list[float], fixed: bool, windings: bool) -> list[tuple[float, float]]:
     """(start, goal) [rad] of one joint for each displacement, least first."""
     both = sorted(product(starts, goals), key=lambda pair: (abs(pair[1] - pair[0]), abs(pair[0]) + abs(pair[1])))
     if not windings:
@@ -253,7 +253,7 @@ class _Ends:
 
 
 def _rule_out(candidates: Sequence[Candidate], marked: Mask, message: str, possible: bool) -> None:
-    """Settle the `marked` (P,) candidates as infeasible. They keep their bounds if an arm can be there."""
+    """Settle the `marked` (P,) candidates as infeasible. They keep their bounds if it is `possible` to be there."""
     for row in np.flatnonzero(marked).tolist():
         candidate = candidates[row]
         candidate.settle(CandidateStatus.INFEASIBLE, Reason.INVALID_END, message)

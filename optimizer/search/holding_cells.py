@@ -52,7 +52,7 @@ class HoldingCells:
         half = (high - low) / 2
         d, next_ = self._displacements(start, (low + high) / 2, half)
         nearest = np.maximum(np.abs(d) - half, 0.0)
-        cap = np.minimum(plain + MOST * np.abs(plain), self._turned(nearest, next_, gain))
+        cap = np.minimum(plain + MOST * np.abs(plain), self._plain.of_other_turns(nearest, next_, gain))
         net = NetEnergy.for_motions(self.prepared.arm, nearest, gain)
         edges, eta, allowed = self._cells(net, nearest, cap)
         # the nearest goal of the box first, whose motions may be the shortest
@@ -99,16 +99,6 @@ class HoldingCells:
             next_ = np.minimum(next_, np.abs(np.where(nearer, nearest, away)))
             nearest = np.where(nearer, away, nearest)
         return np.where(np.isfinite(nearest), nearest, 0.0), np.maximum(next_ - half, 0.0)
-
-    def _turned(self, away: Array, next_: Array, gain: Array) -> Array:
-        """Plain bounds (n,) [J] on motions of which any joint turns by a full turn more than it need."""
-        n, nq = away.shape
-        other = np.where(np.eye(nq, dtype=bool), next_[:, None], away[:, None]).reshape(-1, nq)
-        there = np.isfinite(other).all(axis=1)
-        value = np.full(n * nq, np.inf)
-        if there.any():
-            value[there] = self._plain.of(other[there], np.repeat(gain, nq)[there])
-        return np.asarray(value.reshape(n, nq).min(axis=1))
 
     @cached_property
     def _plain(self) -> LeastBound:

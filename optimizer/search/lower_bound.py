@@ -113,6 +113,16 @@ class LeastBound:
             potential_gain = np.maximum(potential_gain, 0.0)  # that bound is |gain|, of which zero is the least
         return lower_bounds(self.prepared, displacement, potential_gain, np.full_like(potential_gain, self._hold))[0]
 
+    def of_other_turns(self, displacement: Array, turned: Array, potential_gain: Array) -> Array:
+        """Bounds (b,) [J] on motions of which at least one joint has the displacement `turned` (b, nq) [rad] or more,
+        inf for none, and the others as in `of`."""
+        b, nq = displacement.shape
+        other = np.where(np.eye(nq, dtype=bool), turned[:, None], displacement[:, None]).reshape(-1, nq)
+        there, value = np.isfinite(other).all(axis=1), np.full(b * nq, np.inf)
+        if there.any():
+            value[there] = self.of(other[there], np.repeat(potential_gain, nq)[there])
+        return np.asarray(value.reshape(b, nq).min(axis=1))
+
     @cached_property
     def _hold(self) -> float:
         """Least power [W] to stand still: with no torque to hold."""

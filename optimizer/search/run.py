@@ -24,7 +24,7 @@ from optimizer.search.candidates import Candidate, Reason, bound, pairs
 from optimizer.search.ends import ends
 from optimizer.search.fastest import find_fastest
 from optimizer.search.free_goal_bound import family_bound_of
-from optimizer.search.held_pairs import hold
+from optimizer.search.holding_pairs import raise_bounds
 from optimizer.search.incumbent import Incumbent
 from optimizer.search.least_work import explore_least_work
 from optimizer.search.missed_branches import all_known, bound_of_others
@@ -328,7 +328,7 @@ class Run:
         """What no motion goes below [J], and whether every candidate that was not solved needs at least `objective`."""
         incumbent = self.incumbent
         prepared, candidates = incumbent.prepared, incumbent.candidates
-        hold(prepared, candidates, incumbent.deadline)
+        raise_bounds(prepared, candidates, incumbent.deadline)
         if self.problem.bound == "tight":
             tighten(prepared, candidates, objective, incumbent.deadline)
         open_ = [each for each in candidates if each.status in (CandidateStatus.UNVISITED, CandidateStatus.FAILED)]
@@ -343,8 +343,8 @@ class Run:
         else:
             beside = bound_beside(prepared, candidates, incumbent.deadline, objective)
             family = min(family, beside) if any(each.sampled for each in candidates) else family
-        # where no motion is sought, there may be one
-        shut = min((each.lower_bound for each in candidates if not each.holdable), default=np.inf)
-        done = all(each.status is CandidateStatus.PRUNED for each in open_) and min(family, shut) >= objective
+        # an end that is infeasible for the search may still be one of other motions
+        unsought = min((each.lower_bound for each in candidates if not each.holdable), default=np.inf)
+        done = all(each.status is CandidateStatus.PRUNED for each in open_) and min(family, unsought) >= objective
         least = min([family, beside, *(each.lower_bound for each in candidates if not each.sampled)])
         return least, done and all_known(self.problem)

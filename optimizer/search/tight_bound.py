@@ -3,8 +3,9 @@
 `lower_bound.electrical` at a fixed duration T is convex in T. Beyond the durations where it reaches the energy E* of
 the best motion found it stays above E*. In between, cells of T each have the greater of the plain bound and the dual
 one. No motion of the pair spends less than the least over the cells, or than E* if that is less: the tight bound is
-the lesser of the two, and never below the plain one. Where the dual bound does not apply (another objective, a
-friction law that is not concave, more durations than its cells can cover) the plain one stays.
+the lesser of the two, and never below the plain one; nor above the plain one of full turns that no candidate has
+(`turns_left_out`). Where the dual bound does not apply (another objective, a friction law that is not concave, more
+durations than its cells can cover) the plain one stays.
 
 The dual bound is tried around the pair's own motion, or a straight one if it has none, with a few multipliers: those
 nearest to the motor torque that are linear in time, of the joints that carry no gravity, and of these and the joints
@@ -33,6 +34,7 @@ from optimizer.problem.problem import LEAST_DURATION, LONGEST_DURATION
 from optimizer.search.candidates import Candidate
 from optimizer.search.cruise import copper_loss
 from optimizer.search.lower_bound import copper_multiplier, electrical
+from optimizer.search.turns_left_out import bound_of_turns_left_out
 from optimizer.trajectories.spline import sample
 from optimizer.trajectories.time_scalings import quintic_spline
 
@@ -61,7 +63,8 @@ def tighten(prepared: PreparedProblem, candidates: list[Candidate], energy: floa
     for candidate in sorted(below, key=lambda each: each.lower_bound):
         if deadline.left < TERMS_TIME:
             return
-        candidate.lower_bound = max(candidate.lower_bound, pairs.bound(candidate, energy, deadline))
+        most = bound_of_turns_left_out(prepared, candidate)
+        candidate.lower_bound = max(candidate.lower_bound, min(pairs.bound(candidate, energy, deadline), most))
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,16 @@ import pytest
 
 from models.registry import load_robot
 from optimizer.deadline import NEVER, Deadline
+from optimizer.kinematics.tcp import tcp_pose as tcp_pose_of
 from optimizer.optimize import optimize
 from optimizer.prepared_problem import PreparedProblem
+from optimizer.problem.branches import BranchFilter
 from optimizer.problem.cycle import Cycle
+from optimizer.problem.pose import Pose
 from optimizer.problem.problem import Problem
 from optimizer.search import candidates as search
 from optimizer.search.ends import ends
-from optimizer.search.held_pairs import hold
+from optimizer.search.holding_pairs import raise_bounds
 from tests.optimizer.moves import GOAL, START, problem, tcp_pose
 
 # the arm stretched out sideways at both ends: it holds its weight all the way
@@ -25,6 +28,9 @@ TURNED = OUT + np.array([1.2, 0.1, -0.1, 0.0, 0.0, 0.5])
 SHARE = 0.3
 # the cells of a higher bound are others: by how much that may change it
 AGAIN = 0.02
+# by how much a joint has less than half a turn to go [rad]
+HALF_TURN_LESS = 0.01
+BRANCH = BranchFilter("left", "up", "no_flip")
 
 
 def bounded(asked: Problem) -> tuple[PreparedProblem, list[search.Candidate]]:
@@ -53,14 +59,25 @@ def test_the_lowest_are_raised_until_the_least_is() -> None:
     """No bound falls, and the least one is that of a pair that was raised, or hardly could be."""
     made, found = bounded(problem(OUT, tcp_pose(TURNED)))
     before = {id(each): each.lower_bound for each in found}
-    hold(made, found, NEVER)
+    raise_bounds(made, found, NEVER)
     raised = [each for each in found if each.lower_bound != before[id(each)]]
     assert all(each.lower_bound > before[id(each)] for each in raised)
     assert min(found, key=lambda each: each.lower_bound) in raised
     # a second time, nothing is left to be raised by much
     least = min(each.lower_bound for each in found)
-    hold(made, found, NEVER)
+    raise_bounds(made, found, NEVER)
     assert min(each.lower_bound for each in found) == pytest.approx(least, rel=AGAIN)
+
+
+@pytest.mark.parametrize("bound", ["normal", "tight"])
+def test_turns_that_are_no_candidates_are_bounded_too(bound: str) -> None:
+    """Without full turns, a joint that has half a turn to go has about as far the other way around."""
+    arm = problem(robot=load_robot("ur20")).arm
+    goal = TURNED + (np.pi - HALF_TURN_LESS - TURNED[5]) * np.eye(6)[5]
+    asked = problem(OUT, Pose(tcp_pose_of(arm, goal)), robot=arm.robot, windings=False, bound=bound, branch=BRANCH)
+    other = problem(OUT, goal - 2 * np.pi * np.eye(6)[5], robot=arm.robot)
+    _, (around,) = bounded(other)
+    assert optimize(asked).lower_bound <= around.lower_bound
 
 
 def test_nothing_changes_where_it_does_not_apply() -> None:
@@ -71,5 +88,5 @@ def test_nothing_changes_where_it_does_not_apply() -> None:
     ):
         made, found = bounded(problem(START, tcp_pose(GOAL), **given))
         before = [each.lower_bound for each in found]
-        hold(made, found, deadline)
+        raise_bounds(made, found, deadline)
         assert [each.lower_bound for each in found] == before

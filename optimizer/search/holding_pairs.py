@@ -14,6 +14,7 @@ from optimizer.deadline import Deadline
 from optimizer.prepared_problem import PreparedProblem
 from optimizer.search.candidates import Candidate
 from optimizer.search.holding_cells import HoldingCells
+from optimizer.search.turns_left_out import bound_of_turns_left_out
 
 # times that a bound is raised at most, and the time [s] that it takes at most
 MOST_RAISED, RAISING = 16, 0.1
@@ -22,9 +23,9 @@ MOST_RAISED, RAISING = 16, 0.1
 STEP = 0.2
 
 
-def hold(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> None:
-    """Raise the least of the lower bounds of candidates, until the least one has been raised as far as it can be."""
-    pairs = [each for each in candidates if not each.sampled and each.goal.tolerance is None]
+def raise_bounds(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: Deadline) -> None:
+    """Raise the lowest bound of the candidates, again and again, until it is one that cannot be raised further."""
+    pairs = [each for each in candidates if not each.sampled]
     lowest = min(pairs, key=_bound_of, default=None)
     if lowest is None or np.isinf(lowest.lower_bound) or (cells := HoldingCells.of(prepared)) is None:
         return
@@ -32,12 +33,14 @@ def hold(prepared: PreparedProblem, candidates: Sequence[Candidate], deadline: D
     for _ in range(MOST_RAISED):
         if id(lowest) in done or deadline.left < RAISING:
             return
+        most = bound_of_turns_left_out(prepared, lowest)
         # a bound may be near zero: what is drawn at all times is a measure, too
-        cap = lowest.lower_bound + STEP * (abs(lowest.lower_bound) + prepared.arm.base_power * lowest.shortest)
+        step = STEP * (abs(lowest.lower_bound) + prepared.arm.base_power * lowest.shortest)
+        cap = min(lowest.lower_bound + step, most)
         gain = prepared.potential(lowest.q_goal) - prepared.potential(lowest.q_start)
         value = cells.pair(lowest.q_start, lowest.q_goal, gain, cap)
         lowest.lower_bound = max(lowest.lower_bound, value)
-        if value < cap:
+        if value < cap or cap == most:
             done.add(id(lowest))
         lowest = min(pairs, key=_bound_of)
 
